@@ -244,7 +244,19 @@ def test_a_parabola_is_told_where_errors_hang_together() -> None:
         rate = rate_of(time, -0.2 * time * (1.2 - 0.2 * time / time[-1]) + 2e-3 * errors)
         assert not rate.steady
         assert rate.low < -0.2 < rate.high
-        assert rate.thirds == pytest.approx((-0.2 * (1.2 - 0.4 / 6.0), -0.2 * (0.8 + 0.4 / 6.0)), rel=0.06)
+        assert rate.thirds == pytest.approx([-0.2 * (1.2 - 0.4 * at) for at in (1 / 6, 1 / 2, 5 / 6)], rel=0.06)
+
+
+def test_a_rate_that_changes_is_told_third_by_third_as_it_is() -> None:
+    """A rest in the middle, and nothing seen in the last third but its end: no cubic goes through it."""
+    time = np.arange(300) / 30.0
+    way = np.where(time < 4.0, time, np.where(time < 6.0, 4.0, time - 2.0))
+    noise = 1e-3 * np.random.default_rng(4).standard_normal(300)
+    assert rate_of(time, way + noise).thirds == pytest.approx((1.0, 0.4, 1.0), abs=0.04)
+    unseen = np.where((time > 6.6) & (time < 9.95), np.nan, way + noise)
+    first, middle, last = rate_of(time, unseen, unsteady=True).thirds
+    assert (first, middle) == pytest.approx((1.0, 0.4), abs=0.04)
+    assert np.isnan(last)
 
 
 def test_residuals_lie_about_0_where_errors_wander() -> None:

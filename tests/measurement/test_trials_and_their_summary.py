@@ -241,8 +241,9 @@ def test_a_body_that_slows_down_by_a_third_is_told_with_its_rates(make_track: Ca
     slowing = replace(track, body_angle=mean * time * (1.2 - 0.2 * time / span) + 0.4 * errors)
     trial = trial_of(slowing, robot)
     [flag] = [flag for flag in trial.flags if flag.name == "not-steady-body-rotation-rate"]
-    first, last = (float(words.split(" Hz")[0]) * Hz for words in flag.sentence.split("from ")[1].split(" to ")[:2])
+    first, second, last = (float(words.split(" Hz")[0]) * Hz for words in flag.sentence.split("video: ")[1].split(", "))
     assert first == pytest.approx(mean * (1.2 - 0.4 / 6.0), rel=0.05)
+    assert second == pytest.approx(mean, rel=0.05)
     assert last == pytest.approx(mean * (0.8 + 0.4 / 6.0), rel=0.05)
     found = trial.quantities["body_rotation_rate"]
     assert found.low < mean < found.high

@@ -106,12 +106,12 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
 
 
 def _how(rate: Rate, name: str) -> str:
-    """From what to what a rate changes, a clause."""
-    if not rate.thirds:
-        return ""
+    """How a rate changes, a clause; third by third of the time, as far as it was measured."""
     unit, size = ("mm/s", 1e3) if name == "forward_velocity" else ("Hz", 1.0 / Hz)
-    first, last = (f"{size * third:.3g} {unit}" for third in rate.thirds)
-    return f", from {first} in its first third to {last} in its last"
+    places = ("first", "second", "last")
+    known = [(place, third) for place, third in zip(places, rate.thirds, strict=False) if np.isfinite(third)]
+    told = [f"{size * third:.3g} {unit} in its {place} third" for place, third in known]
+    return f": {', '.join(told)}" if told else ""
 
 
 def says_synthetic(words: str) -> bool:

@@ -43,8 +43,6 @@ _UNSTEADY_SHARE = 0.1
 """Relative change of a rate below which it counts as steady."""
 _END_TO_END = np.array([0.0, 1.0, 0.0, 1.0])
 """The mean rate (p(1) - p(-1))/2 of a series of Legendre polynomials, to which those of odd degree contribute."""
-_THIRDS = (-1.0, -1.0 / 3.0), (1.0 / 3.0, 1.0)
-"""The first and the last third of a series, in scaled time."""
 _ENDS = 5
 """Readings averaged at each end of a series."""
 _ROUNDING = 1e-12
@@ -82,7 +80,7 @@ class Rate:
     residual: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """Residuals of the fit, (n,); NaN where not measured or an outlier."""
     thirds: tuple[float, ...] = ()
-    """Mean rates over the first and the last third of the series; empty where the rate is steady."""
+    """Mean rate over each third of the time, NaN where nothing was measured; empty where the rate is steady."""
 
     @property
     def measured(self) -> bool:
@@ -160,7 +158,7 @@ def rate_of(
         not changes,
         fitted.correlation_time * half,
         residual,
-        tuple(_mean_slope(fitted.mean, *part) / half for part in _THIRDS) if changes else (),
+        _in_thirds(t, y) if changes else (),
     )
 
 
@@ -195,6 +193,13 @@ def _weights(error: Samples | None, used: np.ndarray) -> Samples:
     usual = np.nanmedian(here) if np.isfinite(here).any() else 1.0
     ratio = np.where(np.isfinite(here), here / usual, 3.0)
     return np.asarray(1.0 / np.clip(ratio, 1.0 / 3.0, 3.0) ** 2)
+
+
+def _in_thirds(time: Samples, values: Samples) -> tuple[float, ...]:
+    """Mean slope over each third of the time, from its first few readings to its last few; NaN where there are few."""
+    third = np.minimum((3.0 * (time - time[0]) / (time[-1] - time[0])).astype(int), 2)
+    parts = [(time[third == k], values[third == k]) for k in range(3)]
+    return tuple(_from_end_to_end(*part) if part[0].size > _ENDS else np.nan for part in parts)
 
 
 def _from_end_to_end(s: Samples, y: Samples) -> float:
@@ -440,13 +445,7 @@ def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
     return any(curve.p_value(-1) < _UNSTEADY_P and _bends(curve.mean) for curve in curves)
 
 
-def _mean_slope(beta: Samples, first: float, last: float) -> float:
-    """Mean slope of a Legendre series between two scaled times."""
-    start, end = np.polynomial.legendre.legvander([first, last], beta.size - 1) @ beta
-    return float((end - start) / (last - first))
-
-
 def _bends(beta: Samples) -> bool:
     """Whether the slope of a Legendre series changes by more than a tenth of its mean."""
     slope = np.polynomial.legendre.legval(np.linspace(-1, 1, 41), np.polynomial.legendre.legder(beta))
-    return bool(np.ptp(slope) > _UNSTEADY_SHARE * abs(_mean_slope(beta, -1.0, 1.0)))
+    return bool(np.ptp(slope) > _UNSTEADY_SHARE * abs(_END_TO_END[: beta.size] @ beta))

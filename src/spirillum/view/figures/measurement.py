@@ -46,8 +46,8 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
     for trial in measurement.trials:
         found[f"series-{trial.name}"] = Picture(
             f"Series of {plain(trial.name)}",
-            "Left: what was seen on every frame (dots) and the fitted line; grey are frames that were left out of it: "
-            "stray ones, and the first six of a compressed film whose first picture is ahead. Right: residuals.",
+            "Left: what was seen on every frame (dots) and the fit, a line, or a cubic where the rate changes; grey are "
+            "frames that were left out of it: stray ones, and the first six of a compressed film whose first picture is ahead. Right: residuals.",
             f"Position, body angle and tail phase of {plain(trial.name)} over time, with residuals",
             lambda trial=trial: trial_figure(trial),  # type: ignore[misc]
         )
@@ -73,7 +73,7 @@ def trial_figure(trial: Trial) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel("time, s")
     left_out = {name: _left_out(values[name], trial.fits[name]) for name, _, _ in _SERIES}
-    panels[0][0].set_title(f"measured, with the fitted line{_why_left_out(list(left_out.values()))}", loc="left")
+    panels[0][0].set_title(f"measured, with the fit{_why_left_out(list(left_out.values()))}", loc="left")
     panels[0][1].set_title("residuals", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
