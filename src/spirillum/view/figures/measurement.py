@@ -46,8 +46,9 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
     for trial in measurement.trials:
         found[f"series-{trial.name}"] = Picture(
             f"Series of {plain(trial.name)}",
-            "Left: what was seen on every frame (dots) and the fit, a line, or a cubic where the rate changes; grey are "
-            "frames that were left out of it: stray ones, and the first six of a compressed film whose first picture is ahead. Right: residuals.",
+            "Left: what was seen on every frame (dots) and the fit, a line, or a cubic where the rate changes; grey "
+            "are frames that were left out of it: stray ones, and the first six of a compressed film whose first "
+            "picture is ahead. Right: residuals.",
             f"Position, body angle and tail phase of {plain(trial.name)} over time, with residuals",
             lambda trial=trial: trial_figure(trial),  # type: ignore[misc]
         )
