@@ -51,15 +51,16 @@ def show(
     from spirillum.view.scene3d.show import show as answer
 
     target = output if output is not None or window else Path("robot.png")
-    found = answer(
-        loaded_robot(robot, settings),
-        target,
-        view=view,
-        phase=angle(phase),
-        size=size,
-        channel=not no_channel,
-        window=window,
-    )
+    with renderer.at_work("drawing the robot", quiet=json):
+        found = answer(
+            loaded_robot(robot, settings),
+            target,
+            view=view,
+            phase=angle(phase),
+            size=size,
+            channel=not no_channel,
+            window=window,
+        )
     renderer.show(found.to_dict(), json=json)
 
 

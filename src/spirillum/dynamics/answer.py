@@ -61,6 +61,8 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         "steady": dataset.attrs["steady"],
         "duration": quantity(float(last["time"]), "s"),
     }
+    if (begins := float(dataset["time"][0])) > 0.0:
+        content["begins"] = quantity(begins, "s", meaning="first sample of a continued run; means are over this part")
     scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]
     content |= {
         name: quantity(float(dataset[name]), str(dataset[name].attrs["units"]), **_interval(dataset, name))

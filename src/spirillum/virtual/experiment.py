@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -166,10 +166,10 @@ def virtual_experiment(
     if plan.duration is not None and plan.duration * camera.fps < 1.0:
         frame = 1.0 / camera.fps
         raise InputError(f"duration = {plan.duration:g} s; allowed: at least the {frame:.4g} s of a frame")
-    robots, default_model, placement = _robots(study)
+    robots, default_model, placement, cautions = _robots(study)
     if len(robots) * plan.trials > _MOST:
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
-    steady, warnings = {}, []
+    steady, warnings = {}, list(cautions) if motion.model is None else []
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model, placement)
         warnings += [f"{name}: {sentence}" for sentence in said]
@@ -215,10 +215,23 @@ def virtual_experiment(
     )
 
 
-def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Robot], str, Placement | None]:
-    """Robots by the names of their folders, the study's first model, and where it says that robots lie."""
+class _Filmed(NamedTuple):
+    """What an experiment films."""
+
+    robots: dict[str, Robot]
+    """By the names of their folders."""
+    model: str
+    """The study's first."""
+    placement: Placement | None
+    """Where the study says that robots lie."""
+    cautions: tuple[str, ...]
+    """What to be careful about in that model, a sentence each."""
+
+
+def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
+    """What a study has filmed; None: the paper's robots."""
     if study is None:
-        return {name: load(name) for name in PAPER_ROBOTS}, AUTO, None
+        return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None, ())
     from spirillum.studies.loading import load_study
 
     loaded = load_study(study)
@@ -233,7 +246,8 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Rob
             name = f"{name}-{1e3 * tail.wavelength:g}-{1e3 * tail.amplitude:g}"
             robot = robot.model_copy(update={"name": name})
         found[file_name(name, {*found, _MARK, _TABLE})] = robot
-    return found, loaded.study.models[0], loaded.study.placement if loaded.study.placement.is_given else None
+    placement = loaded.study.placement if loaded.study.placement.is_given else None
+    return _Filmed(found, loaded.study.models[0], placement, loaded.cautions)
 
 
 def _gap(robot: Robot, placement: Placement | None) -> float | None:

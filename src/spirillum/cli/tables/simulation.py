@@ -58,7 +58,8 @@ def table(answer: Answer, console: Console) -> None:
     for words in _events(answer["events"]):
         console.print(escape(words), highlight=False)
     show_error(answer["error_estimate"], console)
-    console.print("last 2/3: over the last two thirds of the run, on or off", highlight=False)
+    whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
+    console.print(f"last 2/3: over the last two thirds of {whole}, on or off", highlight=False)
     console.print(f"steady: {answer['steady']}", highlight=False, soft_wrap=True)
     for name in ("plot", "movie"):
         if name in answer:

@@ -215,7 +215,8 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
     if not in_tube or path is None:
         return f"{name}: a run in time"
     time = dataset["time"].values
-    swims = f"swims {1e3 * (path[-1, 0] - path[0, 0]):.3g} mm in {float(time[-1] - time[0]):.4g} s"
+    span = f"in {float(time[-1]):.4g} s" if time[0] == 0 else f"from {float(time[0]):.4g} to {float(time[-1]):.4g} s"
+    swims = f"swims {1e3 * (path[-1, 0] - path[0, 0]):.3g} mm {span}"
     azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
     around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
     if swing < _STILL:
@@ -241,6 +242,8 @@ def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
         ]
         found += [f"roughness {1e6 * float(attrs['roughness']):.3g} µm"] if "roughness" in attrs else []
         found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
+    if "draws" in attrs:
+        found.append(f"the middle of {attrs['draws']} draws")
     return found
 
 
