@@ -99,8 +99,8 @@ _WORDS = {
     "contact_force": "borne by asperities with a contact force of",
 }
 _STATES = {
-    "steady": "steady motion, solved for after {time} of its run",
-    "orbits": "orbit around the tube's axis, solved for after {time} of its run",
+    "steady": "steady motion (fixed point of a turn, found from the run at {time})",
+    "orbits": "orbit around the tube's axis (fixed point of a turn, found from the run at {time})",
     "goes around": "goes around the tube, followed for {time}",
     "changing": "still changing after {time}, in its last turn",
 }
