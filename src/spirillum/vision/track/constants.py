@@ -679,6 +679,10 @@ class FollowingConstants:
     """Time between two frames over the usual one from which on the robot may have left its predicted way."""
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
+    few_edges: float = 0.75
+    """Share of the edges that fit, over the usual one, below which the robot may be elsewhere: a shadow takes some."""
+    more_edges: float = 1.2
+    """Share of the edges that fit at another place, over that where it was followed, from which on it is there."""
 
 
 @dataclass(frozen=True)

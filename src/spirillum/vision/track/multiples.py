@@ -79,7 +79,7 @@ def near_their_mean(steps: Samples, period: float) -> Samples:
 
 def _unit(steps: Samples) -> float | None:
     """The largest step of which all are multiples; None where there is none."""
-    top = float(np.quantile(steps, 0.98))
+    top = float(np.quantile(steps, 1.0 - MULTIPLES.share))  # beyond it may lie misread frames
     if top <= 0.0:
         return None
     sizes = top * np.geomspace(1.0 / MULTIPLES.most, 1.05, 400)

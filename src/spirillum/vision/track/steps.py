@@ -73,7 +73,7 @@ class Follower:
         """Place the robot on the next frame, and read its stripes and tail."""
         start, record = self.known.start, self.record
         found = self._placed(frame, self._guess(frame.time))
-        if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
+        if self._may_be_elsewhere(found):
             found = self._found_again(frame, found)
         stripes = self.known.stripes
         roll, edges = _UNREAD, np.asarray(np.full(len(stripes.stripes), np.nan))
@@ -137,14 +137,30 @@ class Follower:
         tried = [self._near(frame, pose) for pose in (guess, near, self.record.placed[-1].pose)]
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
+    def _may_be_elsewhere(self, found: Placed) -> bool:
+        """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do.
+
+        It is searched for at once where they do so on a frame for the first time, then now and then.
+        """
+        placed = self.record.placed
+        now_and_then = len(placed) % FOLLOWING.search_interval == 0
+        if not found.known:
+            return now_and_then
+        shares = [one.share for one in placed if one.known]
+        if len(shares) < FOLLOWING.memory:
+            return False
+        few = FOLLOWING.few_edges * float(np.median(shares))
+        return found.share < few and (now_and_then or not placed[-1].known or placed[-1].share >= few)
+
     def _found_again(self, frame: Frame, lost: Placed) -> Placed:
-        """Search the whole picture for the body; `lost` if it is not found."""
+        """Search the whole picture for the body; `lost` if it is not found where more of its edges fit."""
+        least = FOLLOWING.more_edges * lost.share if lost.known else 0.0
         start, still = self.known.start, self.still
         factor = frame.image.shape[1] // still.shape[1]
         for candidate in candidates(frame.reduced(factor), still, start.body.shape(factor))[:2]:
             better = close_place(frame, still, start.body, candidate.pose)
             if start.as_clear(better.score):
                 found = start.body.place(frame.image, better.pose)
-                if found.known:
+                if found.known and found.share > least:
                     return found
         return lost
