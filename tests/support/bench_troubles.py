@@ -109,6 +109,17 @@ def _piece_missing(*, even: bool) -> Change:
     return change
 
 
+def _joined(film: Film, _scene: Scene, _rng: np.random.Generator) -> Film:
+    """Its first half twice, as where two recordings were joined."""
+    half = (len(film.images) + 1) // 2
+    return replace(
+        film,
+        images=[*film.images[:half], *film.images[:half]],
+        numbers=film.numbers[: 2 * half],
+        times=film.times[: 2 * half],
+    )
+
+
 def _first(seconds: float) -> Change:
     return lambda film, _scene, _rng: _kept(film, np.arange(round(seconds * FPS) + 1), even=False)
 
@@ -298,6 +309,7 @@ TROUBLES = (
     Trouble("frames lost, times even", "a twentieth of the frames, and the film counts on", _lost(0.05, even=True)),
     Trouble("camera paused", "a second is missing, with true times", _piece_missing(even=False)),
     Trouble("film cut", "a second is missing, and the film counts on", _piece_missing(even=True), known=()),
+    Trouble("films joined", "the first half follows once more", _joined, known=()),
     Trouble("clock jumps", "by 1 to 4 s in the middle, nothing is missing", _clock_jumps, known=()),
     Trouble("camera rolled", "by 2 to 8 degrees", _rolled, still=False),
     Trouble("portrait", "the camera is turned by 90 degrees", _portrait, still=False),

@@ -191,3 +191,17 @@ def test_after_a_gap_the_robot_is_found_where_it_went(tmp_path):
     assert 11 * true > 3 * pixel
     assert step == pytest.approx(np.full(step.size, true), abs=0.25 * pixel)
     assert "times-do-not-fit" in [flag.name for flag in found.flags]
+
+
+def test_a_robot_that_jumps_away_is_found_where_it_is(tmp_path):
+    """Two films that were joined, 16 pixels: edges of the wrong place would fit well enough to be followed on."""
+    scenery = scene("flat", 2)
+    images = [scenery.draw(k / FPS) for k in range(0, 72, 3)]
+    count = len(images)
+    film = Film([*images, *images], list(range(2 * count)), [k / FPS for k in range(2 * count)], dict(scenery.setup))
+    path, setup = film.write(tmp_path, scenery.robot_text)
+    found = follow(path, *load_setup(setup))
+    x, pixel = found.position[:, 0], found.scale.length_per_pixel
+    assert x[count - 1] - x[0] > 10.0 * pixel
+    assert x[count:] == pytest.approx(x[:count], abs=0.25 * pixel)
+    assert [flag.name for flag in found.flags] == ["video-is-cut"]
