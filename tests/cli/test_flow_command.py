@@ -163,6 +163,29 @@ def test_grids_are_checked_before_anything_is_solved(run: Callable[..., Any], mo
     assert run("flow", WIDE, "-o", "flow.png", "--phase", "1").code == 2
 
 
+def test_a_run_is_not_written_over_and_its_grid_is_checked_before_anything_is_solved(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import spirillum.dynamics.flow_of_run as module
+
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(module, "tube_flow_field", solved)
+    kept = str(tmp_path / "run.nc")
+    assert run("simulate", WIDE, "-o", kept, "--duration", "0.05s").code == 0
+    moment = ("flow", "--run", kept, "--time", "0.02s")
+    held = Path(kept).read_bytes()
+    for target in ("-o", "--volume"):
+        over = run(*moment, target, kept)
+        assert over.code == 2
+        assert "run.nc is read by this command and would be written over" in over.err
+    assert Path(kept).read_bytes() == held
+    for arguments in (("--plane", "xyz"), ("--resolution", "1"), ("--offset", "1m")):
+        assert run(*moment, "-o", str(tmp_path / "flow.png"), *arguments).code == 2
+    assert run(*moment, "--volume", str(tmp_path / "flow.vti"), "--volume-resolution", "1").code == 2
+
+
 @pytest.mark.usefixtures("unplaced")
 def test_the_example_of_the_help_runs(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -51,8 +51,11 @@ def test_a_continued_run_is_the_run_that_had_not_ended(early: Path) -> None:
         ({"in_tube": {"wait": "1 s"}}, "in_tube.wait is given together with in_tube.continued"),
         (
             {"motion": "held"},
-            "in_tube.continued is given with model 'tube'; allowed: only with",
+            "in_tube.continued is given with motion 'held'; allowed: only with",
         ),
+        ({"placement": {"eccentricity": 0.0}}, "placement.eccentricity is given together with in_tube.continued"),
+        ({"placement": {"pitch": "0 deg"}}, "placement.pitch is given together with in_tube.continued"),
+        ({"in_tube": {"azimuth": 0.0}}, "in_tube.azimuth is given together with in_tube.continued"),
     ],
     ids=str,
 )
@@ -144,3 +147,16 @@ def test_a_damaged_run_is_not_continued(
         change(dataset.load()).to_netcdf(tmp_path / "damaged.nc")
     with pytest.raises(InputError, match=words):
         simulated("0.6 s", in_tube={"continued": tmp_path / "damaged.nc"})
+
+
+def test_rows_of_a_flow_beyond_the_run_change_nothing(tmp_path: Path) -> None:
+    """Only those about a step are handed to the equations: a log of an hour costs no more than its first seconds."""
+    rows = ["time_s,flow_mm_s", "0,0", "0.02,1", "0.05,0.5", "0.3,0.5"]
+    short, long = tmp_path / "short.csv", tmp_path / "long.csv"
+    short.write_text("\n".join(rows))
+    long.write_text("\n".join([*rows, *(f"{10 + k},{k % 3}" for k in range(500))]))
+    one, other = (
+        sp.simulate(WIDE, model="tube", timing={"duration": "0.1 s"}, in_tube={"flow": path}) for path in (short, long)
+    )
+    assert np.array_equal(one["position"].values, other["position"].values)
+    assert np.allclose(one["mean_flow"], 1e-3 * np.interp(one["time"], [0.0, 0.02, 0.05], [0.0, 1.0, 0.5]), atol=1e-15)

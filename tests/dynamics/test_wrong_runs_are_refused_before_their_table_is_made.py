@@ -27,6 +27,7 @@ def no_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
+        ({"timing": {"duration": "1 s", "on": [b"ab"]}}, "on = .*allowed: pairs of start and stop"),
         ({"timing": {"duration": "bad"}}, 'duration = "bad" is not a time'),
         ({"timing": {"duration": "-1 s"}}, 'duration = "-1 s" is out of range'),
         ({"timing": {"turns": 0.0}}, "turns = 0.0; allowed"),

@@ -120,9 +120,12 @@ def flow(
     from spirillum.fields.answer import flow_answer
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
+    from spirillum.files import protected
+    from spirillum.fluid.tube.domain import seat_of
     from spirillum.results.flow import check_targets, write_flow
 
-    check_targets(output, volume)
+    with protected(run):
+        check_targets(output, volume)
     _check_options(context, output, volume, run, time, model)
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow, yaw)
     fineness = {"accuracy": accuracy, "tolerance": tolerance}
@@ -132,9 +135,6 @@ def flow(
             raise InputError(f"{said}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
         loaded = loaded_robot(robot, settings)
         seat = seat_in_tube(loaded, model, placement, fineness)
-        plane_around(loaded, plane, offset, extent, resolution, seat)
-        if volume is not None:
-            box_around(loaded, extent, volume_resolution, seat)
 
         def around() -> Flow:
             return answer(
@@ -148,13 +148,18 @@ def flow(
                 frame=frame,
             )
     else:
+        from spirillum.dynamics.flow_of_run import flow_of_run, moment_of_run
+
+        moment = moment_of_run(run, str(time), fineness).prediction
+        loaded, seat = moment.robot, seat_of(moment.batch)
 
         def around() -> Flow:
-            from spirillum.dynamics.flow_of_run import flow_of_run
-
             return flow_of_run(run, str(time), frame=frame, resolution=fineness, progress=progress)
 
-    with renderer.progress_bar(quiet=json) as progress:
+    plane_around(loaded, plane, offset, extent, resolution, seat)
+    if volume is not None:
+        box_around(loaded, extent, volume_resolution, seat)
+    with renderer.progress_bar(quiet=json) as progress, protected(run):
         if run is None:
             progress("flow: forces on the robot", 0, 1)
         found = around()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["flow_of_run"]
+__all__ = ["Moment", "flow_of_run", "moment_of_run"]
 
 _SCALARS = (
     *("azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow"),
@@ -51,6 +51,21 @@ _SAME_TIME = 1e-3
 _TOLERANCE = 0.03
 _THINNEST = 0.02
 """Thinnest film that is drawn, in diameters of the body: thinner ones of a yawed robot take many minutes."""
+
+
+class Moment(NamedTuple):
+    """A robot in its tube at a moment of a run, in axes of the body that do not roll; nothing is solved for yet."""
+
+    prediction: Prediction
+    """Its motion as an answer, and the place."""
+    phase: float
+    """Of the tail, rad."""
+    body: np.ndarray
+    """Twist of the body, m/s and rad/s, (6,)."""
+    rotor: np.ndarray
+    """Twist of the rotor, m/s and rad/s, (6,)."""
+    mean_flow: float
+    """Mean flow through the tube, m/s."""
 
 
 def flow_of_run(
@@ -80,6 +95,26 @@ def flow_of_run(
     """
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    at = moment_of_run(run, time, resolution)
+    if progress is not None:
+        progress(OF_A_RUN, 0, 1)
+    field = tube_flow_field(at.prediction.batch, at.body, at.rotor, at.phase, at.mean_flow)
+    return Flow(at.prediction, field, at.phase, cast("Frame", frame)).with_held_force()
+
+
+def moment_of_run(
+    run: str | Path | xr.Dataset, time: str | float, resolution: Resolution | Mapping[str, Any] | None = None
+) -> Moment:
+    """A moment of a run by `simulate` with the model `tube`, checked before anything is solved.
+
+    Args:
+        run: its file, or its dataset.
+        time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
+        resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03.
+
+    Raises:
+        InputError: for another run, a moment outside it, or a place that cannot be resolved.
+    """
     dataset = open_run(run) if isinstance(run, str | Path) else run
     moment = parse_option("time", time, KINDS["time"])
     missing = [name for name in _NEEDED if name not in dataset]
@@ -101,12 +136,7 @@ def flow_of_run(
             f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
         )
         now = now.assign_attrs(warnings="\n".join([said, now.attrs["warnings"]]))
-    prediction, phase, body, rotor = _motion(now, resolution)
-    if progress is not None:
-        progress(OF_A_RUN, 0, 1)
-    field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
-    around = Flow(prediction, field, phase, cast("Frame", frame))
-    return around.with_held_force()
+    return _motion(now, resolution)
 
 
 def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
@@ -131,10 +161,8 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
     return one.isel(time=0).assign(attitude=("quaternion", attitude)).assign_attrs(texts)
 
 
-def _motion(
-    now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None
-) -> tuple[Prediction, float, np.ndarray, np.ndarray]:
-    """The motion as an answer, the tail's phase, and the twists of body and rotor, all in axes that do not roll."""
+def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) -> Moment:
+    """The motion at a sample."""
     from scipy.spatial.transform import Rotation
 
     wanted = {"form": "direct", "tolerance": _TOLERANCE} | Resolution.of(resolution).model_dump(exclude_none=True)
@@ -184,7 +212,7 @@ def _motion(
         motion="free",
         fitted_by=now.attrs["fitted_by"],
     )
-    return found, phase, body, rotor
+    return Moment(found, phase, body, rotor, mean_flow)
 
 
 @contextmanager

@@ -38,13 +38,17 @@ def windows_of(on: Sequence[tuple[str | float, str | float]] | None) -> list[Win
     """
     if on is None:
         return None
-    given: Any = on
-    pairs = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else []
-    if not pairs or any(isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2 for pair in pairs):
+    pairs = _listed(on) or []
+    if not pairs or any(len(_listed(pair) or []) != 2 for pair in pairs):
         raise InputError(f'on = {str(on)[:60]}; allowed: pairs of start and stop, such as [("0 s", "2 s")]')
     return [
         (parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in pairs
     ]
+
+
+def _listed(given: Any) -> list[Any] | None:
+    """The items of a sequence that is no text; None of anything else."""
+    return list(given) if isinstance(given, Sequence) and not isinstance(given, str | bytes | bytearray) else None
 
 
 def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float, end: float) -> list[Switch]:

@@ -254,9 +254,8 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> N
     """
     if not walled and asked != InTube():
         name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
-        raise InputError(
-            f"in_tube.{name} is given with model '{model}'; allowed: only with model 'tube', motion 'free'"
-        )
+        given = "motion 'held'" if model == "tube" else f"model '{model}'"
+        raise InputError(f"in_tube.{name} is given with {given}; allowed: only with model 'tube', motion 'free'")
     if drawn and asked.continued is not None:
         raise InputError(
             "in_tube.continued is given together with a posterior, each draw of which moves in its own way; allowed: "

@@ -7,8 +7,9 @@ A run keeps the beginning of its last step: continued from there, it is the long
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -125,7 +126,8 @@ def integrate_in_tube(
     stops = sorted({s.time for s in switches} | {float(t) for t in robot.flow[:, 0]})
     while run.time < end:
         duty = 0.0 if spent else _duty(switches, run.time)
-        stop = min((t for t in stops if t > run.time), default=np.inf)
+        later = bisect_right(stops, run.time)
+        stop = stops[later] if later < len(stops) else np.inf
         inside = after[(after > run.time) & (after <= stop)] if not going_on else after[after <= stop]
         going_on = False
         stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=tell)
@@ -146,7 +148,14 @@ def observed_at(robot: TubeRobot, state: Samples, time: float = 0.0) -> Samples:
 
 
 def _duty(switches: Sequence[Switch], time: float) -> float:
-    return [switch for switch in switches if switch.time <= time][-1].duty
+    return switches[bisect_right(switches, time, key=lambda switch: switch.time) - 1].duty
+
+
+def _over(robot: TubeRobot, duty: float, start: float, stop: float) -> TubeRobot:
+    """The robot at a duty, with what of the imposed flow matters from one time to another: few rows are copied."""
+    times = robot.flow[:, 0]
+    first = max(int(np.searchsorted(times, start, "right")) - 1, 0)
+    return replace(robot.at_duty(duty), flow=robot.flow[first : int(np.searchsorted(times, stop, "left")) + 1])
 
 
 class _Stretch(NamedTuple):
@@ -162,7 +171,7 @@ class _Stretch(NamedTuple):
 def _stretch(
     run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Callable[[float], None]
 ) -> _Stretch:
-    robot = run.robot.at_duty(duty)
+    robot = _over(run.robot, duty, run.time, stop)
     data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
     tube_steps.watched(run.state, 0.0, data, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, tube_motion.STATES))
@@ -294,7 +303,7 @@ def _joined(
     observed = np.empty((times.size, tube_motion.OBSERVED))
     first = 0
     for time, inside, duty in pieces:
-        here = robot.at_duty(duty)
+        here = _over(robot, duty, float(time[0]), float(time[-1])) if time.size else robot
         tube_motion.observe(time, np.ascontiguousarray(inside), here.data, robot.table, observed[first:])
         first += time.size
     switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]

@@ -96,7 +96,9 @@ def tube_run(
     run = integrate_in_tube(robot, first, moments, times.switches, reach, progress)
     if run.time.size < _FEWEST:
         what = run.events[-1].what if run.events else "the equations have no next step"
-        raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
+        if isinstance(start, StartPlace):
+            raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
+        raise InputError(f"the run cannot be continued: {what}; allowed: a run that ended where it can go on")
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(times.switches, driven, float(run.time[0]))
     ended = float(run.time[-1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check_in_tube", "links_in_tube", "run_in_tube"]
 
+_STARTS = ("gap", "eccentricity", "pitch", "yaw")
+"""Fields of a placement that say where a robot is laid down."""
 _PLACES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
 """Where a run says what a table is asked for."""
 
@@ -172,13 +174,10 @@ def _check_continued(placed: Placement, asked: InTube) -> None:
     Raises:
         InputError: if there is one.
     """
-    starts: dict[str, Any] = {
-        **{f"placement.{name}": getattr(placed, name) for name in ("gap", "eccentricity", "pitch", "yaw")},
-        "in_tube.azimuth": asked.azimuth,
-        "in_tube.wait": asked.wait,
-    }
-    for name, value in starts.items():
-        if value:
+    given = {f"placement.{name}" for name in placed.model_fields_set if getattr(placed, name) is not None}
+    given |= {f"in_tube.{name}" for name in asked.model_fields_set}
+    for name in (*(f"placement.{field}" for field in _STARTS), "in_tube.azimuth", "in_tube.wait"):
+        if name in given:
             raise InputError(
                 f"{name} is given together with in_tube.continued, which begins where that run ended; allowed: one of "
                 "them"

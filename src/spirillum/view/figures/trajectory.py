@@ -258,7 +258,8 @@ def _has(dataset: xr.Dataset, panel: _Panel, time: Samples) -> bool:
 def _time_of(dataset: xr.Dataset) -> Samples:
     time = np.asarray(dataset["time"].values, dtype=float) if "time" in dataset.variables else np.zeros(0)
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
-        raise InputError(f"the run has {time.size} samples of time; allowed: at least 2, increasing")
+        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
+        raise InputError(f"the run {said}; allowed: at least 2 samples, one after the other")
     return time
 
 
