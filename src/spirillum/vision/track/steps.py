@@ -146,7 +146,7 @@ class Follower:
         now_and_then = len(placed) % FOLLOWING.search_interval == 0
         if not found.known:
             return now_and_then
-        shares = [one.share for one in placed if one.known]
+        shares = [one.share for one in placed[-FOLLOWING.usual_edges :] if one.known]
         if len(shares) < FOLLOWING.memory:
             return False
         few = FOLLOWING.few_edges * float(np.median(shares))
