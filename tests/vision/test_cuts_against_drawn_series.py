@@ -84,6 +84,8 @@ def test_where_the_motion_does_not_tell_the_intervals_hold_both_readings():
     assert [flag.name for flag in found.flags] == ["clock-in-doubt"]
     assert not found.flags[0].spoils
     assert "no frame was taken for 2.53 s at 2.00 s" in found.flags[0].sentence
+    put_back = clock_of(Motion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi, stated=true)
+    assert put_back == (0.0, ())  # frames that were lost there by the motion itself
 
 
 def test_pauses_of_a_camera_are_honest_whatever_the_motor_does():

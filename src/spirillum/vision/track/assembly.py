@@ -103,7 +103,7 @@ def track_of(
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
-    clock = clock_of(motion, pixel, known.stripes.period)
+    clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
         gap_flags = ()  # by times that are wrong
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)

@@ -57,7 +57,7 @@ class Clock(NamedTuple):
     flags: tuple[Flag, ...]
 
 
-def clock_of(motion: Motion, length_per_pixel: float, period: float) -> Clock:
+def clock_of(motion: Motion, length_per_pixel: float, period: float, stated: Samples | None = None) -> Clock:
     """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?
 
     Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
@@ -68,12 +68,13 @@ def clock_of(motion: Motion, length_per_pixel: float, period: float) -> Clock:
         motion: the robot's motion.
         length_per_pixel: length per pixel, m.
         period: period of the stripes, rad.
+        stated: times of the frames as the film states them, s, (n,), where lost frames were put back; else None.
     """
     time, x, body_angle, tail_phase = motion
     none = Clock(0.0, ())
     if time.size < 2:
         return none
-    steps = np.diff(time)
+    steps = np.diff(time if stated is None else stated)
     usual, gap = float(np.median(steps)), int(np.argmax(steps))
     if not steps[gap] > CUTS.gap * usual:
         return none
