@@ -252,6 +252,7 @@ def test_held_runs_begin_at_the_place_of_each_draw(one_gap: Path) -> None:
     speed = float(run["mean_forward_velocity_steady"])
     assert speed == pytest.approx(steady.forward_velocity, rel=1e-3)
     assert float(run["mean_forward_velocity_steady_low"]) < speed < float(run["mean_forward_velocity_steady_high"])
+    assert "draws = 20: a 95 % interval of so few is about their extremes" in run.attrs["warnings"]
 
 
 def test_suggestions_ask_robots_with_tables_and_name_the_others(one_gap: Path) -> None:

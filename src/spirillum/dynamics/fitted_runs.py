@@ -25,6 +25,8 @@ __all__ = ["chosen_run", "drawn_number", "with_intervals"]
 
 _DRAWS = 100
 """Draws of a posterior that are run."""
+_SURE = 80
+"""Draws from which on the limits of a 95 % interval lie between them, not at their ends."""
 _FEWEST, _MOST = 20, 1000
 _FACTORS = {
     "mean_forward_velocity": ("advance", "motor_rate"),
@@ -140,7 +142,14 @@ def with_intervals(
         for over in _OVER:
             values = np.array(found[name + over]) * np.prod([off[factor] for factor in factors], axis=0)
             scalars |= _limits(name + over, values, dataset)
-    return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL)
+    said = str(dataset.attrs.get("warnings", ""))
+    if len(drawn) < _SURE:
+        few = (
+            f"draws = {len(drawn)}: a 95 % interval of so few is about their extremes, and varies from one set of "
+            f"draws to the next; accurate: {_SURE} and more"
+        )
+        said = f"{said}\n{few}" if said else few
+    return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL, warnings=said)
 
 
 def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset) -> dict[str, Any]:
