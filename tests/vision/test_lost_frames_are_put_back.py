@@ -131,6 +131,17 @@ def test_noise_is_no_change_of_motion(noise: float, seed: int) -> None:
     assert not {"stands-for-a-while", "reverses"} & set(restored(time, readings)[1])
 
 
+def test_a_clear_tail_says_that_a_slow_body_only_scatters() -> None:
+    """Steps of the body are lost in the errors of readings, and may look like multiples of anything."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time = np.arange(76) / 25.0
+        tail = 2 * np.pi * 4.0 * time + 0.03 * rng.normal(size=76)
+        body = -2 * np.pi * 0.1 * time + 0.02 * rng.integers(-1, 2, size=76)
+        readings = Reading(tail % (2 * np.pi), 2 * np.pi, 0.009), Reading(body % np.pi, np.pi, 0.002)
+        assert "uneven-steps" not in restored(time, readings)[1]
+
+
 def test_copies_of_a_picture_do_not_move_while_a_codec_settles() -> None:
     """It copies most pictures to the last digit; the changes of the others are below the error of any reading."""
     time, _, readings = film(0, 5)

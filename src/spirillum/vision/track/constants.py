@@ -605,6 +605,8 @@ class MultiplesConstants:
     """Mean cosine of the steps over the smallest one, in turns: 1 where all are multiples, 0 where they are any."""
     share: float = 0.1
     """Share of the steps from which on a multiple is frequent."""
+    alike: float = 0.4
+    """Difference of a step from the median step, over it, below which it is that step."""
     changing: float = 0.2
     """Share of the steps that are another multiple than the one before, below which the motor changed its rate."""
     rest: int = 5

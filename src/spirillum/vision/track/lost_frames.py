@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
-from spirillum.vision.track.multiples import Multiples, multiples_of, near_their_mean
+from spirillum.vision.track.multiples import Multiples, all_alike, multiples_of, near_their_mean
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["Reading", "Restored", "restored_times"]
@@ -117,7 +117,9 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
 
 
 def _in_multiples(time: Samples, readings: tuple[Reading, ...], frame: float) -> Multiples | None:
-    """Of the first series whose steps are multiples of one."""
+    """Of the first series whose steps are multiples of one; None where those of a clear series are alike."""
+    if any(all_alike(time, reading.values, reading.period, frame) for reading in readings):
+        return None
     found = (multiples_of(time, reading.values, reading.period, frame) for reading in readings)
     return next((one for one in found if one is not None), None)
 

@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.robust import stretches_of
 from spirillum.vision.track.constants import MULTIPLES
 
-__all__ = ["Multiples", "multiples_of", "near_their_mean"]
+__all__ = ["Multiples", "all_alike", "multiples_of", "near_their_mean"]
 
 
 class Multiples(NamedTuple):
@@ -38,14 +38,9 @@ def multiples_of(time: Samples, values: Samples, period: float, frame: float) ->
         period: period of an angle; infinite for a position.
         frame: usual time between two frames, s.
     """
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size <= MULTIPLES.fewest:
-        return None
-    steps, spans = np.diff(values[known]), np.diff(time[known])
-    each = (near_their_mean(steps, period) * frame / spans)[np.diff(known) == 1]
+    each = _steps(time, values, period, frame)
     if each.size <= MULTIPLES.fewest:
         return None
-    each = each * np.sign(np.mean(each))
     unit = _unit(each)
     if unit is None:
         return None
@@ -61,6 +56,32 @@ def multiples_of(time: Samples, values: Samples, period: float, frame: float) ->
         if len(rest) > MULTIPLES.rest:
             repeated[rest] = False
     return Multiples(int(repeated.sum()), int(np.sum(counts[far] - 1)), int(counts.size))
+
+
+def all_alike(time: Samples, values: Samples, period: float, frame: float) -> bool:
+    """Whether nearly all steps of a series are about as large as their median: it is clear, and has no multiples.
+
+    Args:
+        time: time of each frame, s, (n,).
+        values: the series, as it was read on each frame; NaN where unreadable, (n,).
+        period: period of an angle; infinite for a position.
+        frame: usual time between two frames, s.
+    """
+    each = _steps(time, values, period, frame)
+    if each.size <= MULTIPLES.fewest:
+        return False
+    middle = float(np.median(each))
+    return bool(np.mean(np.abs(each - middle) < MULTIPLES.alike * middle) > 1.0 - MULTIPLES.share)
+
+
+def _steps(time: Samples, values: Samples, period: float, frame: float) -> Samples:
+    """Steps between neighbouring frames in the time of one, mostly positive, (m,)."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 2:
+        return np.zeros(0)
+    steps, spans = np.diff(values[known]), np.diff(time[known])
+    each: Samples = (near_their_mean(steps, period) * frame / spans)[np.diff(known) == 1]
+    return each * np.sign(np.mean(each)) if each.size else each
 
 
 def near_their_mean(steps: Samples, period: float) -> Samples:
