@@ -130,7 +130,7 @@ def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
     time = numbers_of(dataset, "time", ())
     if time.size < 2 or not np.all(np.diff(time) > 0):
         said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2 samples, one after the other")
+        raise InputError(f"the run {said}; allowed: at least 2, increasing")
     if "attitude" in dataset:
         position = numbers_of(dataset, "position", ("axis",), (3,))
         attitude = attitudes_of(dataset)

@@ -259,7 +259,7 @@ def _time_of(dataset: xr.Dataset) -> Samples:
     time = np.asarray(dataset["time"].values, dtype=float) if "time" in dataset.variables else np.zeros(0)
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
         said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2 samples, one after the other")
+        raise InputError(f"the run {said}; allowed: at least 2, increasing")
     return time
 
 
