@@ -87,7 +87,7 @@ def test_first_line_says_that_no_steady_motion_was_reached(
         (["--motion", "free", "--accuracy", "high"], "accuracy = 'high' with model 'tube' and motion 'free'"),
         (["--motion", "free", "--band"], "band = True with motion 'free' in the tube"),
         (["--roughness", "20um"], "roughness = 20um is of free motion in the tube"),
-        (["--friction-coefficient", "0.2"], "--friction-coefficient = 0.2 is of free motion in the tube"),
+        (["--friction-coefficient", "0.2"], "in_tube.friction_coefficient = 0.2 is of free motion in the tube"),
     ],
 )
 def test_what_a_motion_does_not_read_is_refused(run: Callable[..., Any], arguments: list[str], words: str) -> None:
@@ -103,7 +103,7 @@ def test_what_a_motion_does_not_read_is_refused(run: Callable[..., Any], argumen
         (["--until", "1mm"], "until = 1 mm; allowed: less than 0.5 mm"),
         (["-o", "settling.nc"], "does not end in .png or .pdf or .svg"),
         (["--set", "channel=none"], "there is no [channel]; allowed: a robot with a channel.diameter, because"),
-        (["--gap", "15mm"], "--gap = 15 mm"),
+        (["--gap", "15mm"], "placement.gap = 15 mm"),
         (["--friction", "ice"], "friction"),
     ],
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import gc
 import os
-import re
 import signal
 import sys
 from _thread import interrupt_main
@@ -27,10 +26,6 @@ _INSTEAD = {
     "drive that prescribes the rate, --set drive.kind=rate --set drive.rate=1.2Hz",
 }
 """What is said of options that only other commands have, by command and option."""
-_OF_TABLES = re.compile(r"\b(?:in_tube|placement)\.(\w+)")
-"""Arguments in tables that the command line has as options."""
-_OPTIONS = {"continued": "continue"}
-"""Options that are called otherwise than the argument."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """What is wrong with a name or place, not with the program."""
 _AGAIN = 0.02
@@ -134,7 +129,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BaseException as error:
         if isinstance(error, OSError):
             _flushed(sys.stdout)
-        code = _explained(error, sys.argv[1:] if arguments is None else arguments)
+        code = _explained(error)
         if code is None:
             raise
         return code
@@ -158,7 +153,7 @@ def _check_names(arguments: Sequence[str]) -> None:
             raise InputError(f"an empty word after {word[:60]}; allowed: a name or a value")
 
 
-def _explained(error: BaseException, arguments: Sequence[str] = ()) -> int | None:
+def _explained(error: BaseException) -> int | None:
     """Say an error that is the user's in a sentence; None for one that is ours."""
     from typer import Abort
 
@@ -167,7 +162,7 @@ def _explained(error: BaseException, arguments: Sequence[str] = ()) -> int | Non
     if isinstance(error, (KeyboardInterrupt, Abort)) or _interrupts:
         return _fail("interrupted; what was done is kept", 130)
     if isinstance(error, InputError):
-        return _fail(_as_typed(str(error), arguments), 2)
+        return _fail(str(error), 2)
     if isinstance(error, MemoryError):
         return _fail("the request does not fit into memory; allowed: a smaller one", 2)
     if isinstance(error, OSError) and (sentence := _of_place(error)):
@@ -175,17 +170,6 @@ def _explained(error: BaseException, arguments: Sequence[str] = ()) -> int | Non
     if hasattr(error, "format_message"):  # a usage error of the command-line library
         return _fail(str(InputError(_of_usage(error))), 2)
     return None
-
-
-def _as_typed(sentence: str, arguments: Sequence[str]) -> str:
-    """A sentence in which what was typed as an option has the option's name: `--gap` for `placement.gap`."""
-    typed = {word.partition("=")[0] for word in arguments}
-
-    def option(found: re.Match[str]) -> str:
-        name = "--" + _OPTIONS.get(found[1], found[1].replace("_", "-"))
-        return name if name in typed else found[0]
-
-    return _OF_TABLES.sub(option, sentence)
 
 
 def _of_usage(error: Any) -> str:
