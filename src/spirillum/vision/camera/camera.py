@@ -67,8 +67,7 @@ def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
         end = video.duration if end is None else min(end, video.duration)
     elif end is None:
         end = start + _UNKNOWN
-    size = 3 * video.size[0] * video.size[1]
-    count = np.arange(max(_FEWEST_SAMPLES, min(_SAMPLES_BYTES // size, _SAMPLES)))
+    count = np.arange(video.frames_within(_SAMPLES_BYTES, _FEWEST_SAMPLES, _SAMPLES))
     shares = (count + (_GOLDEN * count) % 1.0) / count.size
     return video.samples((start + (end - start) * shares).tolist())
 

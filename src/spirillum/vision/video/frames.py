@@ -110,7 +110,11 @@ class Video:
     @property
     def waiting(self) -> int:
         """Number of frames that may wait between two threads: few large ones."""
-        return max(_FEWEST_AHEAD, min(_AHEAD_BYTES // (3 * self.size[0] * self.size[1]), _AHEAD))
+        return self.frames_within(_AHEAD_BYTES, _FEWEST_AHEAD, _AHEAD)
+
+    def frames_within(self, size: int, fewest: int, most: int) -> int:
+        """Number of frames of this video whose pictures take a number of bytes, between two limits."""
+        return max(fewest, min(size // (3 * self.size[0] * self.size[1]), most))
 
     def frames(self, start: float = 0.0, end: float | None = None) -> Iterator[Frame]:
         """The frames from one time to another, decoded ahead by a thread of its own.
