@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.run_file import numbers_of
+from spirillum.dynamics.run_file import check_increasing, numbers_of
 from spirillum.errors import InputError
 from spirillum.units import show
 
@@ -128,9 +128,7 @@ def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
         InputError: if a variable is missing, has another shape, is not finite, or there are less than two samples.
     """
     time = numbers_of(dataset, "time", ())
-    if time.size < 2 or not np.all(np.diff(time) > 0):
-        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2, increasing")
+    check_increasing(time)
     if "attitude" in dataset:
         position = numbers_of(dataset, "position", ("axis",), (3,))
         attitude = attitudes_of(dataset)

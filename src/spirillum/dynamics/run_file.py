@@ -20,7 +20,7 @@ from spirillum.units import Kind, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["numbers_of", "open_run", "robot_of", "robot_of_settings"]
+__all__ = ["check_increasing", "numbers_of", "open_run", "robot_of", "robot_of_settings"]
 
 _WHAT = "a run written by `spirillum simulate`"
 
@@ -70,6 +70,20 @@ def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape
     if np.abs(values).max(initial=0.0) > _LARGEST:
         raise InputError(f"the run's variable {name!r} holds {np.abs(values).max():.3g}; allowed: at most {_LARGEST:g}")
     return values
+
+
+def check_increasing(time: Samples) -> None:
+    """Refuse times of a run between which nothing moves.
+
+    Args:
+        time: times of its samples, s.
+
+    Raises:
+        InputError: if they are fewer than two, no series, or do not increase.
+    """
+    if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
+        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
+        raise InputError(f"the run {said}; allowed: at least 2, increasing")
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.run_file import robot_of
+from spirillum.dynamics.run_file import check_increasing, robot_of
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
@@ -257,9 +257,7 @@ def _has(dataset: xr.Dataset, panel: _Panel, time: Samples) -> bool:
 
 def _time_of(dataset: xr.Dataset) -> Samples:
     time = np.asarray(dataset["time"].values, dtype=float) if "time" in dataset.variables else np.zeros(0)
-    if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
-        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2, increasing")
+    check_increasing(time)
     return time
 
 
