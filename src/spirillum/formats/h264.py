@@ -12,6 +12,7 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.extras import required
+from spirillum.kernels.colours import film_colours
 
 __all__ = ["ENCODERS", "H264Writer", "h264_writer"]
 
@@ -28,17 +29,24 @@ class H264Writer:
         """Take an open file; `h264_writer` makes it."""
         self._av, self._container, self._stream = av, container, stream
         self._next = 0
-        self._reformatter = av.video.reformatter.VideoReformatter()
+        self._colours = np.empty((3 * stream.height // 2, stream.width), dtype=np.uint8)
 
     def add(self, image: np.ndarray, number: int | None = None) -> None:
         """Append a frame.
 
         Args:
-            image: (height, width, 3) sRGB bytes.
+            image: (height, width, 3) sRGB bytes, of the film's size.
             number: its time in ticks, later than that of the frame before; None: the next tick.
+
+        Raises:
+            ValueError: for a picture of another size.
         """
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = self._reformatter.reformat(frame, format="yuv420p", dst_colorspace="ITU709")
+        size = 2 * len(self._colours) // 3, self._colours.shape[1], 3
+        if image.shape != size:
+            raise ValueError(f"a frame of shape {image.shape} in a film of frames of shape {size}")
+        film_colours(np.ascontiguousarray(image), self._colours)
+        frame = self._av.VideoFrame.from_ndarray(self._colours, format="yuv420p")
+        frame.colorspace, frame.color_range = _BT709, _LIMITED_RANGE
         frame.pts = self._next if number is None else number
         frame.time_base = self._stream.codec_context.time_base
         self._next = frame.pts + 1

@@ -10,7 +10,7 @@ from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.newey_west import variance_of_sum
 
-__all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
+__all__ = ["edge_misfits", "profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
 
 _CHANNELS = 3
 _STEPS, _LAST = 8, 2e-5
@@ -112,6 +112,39 @@ def stripes_at(angles: Samples, blur: Samples, roll: float, order: Whole, palett
             out[n, c] = (
                 palette[one, c] * (1.0 - before) + palette[two, c] * (before - after) + palette[three, c] * after
             )
+
+
+@compiled
+def edge_misfits(
+    levels: Samples,
+    angles: Samples,
+    blur: Samples,
+    shade: Samples,
+    before: Samples,
+    after: Samples,
+    shifts: Samples,
+    out: Samples,
+) -> None:
+    """Sums of squared residuals of colours about one blurred edge between stripes, for several places of the edge.
+
+    Args:
+        levels: observed colours, (n, 3).
+        angles: where, rad, (n,).
+        blur: standard deviation of the blur there, rad, (n,).
+        shade: shading factor and additive sheen there, in each channel, (n, 6).
+        before: colour of the stripe at smaller angles, (3,).
+        after: colour of the stripe at larger angles, (3,).
+        shifts: angles of the edge, rad, (k,).
+        out: the sums, (k,).
+    """
+    for k in range(shifts.size):
+        out[k] = 0.0
+        for n in range(angles.size):
+            share = 0.5 * (1.0 + math.erf((angles[n] - shifts[k]) / (blur[n] * math.sqrt(2.0))))
+            for c in range(_CHANNELS):
+                colour = before[c] + (after[c] - before[c]) * share
+                residual = levels[n, c] - shade[n, c + _CHANNELS] - shade[n, c] * colour
+                out[k] += residual * residual
 
 
 @compiled

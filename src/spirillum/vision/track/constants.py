@@ -682,7 +682,7 @@ class FollowingConstants:
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
     usual_edges: int = 200
-    """Frames whose median is the usual share of the edges that fit."""
+    """Frames with the body in view whose median is the usual share of the edges that fit."""
     few_edges: float = 0.75
     """Share of the edges that fit, over the usual one, below which the robot may be elsewhere: a shadow takes some."""
     more_edges: float = 1.2

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
+from itertools import pairwise
+from math import hypot
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -68,6 +72,7 @@ class Follower:
         self.known, self.still, self.record = known, still, Record()
         self._ahead = ahead
         self._last: BodyPose | None = None
+        self._shares: deque[float] = deque(maxlen=FOLLOWING.usual_edges)
 
     def step(self, frame: Frame) -> Seen:
         """Place the robot on the next frame, and read its stripes and tail."""
@@ -88,6 +93,7 @@ class Follower:
         record.tail.append(tail)
         if found.known:
             self._last = found.pose
+            self._shares.append(found.share)
         return Seen(frame.time, found.pose if found.known else None, roll[0], tail[0], start.body.optics)
 
     def _guess(self, time: float) -> BodyPose | None:
@@ -120,7 +126,7 @@ class Follower:
         """Place the body near a pose; further away it counts as not detected."""
         body = self.known.start.body
         found, far = body.place(frame.image, guess), FOLLOWING.largest_jump * body.optics.length_per_pixel
-        if np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+        if hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
             return found
         return found._replace(error=BodyPose(np.nan, np.nan, np.nan))
 
@@ -128,8 +134,9 @@ class Follower:
         """Whether no frame was taken for so long that the robot may not have kept to its predicted way."""
         times, last = self.record.time[-FOLLOWING.memory :], self.record.placed[-1].pose
         far = FOLLOWING.sure_step * self.known.start.body.optics.length_per_pixel
-        long = time - times[-1] > FOLLOWING.gap * float(np.median(np.diff(times)))
-        return bool(long and np.hypot(guess.x - last.x, guess.y - last.y) > far)
+        if hypot(guess.x - last.x, guess.y - last.y) <= far:
+            return False
+        return time - times[-1] > FOLLOWING.gap * median(later - before for before, later in pairwise(times))
 
     def _after_a_gap(self, frame: Frame, guess: BodyPose) -> Placed | None:
         """The body where most of its edges fit: at the predicted pose, near it, or where it was; None if nowhere."""
@@ -146,10 +153,9 @@ class Follower:
         now_and_then = len(placed) % FOLLOWING.search_interval == 0
         if not found.known:
             return now_and_then
-        shares = [one.share for one in placed[-FOLLOWING.usual_edges :] if one.known]
-        if len(shares) < FOLLOWING.memory:
+        if len(self._shares) < FOLLOWING.memory:
             return False
-        few = FOLLOWING.few_edges * float(np.median(shares))
+        few = FOLLOWING.few_edges * median(self._shares)
         return found.share < few and (now_and_then or not placed[-1].known or placed[-1].share >= few)
 
     def _found_again(self, frame: Frame, lost: Placed) -> Placed:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.kernels.pictures import edge_misfits
 from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import WIDTHS
@@ -42,12 +43,10 @@ def edge_shifts(
         colours: of the stripes in their order, (stripes, 3).
         angle: of the body, rad.
     """
-    from scipy.special import ndtr
-
     count = len(colours)
     width = 2.0 * np.pi / count
     shifts = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
-    found = np.full(count, np.nan)
+    found, losses = np.full(count, np.nan), np.empty(shifts.size)
     for edge in range(count):
         place = (angle + (edge - 0.5) * width + np.pi) % (2.0 * np.pi) - np.pi
         before, after = colours[edge - 1], colours[edge]
@@ -57,10 +56,7 @@ def edge_shifts(
         seen = levels[near]
         if near.sum() < WIDTHS.fewest or not np.isfinite(seen).all():
             continue
-        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])[..., None]
-        light, sheen = shade[near, :3], shade[near, 3:]
-        misfit = seen - sheen - light * (before + (after - before) * share)
-        losses = np.sum(misfit**2, axis=(1, 2))
+        edge_misfits(seen, angles[near] - place, blur[near], shade[near], before, after, shifts, losses)
         best = int(np.argmin(losses))
         if not 0 < best < shifts.size - 1:
             continue
