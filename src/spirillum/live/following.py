@@ -175,7 +175,8 @@ class Following:
             return ()
         _, _, body, _, roll, error, _, _ = self.readings.columns()
         edges = np.array(self.follower.record.edges[-body.size :])
-        if not evened(body, roll, error, edges, self.body.period).flags:
+        found = evened(body, roll, error, edges, self.body.period)
+        if not {flag.name for flag in found.flags} & {"uneven-stripes", "stripes-do-not-fit"}:
             return ()
         sentence = "the stripes are uneven: the body's angle and rate are not given frame by frame, but over all frames"
         return (Flag("uneven-stripes", sentence, (_BODY,)),)

@@ -32,7 +32,7 @@ _FEWEST_FRAMES = 4
 """Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
-_OF_STRIPES = {"uneven-stripes", "stripes-do-not-pass", "short-turn"}
+_OF_STRIPES = {"uneven-stripes", "stripes-of-another-size", "stripes-do-not-pass", "short-turn"}
 """Flags that say nothing where the stripes are not those of the robot file."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}

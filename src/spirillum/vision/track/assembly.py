@@ -132,7 +132,7 @@ def track_of(
         time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
         drift=math.hypot(swayed.drift, glare),
         elongation=elongation * optics.focal / sight.optics.focal,
-        body_angle_drift=STRIPES.under_glare if known.stripes.under_glare else 0.0,
+        body_angle_drift=math.hypot(even.drift, STRIPES.under_glare if known.stripes.under_glare else 0.0),
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

@@ -412,6 +412,12 @@ class WidthConstants:
     """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
     painted: float = 0.2 / sqrt(3.0)
     """Standard deviation of the widths of stripes by hand, over an even one: evenly spread up to a fifth."""
+    other_size: float = 0.015
+    """Standard deviation of what wrong scale, diameter and heights add to all widths alike. Assumed."""
+    size: float = 0.005
+    """Standard uncertainty of the same, where widths are learnt from a part of a turn. Assumed."""
+    printed: float = 0.01
+    """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
     together: float = 2.5
     """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
 

@@ -53,9 +53,9 @@ class Identified(NamedTuple):
         flags = []
         if not self.robot:
             sentence = (
-                "stripes and tail do not look like the robot's: what was followed may be something else, glare, poor "
-                "light or compression may hide them, or heights, scale, robot file, robot.direction or [region] are "
-                "wrong; nothing is given"
+                "stripes and tail do not look like the robot's, and nothing is given: look at the annotated film; "
+                "where the outline is not on the robot, draw a [region] around it; where it is, glare or poor light "
+                "hide them, or the robot file, robot.direction or the heights are wrong"
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals

@@ -28,6 +28,8 @@ class Evened(NamedTuple):
     error: Samples
     """Standard error on each frame, rad, (n,)."""
     flags: tuple[Flag, ...]
+    drift: float = 0.0
+    """Standard uncertainty of the angle from end to end, where less than a turn was seen, rad."""
 
 
 def edge_shifts(
@@ -85,12 +87,15 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     shifts = np.full((int(known.sum()), count), np.nan)
     np.put_along_axis(shifts, which, edges[known], axis=1)
     places, scatter = _places(shifts)
-    seen = np.isfinite(places)
-    off = float(np.ptp(places[seen])) if seen.any() else 0.0
+    off = float(np.ptp(places[np.isfinite(places)])) if np.isfinite(places).any() else 0.0
     if off < max(WIDTHS.uneven, WIDTHS.clear * scatter):
         return untouched
     if (wide := _not_of_paint(places)) is not None:
         return Evened(angle, error, (wide,))
+    seen, turned = np.isfinite(places), float(np.ptp(angle[known]))
+    if (size := _another_size(places)) is not None:
+        share, flag = size
+        return Evened(angle, error, (flag,), 0.5 * abs(share) * turned)
     weight = (np.isfinite(shifts) & seen).astype(float)
     total = np.maximum(weight.sum(axis=1), 1e-9)
     own = np.sum(weight * np.nan_to_num(shifts - places), axis=1) / total
@@ -103,7 +108,8 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
         f"shifted by amounts that differ by up to {np.degrees(off):.1f} deg; their places were learnt from the film "
         "and used"
     )
-    return Evened(better, surer, (Flag("uneven-stripes", sentence),))
+    drift = 0.0 if seen.all() else WIDTHS.size * turned
+    return Evened(better, surer, (Flag("uneven-stripes", sentence),), drift)
 
 
 def _not_of_paint(places: Samples) -> Flag | None:
@@ -132,6 +138,40 @@ def _not_of_paint(places: Samples) -> Flag | None:
         "the stripes, and compare the ruler's spacing"
     )
     return Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",))
+
+
+def _another_size(places: Samples) -> tuple[float, Flag] | None:
+    """The relative difference of the widths that are known from even ones, and a flag, if they differ all alike.
+
+    A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
+    than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
+    other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the size.
+
+    Args:
+        places: shift of each edge, rad, (stripes,); NaN where unknown.
+    """
+    count = places.size
+    off = np.diff(np.append(places, places[0])) * count / (2.0 * np.pi)
+    off = off[np.isfinite(off)]
+    if not 1 < off.size < count:
+        return None
+    whole = np.eye(off.size)
+
+    def misfit(width: float) -> float:
+        """Minus twice the logarithm of the likelihood of widths with a standard deviation; all add up to a turn."""
+        among = (count * whole - 1.0) / (count - 1.0)
+        covariance = width**2 * among + WIDTHS.other_size**2 + WIDTHS.printed**2 * whole
+        return float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
+
+    if misfit(WIDTHS.painted) < misfit(0.0):
+        return None
+    side = "wider" if off.mean() > 0 else "narrower"
+    sentence = (
+        f"all stripes in view look {100.0 * abs(off.mean()):.1f} % {side} than even ones: if the view makes them so, "
+        "they are even and taken as such; if paint does, the body's rate is off by as much, and its interval holds "
+        "both: compare the body's diameter, heights and spacing with the setup"
+    )
+    return float(off.mean()), Flag("stripes-of-another-size", sentence)
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:
