@@ -243,6 +243,29 @@ def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design
     assert lead_warnings(replace(learned, alternatives=breaking)) == ()
 
 
+def test_a_better_design_outside_the_ranges_is_said_to_be_one() -> None:
+    """Today's wavelength of 25 mm swims faster by `sbt` than any of 40 mm and more."""
+    found = sp.design("biorob2012-wide", {"tail.wavelength": "40 mm:60 mm"}, maximise="forward_velocity", model="sbt")
+    today = sp.predict("biorob2012-wide", model="sbt").forward_velocity
+    assert today > found.objective
+    better = 100.0 * (today / found.objective - 1.0)
+    assert any(f"is better than the best design within them, by {better:.2g} %" in line for line in found.warnings)
+    assert not any("leads today's design" in line for line in found.warnings)
+
+
+def test_a_field_that_changes_nothing_is_named() -> None:
+    found = sp.design("biorob2012-wide", {"body.mass": "8 g:12 g"}, maximise="forward_velocity", model="sbt")
+    (said,) = lead_warnings(found)
+    assert said == "the forward velocity does not depend on body.mass: every value of the range is as good"
+
+
+@pytest.mark.parametrize("asked", [{"maximise": "step_out_rate"}, {"subject_to": "step_out_rate >= 1 Hz"}])
+def test_a_quantity_that_the_robot_has_not_is_named(asked: dict[str, str]) -> None:
+    asked = {"maximise": "forward_velocity"} | asked
+    with pytest.raises(InputError, match="step_out_rate has no value for biorob2012-wide, as its drive"):
+        sp.design("biorob2012-wide", {"tail.wavelength": "10 mm:40 mm"}, model="sbt", **asked)
+
+
 def test_whole_turns_and_windings() -> None:
     found = sp.design("biorob2012-wide", {"tail.turns": (1, 6)}, maximise="forward_velocity", model="rft")
     assert found.values["tail.turns"] == round(found.values["tail.turns"])

@@ -164,9 +164,26 @@ def test_a_robot_that_dry_friction_holds_has_no_speed() -> None:
     held = sp.predict(heavy, motion="free")
     assert any("dry friction (coefficient 0.1) holds the robot" in said for said in held.warnings)
     assert np.isnan(held.error_estimate)
+    heavier = sp.load("biorob2012-wide", **{"body.mass": "1 kg"})
+    run = sp.simulate(heavier, model="tube", timing={"duration": "4 s"}, in_tube={"wait": "10 s"})
+    assert "dry friction (coefficient 0.1) holds the robot" in run.attrs["warnings"]
+    assert np.isnan(run.attrs["error_estimate"])
     slides = sp.predict(heavy, motion="free", in_tube={"friction_coefficient": 0.0})
     assert slides.forward_velocity > 20.0 * held.forward_velocity
     assert not any("holds the robot" in said for said in slides.warnings)
+
+
+def test_where_inertia_rules_no_motion_has_an_error_estimate() -> None:
+    """The error is against other solutions of Stokes flow; `predict` refuses, held or free."""
+    fast = sp.load("biorob2012-wide", **{"fluid.viscosity": "20 mPa s"})
+    for motion in ("held", "free"):
+        with pytest.raises(sp.InputError, match=r"Reynolds number .* allowed: at most 10"):
+            sp.predict(fast, motion=motion)
+    assert np.isnan(sp.predict(fast, beyond_stokes=True).error_estimate)
+    run = sp.simulate(fast, model="tube", timing={"duration": "1 s"})
+    assert "at the largest speed of the run" in run.attrs["warnings"]
+    assert np.isnan(run.attrs["error_estimate"])
+    assert np.isnan(sp.simulate(fast, model="slender", timing={"duration": "0.2 s"}).attrs["error_estimate"])
 
 
 @pytest.mark.parametrize(

@@ -169,6 +169,14 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
         why = outside[0].sentence()
     else:
         swum = searched.swum(shares[None])
+        asked = [goal.quantity.name for goal in searched.objectives]
+        asked += [condition.quantity.name for condition in searched.conditions]
+        undefined = [name for name in asked if np.isnan(searched.quantity(swum, name)).all()]
+        if undefined and swum.valid.all():
+            return (
+                f"{undefined[0]} has no value for {searched.space.robot.name}, as its drive, joint and placement are, "
+                f"by model '{searched.model.name}'; allowed: a quantity that `predict --all` gives"
+            )
         worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
         kept = [words for words, excess in worst.items() if excess > 0]
         why = f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion"

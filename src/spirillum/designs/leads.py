@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from spirillum.designs.answer import Alternative, Design
 from spirillum.fluid.registry import find_swimmer_model
 
 __all__ = ["ALTERNATIVES", "lead_warnings"]
 
+_ALIKE = 1e-9
+"""Relative range of an objective below which it does not change."""
 ALTERNATIVES = {
     "today": "today's design",
     "runner_up": "the best of the designs that differ by a tenth of a range or more",
@@ -17,7 +21,7 @@ ALTERNATIVES = {
 
 
 def lead_warnings(answer: Design) -> tuple[str, ...]:
-    """A sentence on the designs that the best one leads by less than the error that is stated of its objective.
+    """Sentences on fields that do not matter, on a better design, and on leads below the error of the objective.
 
     Args:
         answer: the best design, with how well a learned model is known.
@@ -25,6 +29,9 @@ def lead_warnings(answer: Design) -> tuple[str, ...]:
     Returns:
         One sentence for each such error; none where every lead is larger.
     """
+    said = _without_effect(answer)
+    if len(said) == len(answer.profiles):  # every design is the best one
+        return said
     leads: dict[tuple[float, str], list[str]] = {}
     best, sign = answer.objective, answer.objectives[0].sign
     for other in answer.alternatives:
@@ -32,13 +39,29 @@ def lead_warnings(answer: Design) -> tuple[str, ...]:
         if not (other.keeps and math.isfinite(other.objective) and best):
             continue
         lead = sign * (best - other.objective) / abs(best)
-        if lead < error[0]:
+        if lead < 0:
+            said += (
+                f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best design within them, by "
+                f"{-100 * lead:.2g} % of it: wider ranges would hold a better one",
+            )
+        elif lead < error[0]:
             leads.setdefault(error, []).append(f"{ALTERNATIVES[other.name]} by {100 * lead:.2g} %")
-    return tuple(
+    return said + tuple(
         f"the best design leads {' and '.join(led)}, less than the error of {100 * error:.2g} % {of}: it is surely the "
         "better one only as far as they share that error"
         for (error, of), led in leads.items()
     )
+
+
+def _without_effect(answer: Design) -> tuple[str, ...]:
+    """A sentence for each field along which the objective stays as it is."""
+    found = []
+    for profile in answer.profiles:
+        known = profile.objective[np.isfinite(profile.objective)]
+        if known.size > 1 and np.ptp(known) <= _ALIKE * np.abs(known).max():
+            name = answer.objectives[0].name.replace("_", " ")
+            found.append(f"the {name} does not depend on {profile.path}: every value of the range is as good")
+    return tuple(found)
 
 
 def _error(answer: Design, other: Alternative) -> tuple[float, str]:

@@ -19,7 +19,7 @@ from spirillum.dynamics.integration import Progress, Reach
 from spirillum.dynamics.long_run import LongRun, long_run
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.table_check import Checked, held_against_check
+from spirillum.dynamics.table_check import Checked, held_against_check, held_by_friction
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
@@ -38,6 +38,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.swimming.answer import Swimming
+from spirillum.swimming.cautions import in_stokes_flow
 from spirillum.swimming.drives import current_at
 from spirillum.swimming.loading import prepared
 from spirillum.swimming.prediction import Prediction, predict
@@ -158,7 +159,12 @@ def free_motion(
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
     checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
-    stuck = _stuck(swimming, run, links, 0.5 * ready.body.diameter)
+    stuck = held_by_friction(
+        links,
+        forward=float(swimming.forward_velocity[0]),
+        turning=0.5 * ready.body.diameter * float(swimming.body_rotation_rate[0]),
+        contact_force=run.lying.contact_force,
+    )
     warnings = (
         *held.warnings,
         *(checked.said if lies and not stuck else ()),
@@ -167,6 +173,7 @@ def free_motion(
     )
     known = lies and checked.known and not stuck
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
+    error = in_stokes_flow(error, swimming.reynolds_number, swimming.tail_reynolds_number)
     acts = friction_acts(held.friction, held.tail_rate)
     source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
@@ -245,19 +252,6 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
             "reach it; `simulate` follows the way there"
         )
     return found
-
-
-def _stuck(swimming: Swimming, run: LongRun, links: TubeRobot, radius: float) -> list[str]:
-    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
-    forward, body = float(swimming.forward_velocity[0]), float(swimming.body_rotation_rate[0])
-    smoothed = float(links.tube[kernel.SLIDING])
-    if run.lying.contact_force <= 0.0 or not np.hypot(forward, radius * body) < smoothed:
-        return []
-    return [
-        f"dry friction (coefficient {float(links.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
-        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
-        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
-    ]
 
 
 def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:

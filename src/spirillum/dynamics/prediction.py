@@ -16,14 +16,12 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
+from spirillum.swimming.cautions import BEYOND_STOKES
 from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice, check_calibrated, choose_model, posterior_alone
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 
 __all__ = ["predict"]
-
-_LARGEST_REYNOLDS = 10.0
-"""Reynolds number from which on an answer of Stokes flow is refused unless it is asked for."""
 
 
 def predict(  # noqa: PLR0913 - the options of the command
@@ -131,6 +129,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         progress=progress,
     )
     answer = replace(found.prediction, choice=choice)
+    if not beyond_stokes:
+        _check_stokes(answer)
     if known is None:
         return answer
     from spirillum.dynamics.free_draws import intervals_of_free_motion
@@ -153,9 +153,9 @@ def _check_stokes(answer: Prediction) -> None:
     """
     for name, what in (("reynolds_number", "body diameter"), ("tail_reynolds_number", "tail amplitude")):
         value = float(getattr(answer, name))
-        if value > _LARGEST_REYNOLDS:
+        if value > BEYOND_STOKES:
             raise InputError(
-                f"Reynolds number ({what}) = {value:.3g}; allowed: at most {_LARGEST_REYNOLDS:g}, for these models "
+                f"Reynolds number ({what}) = {value:.3g}; allowed: at most {BEYOND_STOKES:g}, for these models "
                 "neglect inertia; a more viscous fluid, a slower or a smaller robot, or --beyond-stokes"
             )
 

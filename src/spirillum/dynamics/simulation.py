@@ -35,7 +35,7 @@ from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.cautions import speed_limit
+from spirillum.swimming.cautions import in_stokes_flow, speed_limit
 from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
@@ -235,15 +235,11 @@ def _free_run(
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
-    dataset.attrs["warnings"] = "\n".join([*_of_the_way(dataset, steady), *said])
+    fastest = speed_limit(steady.batch, float(np.linalg.norm(dataset["velocity"].values, axis=-1).max()))
+    way = [*vertical_drift(dataset), *(limit.caution() for limit in broken([fastest]))]
+    dataset.attrs["warnings"] = "\n".join([*way, *said])
+    dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], fastest.value)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
-
-
-def _of_the_way(dataset: xr.Dataset, steady: Prediction) -> list[str]:
-    """What the path shows that a held robot's speed does not: that it sinks or rises, and how fast it moves."""
-    velocity = dataset["velocity"].values
-    limits = [speed_limit(steady.batch, float(np.linalg.norm(velocity, axis=-1).max()))]
-    return [*vertical_drift(dataset), *(limit.caution() for limit in broken(limits))]
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:

@@ -1,4 +1,4 @@
-"""Whether a motion in the tube stays among the places against which its robot's table was checked."""
+"""Whether the error of a robot's table says anything of a motion: its places were checked, and it slides freely."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.fluid.tube.table import least_checked_gap
+from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import largest_yaw
 from spirillum.units import show
 
-__all__ = ["Checked", "held_against_check"]
+__all__ = ["Checked", "held_against_check", "held_by_friction"]
 
 
 class Checked(NamedTuple):
@@ -55,6 +57,25 @@ def held_against_check(
             f"{_length(least)} on: the error estimate is that of such places"
         )
     return Checked(not beyond.size, bool(near.size), said)
+
+
+def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[str]:
+    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
+
+    Args:
+        robot: what its rates in the tube follow from.
+        forward: mean forward velocity, m/s.
+        turning: mean speed of the body's surface by its rotation, m/s.
+        contact_force: mean force of the asperities, N.
+    """
+    smoothed = float(robot.tube[kernel.SLIDING])
+    if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
+        return []
+    return [
+        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
+        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
+        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
+    ]
 
 
 def _falls(time: Samples | None, first: int) -> str:

@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.earlier_run import earlier_run, weight_words
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.start import start_phase, turning_rate
-from spirillum.dynamics.table_check import held_against_check
+from spirillum.dynamics.table_check import held_against_check, held_by_friction
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -27,7 +27,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
-from spirillum.swimming.cautions import flow_limit
+from spirillum.swimming.cautions import flow_limit, in_stokes_flow, speed_limit
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.units import show
 
@@ -77,7 +77,6 @@ def run_in_tube(
     timetable = times.timetable(turn, own)
     begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links, timetable.switches)
     dataset = tube_run(steady, links, begun, timetable, wait=asked.wait or 0.0, progress=progress)
-    error = table.error["forward_velocity"]
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
@@ -86,9 +85,19 @@ def run_in_tube(
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+    fastest = speed_limit(steady.batch, float(np.linalg.norm(dataset["velocity"].values, axis=-1).max()))
+    stuck = held_by_friction(
+        links,
+        forward=float(dataset["mean_forward_velocity_steady"]),
+        turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
+        contact_force=float(dataset["contact_force"][-1]),
+    )
+    error = in_stokes_flow(table.error["forward_velocity"], fastest.value)
+    said += [limit.caution() for limit in broken([fastest])]
+    said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
-        warnings="\n".join([*said, *checked.said]),
-        error_estimate=error if checked.known else np.nan,
+        warnings="\n".join(said),
+        error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
         weight=weight_words(links),

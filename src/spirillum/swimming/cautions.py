@@ -16,8 +16,18 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
 from spirillum.units import show
 
-__all__ = ["accuracy_limits", "calibration_warnings", "flow_limit", "no_band_warnings"]
+__all__ = [
+    "BEYOND_STOKES",
+    "accuracy_limits",
+    "calibration_warnings",
+    "flow_limit",
+    "in_stokes_flow",
+    "no_band_warnings",
+    "speed_limit",
+]
 
+BEYOND_STOKES = 10.0
+"""Reynolds number above which inertia rules: `predict` refuses unless asked, and no answer has an error estimate."""
 _LARGEST_REYNOLDS = 0.1
 _INERTIA = "inertia is neglected (Stokes flow)"
 
@@ -46,6 +56,12 @@ def flow_limit(batch: RobotBatch, flow: float) -> Limit:
     """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
     value = batch.density * flow * batch.body_diameter / batch.viscosity
     return _reynolds_limit("imposed flow, body diameter", value, "flow-reynolds-number")
+
+
+def in_stokes_flow(error: float, *reynolds: Samples) -> float:
+    """An error estimate against other solutions of Stokes flow; NaN where inertia rules, which none of them knows."""
+    largest = max(float(np.max(value, initial=0.0, where=np.isfinite(value))) for value in reynolds)
+    return error if largest <= BEYOND_STOKES else float("nan")
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[str]:

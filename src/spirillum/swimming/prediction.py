@@ -28,7 +28,13 @@ from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
 from spirillum.swimming.answer import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.band import Band, band_of
-from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, no_band_warnings
+from spirillum.swimming.cautions import (
+    accuracy_limits,
+    calibration_warnings,
+    flow_limit,
+    in_stokes_flow,
+    no_band_warnings,
+)
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
@@ -345,10 +351,15 @@ class _Case:
         return None if other is None else self.swim(self.batch, other)
 
     def error_estimate(self, result: Swimming, check: Swimming | None) -> float:
-        """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
-        if check is None:
-            return self.model.stated_speed_error(self.batch)
-        return float(speed_difference(check, result)[0])
+        """Relative difference of the forward velocity from another resolution.
+
+        NaN for a model in closed form, and where inertia rules.
+        """
+        found = (
+            self.model.stated_speed_error(self.batch) if check is None else float(speed_difference(check, result)[0])
+        )
+        flow = flow_limit(self.batch, abs(self.batch.placement.flow or 0.0)).value
+        return in_stokes_flow(found, result.reynolds_number, result.tail_reynolds_number, flow)
 
     def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
         """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
