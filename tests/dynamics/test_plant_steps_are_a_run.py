@@ -89,6 +89,13 @@ def test_wrong_commands_move_nothing(tube: sp.Plant, asked: dict[str, Any], word
     assert plant.state == tube.state
 
 
+def test_a_step_below_the_rounding_error_of_the_time_is_none(tube: sp.Plant) -> None:
+    plant = tube.copy()
+    plant.step(0.1)
+    with pytest.raises(sp.InputError, match="dt = 1e-18 s is none at t = 0.1 s"):
+        plant.step(1e-18)
+
+
 def test_flow_needs_walls_and_a_state_its_own_kind(tube: sp.Plant) -> None:
     free = sp.Plant("biorob2012-wide", model="rft")
     with pytest.raises(sp.InputError, match="flow is known only to model 'tube'"):
