@@ -92,7 +92,7 @@ def test_wrong_commands_move_nothing(tube: sp.Plant, asked: dict[str, Any], word
 def test_a_step_below_the_rounding_error_of_the_time_is_none(tube: sp.Plant) -> None:
     plant = tube.copy()
     plant.step(0.1)
-    with pytest.raises(sp.InputError, match="dt = 1e-18 s is none at t = 0.1 s"):
+    with pytest.raises(sp.InputError, match=r"dt = 1e-18 s is none at t = 0\.1 s"):
         plant.step(1e-18)
 
 

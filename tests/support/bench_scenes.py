@@ -33,7 +33,12 @@ from spirillum.virtual.troubles import Troubles, stripe_edges
 from spirillum.virtual.truth import setup_text
 
 STYLES = ("virtual", "flat", "light-table")
-VARIANTS = ("", "uneven", "bare", "one-colour", "stuck", "small", "fast-tail")
+VARIANTS = ("", "uneven", "bare", "one-colour", "line", "bars", "stuck", "small", "fast-tail")
+PATTERNS = {
+    "line": ("white", *("black",) * 23),
+    "bars": ("black", "white", "white", *("black", "white") * 2, "black", "black", *("white",) * 3),
+}
+"""Seals of other stripes than the paper's, which the robot's file states."""
 FPS = 25.0
 """Frames a second of all films."""
 DURATION = 3.0
@@ -101,6 +106,8 @@ def drawn(seed: int, variant: str = "") -> Drawn:
         assert robot.seal is not None
         uneven = stripe_edges(Troubles(uneven_stripes=0.2), len(robot.seal.stripes), seed)
         return replace(found, edges=tuple(uneven.tolist()))
+    if variant in PATTERNS:
+        return replace(found, robot=_with_stripes(robot, PATTERNS[variant]), body_angle=rng.uniform(-1.0, 1.0))
     if variant == "stuck":
         return replace(found, body_rate=0.0)
     if variant == "small":
@@ -108,6 +115,11 @@ def drawn(seed: int, variant: str = "") -> Drawn:
     if variant == "fast-tail":
         return replace(found, tail_rate=Hz * FPS * float(rng.uniform(0.55, 0.95)))
     return found
+
+
+def _with_stripes(robot: Robot, stripes: tuple[str, ...]) -> Robot:
+    """A robot with other stripes, which its file states."""
+    return load({"extends": robot.name, "name": "striped", "seal": {"stripes": list(stripes)}})
 
 
 def shrunk(robot: Robot, share: float) -> Robot:

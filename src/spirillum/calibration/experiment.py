@@ -175,6 +175,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         _check_row(path, item, robot)
         groups.setdefault(item.tail, []).append(item)
     _check_variety(path, observations)
+    _check_zeros(path, observations)
     items = list(groups.values())
     channels = tuple(sorted({group[0].tail[0] for group in items}))
     for group in items:
@@ -340,6 +341,17 @@ def _check_rates(path: Path, observations: Sequence[Observation], found: Sequenc
             f"{path}, row {speeds[0].row}, column tail_rate_Hz: empty, as in all rows with a speed; allowed: "
             "tail_rate_Hz or motor_rate_Hz beside each speed, which is compared per rate"
         )
+
+
+def _check_zeros(path: Path, observations: Sequence[Observation]) -> None:
+    """Refuse a column of zeros: no model has a robot that does not move at all, and errors are relative."""
+    for name, column in (("forward_velocity", "forward_velocity_mm_s"), ("body_rate", "body_rate_Hz")):
+        known = [item for item in observations if np.isfinite(getattr(item, name))]
+        if known and all(getattr(item, name) == 0.0 for item in known):
+            raise InputError(
+                f"{path}, row {known[0].row}, column {column}: 0, as in all rows; allowed: what was observed, or an "
+                "empty column where it was not"
+            )
 
 
 def _of_trials(values: Samples, *relative: Samples) -> _Trials:

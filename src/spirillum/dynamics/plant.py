@@ -270,7 +270,7 @@ class Plant:
         """
         _check_number("dt", dt, 0.0, _LONGEST, "s")
         if self._now.time + dt == self._now.time:
-            raise InputError(f"dt = {dt:g} s is none at t = {self._now.time:g} s; allowed: more than its rounding error")
+            raise InputError(f"dt = {dt:g} s is none at t = {self._now.time:g} s; allowed: above its rounding error")
         if self._now.ended:
             raise InputError(f"the run has ended: {self._now.ended}; allowed: reset")
         command = self._commanded(remote=remote, duty=duty)

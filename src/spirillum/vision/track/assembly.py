@@ -86,7 +86,8 @@ def track_of(
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
     restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
     time = restored.time
-    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
+    stripes = known.stripes
+    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], stripes.period, readable=stripes.readable)
     even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     roll_flags = (*roll_flags, *_under_glare(known, body_angle))

@@ -18,6 +18,7 @@ __all__ = [
     "named_rightly",
     "order_seen",
     "pattern_period",
+    "runs_of",
     "told_apart",
     "width_seen",
     "without_glare",
@@ -54,6 +55,12 @@ def pattern_period(stripes: Sequence[str]) -> float:
         if count % step == 0 and all(stripes[k] == stripes[(k + step) % count] for k in range(count)):
             return 2.0 * np.pi * step / count
     return 2.0 * np.pi
+
+
+def runs_of(stripes: Sequence[str]) -> list[int]:
+    """How many stripes of one colour lie side by side, run by run around the body."""
+    starts = [k for k in range(len(stripes)) if stripes[k] != stripes[k - 1]]
+    return [(after - start - 1) % len(stripes) + 1 for start, after in pairwise([*starts, *starts[:1]])]
 
 
 def _opponent(colours: Samples) -> Samples:

@@ -346,6 +346,14 @@ class StripeConstants:
     """Loss over that of one even colour above which nothing is read."""
     good: float = 0.3
     """Loss over that of a uniform colour below which the named colours are not tried as initial ones."""
+    faces: float = radians(65.0)
+    """Largest angle from the direction towards the camera at which an edge is surely read, rad."""
+    still: float = 0.25
+    """Quantile over the frames of what stays while a line on a bare seal comes and goes."""
+    fewest_still: int = 4
+    """Fewest frames for it."""
+    whole_width: float = radians(120.0)
+    """Width below which a stretch of one colour is seen whole, with what lies on either side, rad."""
     fits: float = 0.25
     """Loss over that of one even colour from which on the stripes are not those that are stated.
 
@@ -487,6 +495,8 @@ class UnwrappingConstants:
     more."""
     leaps: int = 2
     """Leaps that say that stripes are misread."""
+    stray_rest: float = radians(10.0)
+    """Deviation of the step from the reading before to that behind a stray one up to which it is alone, rad."""
     leap_window: int = 9
     """Steps of the running median."""
     least_share: float = 0.1

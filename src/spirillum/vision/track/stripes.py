@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from spirillum.vision.track.colours import (
     named_rightly,
     order_seen,
     pattern_period,
+    runs_of,
     told_apart,
     width_seen,
     without_glare,
@@ -84,6 +86,17 @@ class Stripes:
             ]
         )
 
+    @cached_property
+    def readable(self) -> float:
+        """Share of a turn in which an edge between two colours faces the camera: about half for a single line."""
+        return float(np.mean([self._faces(angle, STRIPES.faces) for angle in np.linspace(0.0, 2.0 * np.pi, 361)]))
+
+    def _faces(self, angle: float, reach: float) -> bool:
+        """Whether at an angle of the body an edge between two colours lies within `reach` of facing the camera."""
+        count = len(self.stripes)
+        edges = [k for k in range(count) if self.stripes[k] != self.stripes[k - 1]]
+        return any(np.cos(angle + 2.0 * np.pi / count * (edge - 0.5)) > np.cos(reach) for edge in edges)
+
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Learn colours, shading and blur of the stripes from some frames of the video.
 
@@ -122,9 +135,7 @@ class Stripes:
             self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
             return
         rightly = named_rightly(self.appearance.palette, start)
-        stated = 2.0 * np.pi / len(self.stripes)
-        wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:]), stated) / stated
-        counted = not abs(np.log(wide)) > STRIPES.width_range
+        counted = self._as_wide(seen_steep, (palette, *palettes[1:]))
         if least < STRIPES.fits and rightly and counted:
             self.fits = True
             return  # the stated order fits, with colours that match the names
@@ -144,10 +155,48 @@ class Stripes:
         else:
             self.fits = True
 
+    def _as_wide(self, profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
+        """Whether stripes are seen as wide as stated; of patterns with several widths the fit alone says so."""
+        widths = {
+            wide for wide in runs_of(self.stripes) if wide * 2.0 * np.pi / len(self.stripes) < STRIPES.whole_width
+        }
+        if len(widths) != 1:
+            return True
+        stated = widths.pop() * 2.0 * np.pi / len(self.stripes)
+        return not abs(np.log(width_seen(profiles, self.angles, palettes, stated) / stated)) > STRIPES.width_range
+
     def _typical_loss(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> float:
         """Median over the frames of the loss relative to that of a uniform colour."""
-        fits = [self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)]
-        return float(np.median([a[2] / a[4] if np.isfinite(a[0]) else 1.0 for a in fits]))
+        fits = np.array([self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)])
+        ratios = np.where(np.isfinite(fits[:, 0]), fits[:, 2] / fits[:, 4], 1.0)
+        told = ratios[self._told(fits)]
+        return float(np.median(told)) if told.size else 1.0
+
+    def _told(self, fits: Samples) -> np.ndarray:
+        """Mask of the frames that tell the angle: where one colour alone is in view, many angles fit alike."""
+        if self.readable == 1.0:
+            return np.ones(len(fits), dtype=bool)
+        return np.asarray(fits[:, 3] >= STRIPES.ambiguous * fits[:, 2])
+
+    def _sheen_of(self, profiles: Samples, palette: Samples) -> Samples:
+        """Sheen along the angle to begin with, (n, 3): what stays while a line comes and goes; zeros where none does.
+
+        A highlight on a dark seal would else be taken for the only line on it: it is there on every frame.
+
+        Args:
+            profiles: colours along the angle, (f, n, 3).
+            palette: colours of the classes, (classes, 3).
+        """
+        if self.readable == 1.0:
+            return np.zeros((self.angles.size, 3))
+        counts = np.bincount(self.order, minlength=len(palette))
+        ground = palette[int(np.argmax(counts))]
+        dark = ground.sum() <= palette.sum(axis=1).mean()
+        seen = np.isfinite(profiles).all(axis=2).sum(axis=0) >= STRIPES.fewest_still
+        still = np.zeros((self.angles.size, 3))
+        still[seen] = np.nanquantile(profiles[:, seen], STRIPES.still if dark else 1.0 - STRIPES.still, axis=0)
+        least = still[seen].min(axis=0) if seen.any() else np.zeros(3)
+        return np.asarray(np.where(seen[:, None], np.maximum(still - np.minimum(ground, least), 0.0), 0.0))
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
         """Rotation angle of the body about +x, modulo `period`, and its standard error, rad; NaN where unreadable.
@@ -174,6 +223,8 @@ class Stripes:
         answer = self._fit(profile, scale, self.appearance)
         loss, other, flat = answer[2:5]
         if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
+            return unread
+        if self.readable < 1.0 and not self._faces(float(answer[0]), STRIPES.reach):
             return unread
         error = np.sqrt(answer[1] ** 2 + STRIPES.floor**2 + (STRIPES.pixel_locking / scale.max()) ** 2)
         known, blur = self.appearance, np.clip(self.appearance.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
@@ -228,7 +279,7 @@ class Stripes:
 
     def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Appearance:
         """Colours, shading and blur by alternating fits; profiles with glare enter only the last of them."""
-        even = np.column_stack([np.ones((self.angles.size, 3)), np.zeros((self.angles.size, 3))])
+        even = np.column_stack([np.ones((self.angles.size, 3)), self._sheen_of(profiles, palette)])
         appearance = _Appearance(palette, even, 1.0, STRIPES.first_residual, np.ones(self.angles.size))
         for repeat in range(STRIPES.repeats):
             if repeat in (2, STRIPES.repeats - 1):
@@ -252,6 +303,7 @@ class Stripes:
         models, wanted, good_at, residuals, squares = [], [], [], [], []
         fits = [self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)]
         losses = np.array([a[2] / a[4] if np.isfinite(a[0]) else np.inf for a in fits])
+        losses[~self._told(np.array(fits))] = np.inf
         best = np.argsort(losses)[: max(3, int(0.8 * np.isfinite(losses).sum()))]
         shade, sheen = appearance.shade[:, :3], appearance.shade[:, 3:]
         for which in best[np.isfinite(losses[best])]:

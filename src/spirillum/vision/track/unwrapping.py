@@ -26,7 +26,7 @@ _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": (
 
 
 def unwrapped(
-    time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body"
+    time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body", *, readable: float = 1.0
 ) -> tuple[Samples, tuple[Flag, ...]]:
     """Continuous angles, NaN where unknown or outliers, and flags.
 
@@ -38,6 +38,7 @@ def unwrapped(
         error: standard error of each angle, rad, (n,).
         period: period of the angle, rad.
         part: `body` or `tail`, for the flags.
+        readable: share of a turn in which something of the pattern faces the camera.
     """
     out = np.full(angle.shape, np.nan)
     known = np.flatnonzero(np.isfinite(angle) & np.isfinite(time))
@@ -47,7 +48,7 @@ def unwrapped(
     dt = float(np.median(np.diff(t)))
     rate, order = _rate(t, a, period, dt)
     flags: list[Flag] = []
-    if known.size < 0.5 * angle.size:
+    if known.size < 0.5 * readable * angle.size:
         flags.append(_unread(part, known.size, angle.size))
     least = UNWRAPPING.least_order
     if abs(rate) * dt > UNWRAPPING.largest_step * period:
@@ -65,8 +66,10 @@ def unwrapped(
                 "turns may be missing from its angle",
             )
         )
-    if part == "body" and (count := _leaps(t, values, dt)) >= UNWRAPPING.leaps:
-        flags.append(_wrong_stripes(count))
+    if part == "body":
+        values = _without_strays(t, values, dt)
+        if (count := _leaps(t, values, dt)) >= UNWRAPPING.leaps:
+            flags.append(_wrong_stripes(count))
     out[known] = values
     return out, tuple(flags)
 
@@ -160,6 +163,23 @@ def _first_good(t: Samples, a: Samples, period: float, rate: float) -> int:
         if np.median(np.abs(miss - np.round(miss))) < 0.2:
             return k
     return 0
+
+
+def _without_strays(t: Samples, values: Samples, dt: float) -> Samples:
+    """Angles without single readings far off the line between their neighbours, which go on as if it were not there."""
+    known = np.flatnonzero(np.isfinite(values))
+    a, at = values[known], t[known]
+    if a.size < UNWRAPPING.leap_window:
+        return values
+    before, here, after = a[:-2], a[1:-1], a[2:]
+    span = at[2:] - at[:-2]
+    between = before + (after - before) * (at[1:-1] - at[:-2]) / span
+    usual = running_median(np.diff(a) / np.diff(at), UNWRAPPING.leap_window)
+    on = np.abs(after - before - 0.5 * (usual[:-1] + usual[1:]) * span) < UNWRAPPING.stray_rest
+    stray = on & (np.abs(here - between) > UNWRAPPING.leap) & (span < 10.0 * dt)
+    kept = values.copy()
+    kept[known[1:-1][stray]] = np.nan
+    return kept
 
 
 def _leaps(t: Samples, values: Samples, dt: float) -> int:
