@@ -49,6 +49,10 @@ def written(folder: Path, *lines: str) -> Path:
             [HEADER + ",tail_rate_Hz_ci95", *(f"{row},-0.1" for row in GOOD)],
             "row 2, column tail_rate_Hz_ci95: '-0.1'; allowed: a number",
         ),
+        (
+            [HEADER, *(f"{row.rpartition(',')[0]},0" for row in GOOD)],
+            "row 2, column body_rate_Hz: 0, as in all rows; allowed: what was observed, or an empty column",
+        ),
         ([row.replace(",", ";") for row in (HEADER, *GOOD)], "columns are separated by semicolons; allowed: commas"),
         ([row.replace(",", "\t") for row in (HEADER, *GOOD)], "columns are separated by tabs; allowed: commas"),
     ],

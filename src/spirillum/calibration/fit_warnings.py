@@ -19,6 +19,7 @@ from spirillum.robust import mad_scale
 
 __all__ = [
     "CALLED",
+    "RATES_IN_RADIANS",
     "check_plausible",
     "common_warnings",
     "factor_misfit_warnings",
@@ -32,6 +33,11 @@ __all__ = [
     "synthetic_warning",
 ]
 
+RATES_IN_RADIANS = (
+    "a motor that is too weak for most tails is most often a unit: are the rates in Hz, turns a second, and not in "
+    "rad/s (6.3 times larger)?"
+)
+"""Said where most of the robots would need more torque than their motors give."""
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 """Name of each compared quantity in a sentence."""
 _LARGE_MISFIT = 0.03
@@ -257,10 +263,7 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]
             "these tails takes zero"
         )
         if 2 * len(negative) > len(friction):
-            found.append(
-                "a motor that is too weak for most tails is most often a unit: are the rates in Hz, turns a second, "
-                "and not in rad/s (6.3 times larger)?"
-            )
+            found.append(RATES_IN_RADIANS)
     if problem.interpolation_error > 0:
         where = "at places that were not used for them" if problem.model.placed else "at one wire between their points"
         found.append(

@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL
 from spirillum.calibration.fit import RobotSource, fit_model
-from spirillum.calibration.fit_warnings import synthetic_warning
+from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, synthetic_warning
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate, free_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
@@ -237,6 +237,8 @@ def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None
         InputError: for unknown names, a single model, or parameters that not all models have.
     """
     names = list(dict.fromkeys(models or _MODELS))
+    for name in names:
+        find_swimmer_model(name)
     if len(names) < 2:
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
     if free:
@@ -307,6 +309,8 @@ def _cautions(ranked: Sequence[Ranked]) -> list[str]:
                 f"trusted (Pareto k above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
             )
         said += [f"{item.model}: {sentence}" for sentence in item.fit.warnings if "may not be used" in sentence]
+    if all(RATES_IN_RADIANS in item.fit.warnings for item in ranked):
+        said.append(RATES_IN_RADIANS)
     count = ranked[0].fit.experiment.size
     if count < _FEWEST_ROBOTS:
         said.append(

@@ -174,7 +174,7 @@ class Study(Section):
         varied = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
         if self.vary and varied > _MOST_ROBOTS:
             problems.append(f"vary makes {varied} robots; allowed: at most {_MOST_ROBOTS}, or a [grid]")
-        if self.size > LARGEST_STORED:
+        elif self.size > LARGEST_STORED:
             problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STORED}")
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
