@@ -10,7 +10,7 @@ from typing import Any
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import fitted_of
+from spirillum.fitted.warnings import FITTED_HELD, fitted_of
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
@@ -141,7 +141,11 @@ def predict(  # noqa: PLR0913 - the options of the command
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(known, answer.robot, whose),
-        warnings=(*answer.warnings, *fitted_of(None, known).run_warnings(answer.robot, answer.model, answer.friction)),
+        warnings=(
+            *answer.warnings,
+            FITTED_HELD,
+            *fitted_of(None, known).run_warnings(answer.robot, answer.model, answer.friction),
+        ),
     )
 
 

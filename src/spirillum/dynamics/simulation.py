@@ -23,7 +23,7 @@ from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_fiel
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
-from spirillum.fitted.warnings import fitted_of
+from spirillum.fitted.warnings import FITTED_HELD, fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
@@ -164,6 +164,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     dataset = run(central, times, progress)
     if known is not None:
         reading = friction_reading(central.friction.reading if friction is None else friction)
+        said += [FITTED_HELD] if walled else []
         said += fitted_of(None, known).run_warnings(central, find_swimmer_model(model), reading)
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)

@@ -22,10 +22,16 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
-__all__ = ["Fitted", "fitted_of", "friction_acts"]
+__all__ = ["FITTED_HELD", "Fitted", "fitted_of", "friction_acts"]
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 """Fitted fields that act on `rft` alone."""
+
+FITTED_HELD = (
+    "the posterior was fitted to robots that are held at their places; this one is let go and finds its own: its "
+    "intervals are of that motion, and need not hold the observations that were fitted"
+)
+"""Said of a free motion in the tube over a posterior."""
 
 
 @dataclass(frozen=True)
