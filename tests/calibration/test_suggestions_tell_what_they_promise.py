@@ -94,6 +94,13 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
         assert found.narrowing[name] == pytest.approx(np.sqrt(after[place, place]) / spread[place], rel=0.02)
 
 
+def test_a_tail_for_which_the_model_is_not_accurate_is_said(fitted: Path) -> None:
+    path = candidates(fitted, "40,20,2.5", "40,250,2.5")
+    found = sp.suggest(fitted / "posterior.nc", WIDE, candidates=path)
+    (said,) = [words for words in found.warnings if "accurate" in words]
+    assert said.startswith("1 of 2 candidates, the first channel 40 mm, tail 250 x 2.5 mm: turns")
+
+
 def test_a_candidate_that_stands_twice_is_refused(fitted: Path) -> None:
     path = candidates(fitted, "40,20,2.5", "40,12,1.5", "40.0,20,2.50")
     with pytest.raises(sp.InputError, match=r"candidates\.csv, .*wavelength_mm = 20, .* stands twice; allowed: each"):

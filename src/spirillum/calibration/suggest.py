@@ -40,7 +40,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
+from spirillum.shown import Shown, counted
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
 from spirillum.swimming.steady import requirements
@@ -160,7 +160,12 @@ def suggest(
         known,
         trials,
         _ranked(found),
-        (*((PAPER_ROBOTS_TAKEN,) if robots is None else ()), *_cautions(known, loaded), *left_out),
+        (
+            *((PAPER_ROBOTS_TAKEN,) if robots is None else ()),
+            *_cautions(known, loaded),
+            *_inaccurate(known, listed),
+            *left_out,
+        ),
     )
 
 
@@ -219,6 +224,15 @@ def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[str]:
     if known.synthetic:
         said.append(synthetic_warning(known.observations))
     return said
+
+
+def _inaccurate(known: PosteriorFile, listed: Sequence[Robot]) -> list[str]:
+    """A sentence for each limit within which the model is accurate that candidates break, with the first of them."""
+    broken_by: dict[str, list[str]] = {}
+    for robot in listed:
+        for limit in broken(find_swimmer_model(known.model).cautions(RobotBatch.of(robot))):
+            broken_by.setdefault(limit.flag, []).append(f"{tail_words(robot)}: {limit.caution()}")
+    return [f"{len(said)} of {counted(len(listed), 'candidate')}, the first {said[0]}" for said in broken_by.values()]
 
 
 def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
