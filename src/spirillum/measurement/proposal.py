@@ -225,14 +225,20 @@ def _findings(
         "robot", robot.name if given else name, "", "clear" if sure or striped else "doubtful", words,
         pixels=((tuple(rear), tuple(nose)),),
     )  # fmt: skip
+    behind = "its tail is seen behind it" if sure else "a guess, for its tail is hardly seen behind it"
     yield Finding(
         "direction", found.direction, "", "clear" if sure else "doubtful",
-        f"the nose points to the {found.direction}: its tail is seen behind it", "robot.direction",
+        f"the nose points {_towards(found.direction)}: {behind}", "robot.direction",
         ((tuple(rear), tuple(nose)),),
     )  # fmt: skip
     yield _travel(found)
     yield _stripes(found)
     yield _walls(found, robot)
+
+
+def _towards(direction: str) -> str:
+    """A direction of the picture after "points"."""
+    return direction if direction in ("up", "down") else f"to the {direction}"
 
 
 def _frame_rate(video: Video, *, timed: bool) -> Finding:

@@ -57,7 +57,7 @@ def _notes(settling: Settling) -> list[str]:
         return []
     return [
         f"The run ends at {end:.3g} s; the rest of the way to the steady motion, which is solved for, decays with a "
-        f"time constant of {slow:.3g} s."
+        f"time constant of {slow:.3g} s, at last: before, azimuth and yaw may go past it and come back."
     ]
 
 
