@@ -131,6 +131,22 @@ def test_a_flag_is_said_once_and_a_cause_without_its_consequence(make_track: Mak
     assert "flags: no-stripes, tail-does-not-fit, tail-unreadable\n" in rows
 
 
+def test_a_reason_names_one_thing_to_do(make_track: Make, robot: Any) -> None:
+    """Of a tail that is another one, and of a mirrored film, what follows is not said beside the reason."""
+    tail, body = ("tail_rotation_rate",), ("body_rotation_rate",)
+    unread = Flag("tail-unreadable", "sharper pictures show more", tail)
+    trial = trial_of(make_track(flags=(unread, Flag("tail-does-not-fit", "check the file", tail))), robot, "a")
+    assert [flag.name for flag in trial.flags] == ["tail-does-not-fit"]
+    order = Flag("stripe-order", "the stripes are seen in the reversed order", body)
+    hand = Flag("handedness", "body and tail seem to turn the same way", (*tail, *body))
+    mirrored = trial_of(make_track(flags=(order, hand)), robot, "a")
+    assert [flag.name for flag in mirrored.flags] == ["mirrored"]
+    for name in (*tail, *body, "motor_rotation_rate"):
+        assert "mirror the film back" in mirrored.quantities[name].reason
+    other = trial_of(make_track(flags=(replace(order, sentence="in another order"), hand)), robot, "a")
+    assert [flag.name for flag in other.flags] == ["stripe-order", "handedness"]
+
+
 def test_an_amplitude_over_trials_is_not_negative(make_trial: MakeTrial) -> None:
     trials = [make_trial(seed=seed, wobble=0.01 * PIXEL, body=-1.9) for seed in range(3)]
     found = summary_of(trials).quantities

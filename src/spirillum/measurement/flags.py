@@ -32,8 +32,27 @@ _FEWEST_FRAMES = 4
 """Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
-_OF_STRIPES = {"uneven-stripes", "stripes-of-another-size", "stripes-do-not-pass", "short-turn"}
-"""Flags that say nothing where the stripes are not those of the robot file."""
+_IMPLIED = {
+    "no-stripes": {"stripes-unreadable"},
+    "stripes-do-not-fit": {
+        "stripes-unreadable",
+        "uneven-stripes",
+        "stripes-of-another-size",
+        "stripes-do-not-pass",
+        "short-turn",
+    },
+    "tail-does-not-fit": {"tail-unreadable"},
+    "not-the-robot": {*_FOLLOWING, "nothing-moves"},
+    "nose-on-the-other-side": {
+        "not-the-robot",
+        "stripes-do-not-fit",
+        "tail-does-not-fit",
+        "moves-backwards",
+        *_FOLLOWING,
+    },
+    "mirrored": {"stripe-order", "handedness"},
+}
+"""Flags that say nothing more beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
 """Flags that say nothing more where the robot does not move one way throughout."""
@@ -56,17 +75,14 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
         same = [other for other in flags if other.name == flag.name]
         if not same or (flag.name not in _ONCE and all(other.sentence != flag.sentence for other in same)):
             flags.append(flag)
+    flags += _mirrored(flags)
     names = {flag.name for flag in flags}
-    implied = {"stripes-unreadable"} if "no-stripes" in names else set()
+    implied = set[str]().union(*(_IMPLIED.get(flag.name, ()) for flag in flags if flag.spoils))
     for name in SEEN:  # what is not given has no mean, and no frames left out of it
         if any(name in flag.spoils for flag in flags):
             implied |= {f"{kind}-{name.replace('_', '-')}" for kind in ("not-steady", "stray-frames")}
-    if "stripes-do-not-fit" in names:
-        implied |= _OF_STRIPES
     if _CHANGES & names:
         implied |= _OF_CHANGES
-    if "not-the-robot" in names:
-        implied |= {*_FOLLOWING, "nothing-moves"}
     count = track.time.size
     if count < _FEWEST_FRAMES and not {BY_HAND, IMPORTED} & names:
         frames = "1 frame was" if count == 1 else f"{count} frames were"
@@ -74,6 +90,18 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
         flags.insert(0, Flag("too-few-frames", few, SEEN))
         implied |= _FOLLOWING
     return tuple(flag for flag in flags if flag.name not in implied)
+
+
+def _mirrored(flags: list[Flag]) -> list[Flag]:
+    """A flag where stripes and tail both run the other way round than they should."""
+    reversed_order = any(flag.name == "stripe-order" and "reversed" in flag.sentence for flag in flags)
+    if not reversed_order or all(flag.name != "handedness" for flag in flags):
+        return []
+    sentence = (
+        "stripes and tail both run the other way round than the robot file says, as in a mirrored picture; neither "
+        "rotation is given: mirror the film back, or, if it is not mirrored, correct robot.stripes and tail.handedness"
+    )
+    return [Flag("mirrored", sentence, ("body_rotation_rate", "tail_rotation_rate"))]
 
 
 def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:

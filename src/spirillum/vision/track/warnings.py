@@ -78,7 +78,7 @@ def turned_flags(
     side = body.optics.direction
     sentence = (
         f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits {turned:.2g} times "
-        "better; all signs would be wrong, so that nothing is given"
+        "better; all signs would be wrong, so that nothing is given: give it the other way"
     )
     return (Flag("nose-on-the-other-side", sentence, EVERYTHING),)
 
