@@ -10,7 +10,7 @@ import pytest
 from flat_pictures import drawn
 from spirillum.vision.camera.optics import BodyPose, Optics, optics_of
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.colours import pattern_period, runs_of
 from spirillum.vision.track.stripes import Stripes
 
 PRESET = ("red", "yellow", "green", "blue") * 2
@@ -109,6 +109,58 @@ def test_wide_glare_that_was_there_all_the_time_does_not_hold_the_angle(
     assert read.mean() > 0.5
     assert np.degrees(np.max(np.abs(missed[read]))) < 4.0
     assert abs(np.polyfit(angle[read], missed[read], 1)[0]) < 0.03  # it does not lag behind
+
+
+LINE = ("white", *("black",) * 23)
+BARS = ("black", "white", "white", *("black", "white") * 2, "black", "black", *("white",) * 3)
+
+
+def shining(flat: Any, pictures: list[tuple[np.ndarray, BodyPose]]) -> list[tuple[np.ndarray, BodyPose]]:
+    """A highlight that stays on the seal, as of a lamp on dark paint."""
+    found = []
+    for picture, pose in pictures:
+        centre = flat.pixels(np.array([pose.x - 0.012, pose.y - 0.003, flat.axis_height]))
+        v, u = np.mgrid[: picture.shape[0], : picture.shape[1]]
+        shine = 60.0 * np.exp(-0.5 * ((v - centre[1]) / 6.0) ** 2) * (np.abs(u - centre[0]) < 60.0)
+        found.append((np.clip(picture + shine[..., None], 0, 255).astype(np.uint8), pose))
+    return found
+
+
+@pytest.mark.parametrize("shines", [False, True])
+def test_one_painted_line_is_read_where_it_faces_the_camera(
+    flat_pictures: ModuleType, tmp_path: Path, *, shines: bool
+) -> None:
+    """A turn and a quarter. Where black alone is in view, or what the lamp makes of it, nothing is read."""
+    said = str(list(LINE)).replace("'", '"')
+    flat = film(flat_pictures, stripes=LINE, frames=40, body_rate=-np.pi / 4, noise=2.0)
+    stripes, pictures, angle = learnt(flat, tmp_path, robot_stripes=said)
+    if shines:
+        pictures = shining(flat, pictures)
+        stripes.learn(pictures)
+    missed, _ = errors(stripes, pictures, angle)
+    assert stripes.flags == ()
+    away = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi)  # of the line from the direction towards the camera
+    read = np.isfinite(missed)
+    assert read[away < np.radians(45.0)].mean() > 0.7
+    assert not read[away > np.radians(75.0)].any()
+    assert np.degrees(np.max(np.abs(missed[read]))) < 2.5
+    assert np.degrees(np.median(np.abs(missed[read]))) < 1.0
+    assert 0.3 < stripes.readable < 0.5
+
+
+def test_bars_of_several_widths_are_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    said = str(list(BARS)).replace("'", '"')
+    flat = film(flat_pictures, stripes=BARS, frames=12)
+    stripes, pictures, angle = learnt(flat, tmp_path, robot_stripes=said)
+    missed, _ = errors(stripes, pictures, angle)
+    assert stripes.flags == ()
+    assert np.degrees(np.max(np.abs(missed))) < 0.6
+
+
+@pytest.mark.parametrize(("order", "runs"), [(BARS, [1, 2, 1, 1, 1, 1, 2, 3]), (LINE, [1, 23]), (PRESET, [1] * 8)])
+def test_runs_of_one_colour_add_up_to_a_turn(order: tuple[str, ...], runs: list[int]) -> None:
+    assert runs_of(order) == runs
+    assert sum(runs) == len(order)
 
 
 @pytest.mark.parametrize(

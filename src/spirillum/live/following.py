@@ -166,7 +166,7 @@ class Following:
             return
         self.next_check = frame.time + _CHECKED
         hand = self.learnt.known.wire.handedness()
-        odd = motion_flags(self.readings, self.robot, self.body.period, hand)
+        odd = motion_flags(self.readings, self.robot, self.body.period, hand, self.learnt.known.stripes.readable)
         self.flags = (*self.moved, *self.always, *self.learnt.flags, *self._uneven(), *odd)
 
     def _uneven(self) -> tuple[Flag, ...]:

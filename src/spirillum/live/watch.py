@@ -46,7 +46,7 @@ class Readings:
         return np.array(self.rows).T
 
 
-def motion_flags(readings: Readings, robot: Robot, period: float, hand: int) -> tuple[Flag, ...]:
+def motion_flags(readings: Readings, robot: Robot, period: float, hand: int, readable: float = 1.0) -> tuple[Flag, ...]:
     """Flags on the motion in the last seconds.
 
     Args:
@@ -54,15 +54,17 @@ def motion_flags(readings: Readings, robot: Robot, period: float, hand: int) -> 
         robot: the robot.
         period: of the stripes, rad.
         hand: handedness by perspective, as of `TailWave.handedness`.
+        readable: share of a turn in which something of the stripes faces the camera.
     """
     if len(readings.rows) < 4:
         return ()
     time, x, body, tail, roll, roll_error, phase, phase_error = readings.columns()
-    of_body = unwrapped(time, roll, roll_error, period)[1]
+    of_body = unwrapped(time, roll, roll_error, period, readable=readable)[1]
     of_tail = unwrapped(time, phase, phase_error, 2.0 * np.pi, "tail")[1]
     motion = Motion(time, x, body, tail)
-    odd = (*nothing_moves(motion, robot), *contradictions(motion, robot, hand), *no_stripe_passes(motion, robot))
-    return (*of_body, *of_tail, *odd)
+    odd = (*nothing_moves(motion, robot), *contradictions(motion, robot, hand))
+    still = no_stripe_passes(motion, robot, bare=0.0 < readable < 1.0)
+    return (*of_body, *of_tail, *odd, *still)
 
 
 class CameraWatch:

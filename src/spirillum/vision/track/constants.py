@@ -346,7 +346,7 @@ class StripeConstants:
     """Loss over that of one even colour above which nothing is read."""
     good: float = 0.3
     """Loss over that of a uniform colour below which the named colours are not tried as initial ones."""
-    faces: float = radians(65.0)
+    faces: float = radians(60.0)
     """Largest angle from the direction towards the camera at which an edge is surely read, rad."""
     still: float = 0.25
     """Quantile over the frames of what stays while a line on a bare seal comes and goes."""

@@ -89,13 +89,13 @@ class Stripes:
     @cached_property
     def readable(self) -> float:
         """Share of a turn in which an edge between two colours faces the camera: about half for a single line."""
-        return float(np.mean([self._faces(angle, STRIPES.faces) for angle in np.linspace(0.0, 2.0 * np.pi, 361)]))
+        return float(np.mean([self._faces(angle) for angle in np.linspace(0.0, 2.0 * np.pi, 361)]))
 
-    def _faces(self, angle: float, reach: float) -> bool:
-        """Whether at an angle of the body an edge between two colours lies within `reach` of facing the camera."""
+    def _faces(self, angle: float) -> bool:
+        """Whether at an angle of the body an edge between two colours faces the camera."""
         count = len(self.stripes)
         edges = [k for k in range(count) if self.stripes[k] != self.stripes[k - 1]]
-        return any(np.cos(angle + 2.0 * np.pi / count * (edge - 0.5)) > np.cos(reach) for edge in edges)
+        return any(np.cos(angle + 2.0 * np.pi / count * (edge - 0.5)) >= np.cos(STRIPES.faces) - 1e-9 for edge in edges)
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Learn colours, shading and blur of the stripes from some frames of the video.
@@ -224,7 +224,7 @@ class Stripes:
         loss, other, flat = answer[2:5]
         if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
             return unread
-        if self.readable < 1.0 and not self._faces(float(answer[0]), STRIPES.reach):
+        if self.readable < 1.0 and not self._faces(float(answer[0])):
             return unread
         error = np.sqrt(answer[1] ** 2 + STRIPES.floor**2 + (STRIPES.pixel_locking / scale.max()) ** 2)
         known, blur = self.appearance, np.clip(self.appearance.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
