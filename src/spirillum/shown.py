@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from spirillum.units import among, in_unit
 
-__all__ = ["Row", "Shown", "counted", "fitted_words", "html_of", "rows_of", "text_of"]
+__all__ = ["Row", "Shown", "counted", "fitted_words", "html_of", "percent", "rows_of", "text_of"]
 
 
 class Row(NamedTuple):
@@ -65,6 +65,12 @@ _LABELS = {"advance_per_radian": "advance"}
 def counted(number: int, word: str) -> str:
     """A number with its noun, in the plural where it is not one."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def percent(share: float) -> str:
+    """A share in per cent, with two significant digits and no exponent up to 1e5."""
+    value = 100.0 * share
+    return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
 
 
 class Shown(ABC):
@@ -206,4 +212,4 @@ def _errors(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     known = ("known error", str(error["statement"]))
     if error["value"] is None:
         return [known]
-    return [("error estimate", f"{100 * error['value']:.2g} % of the forward velocity"), known]
+    return [("error estimate", f"{percent(error['value'])} of the forward velocity"), known]

@@ -16,6 +16,7 @@ from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 from spirillum.robust import mad_scale
+from spirillum.shown import percent
 
 __all__ = [
     "CALLED",
@@ -28,7 +29,6 @@ __all__ = [
     "misfit_warnings",
     "narrow_channel_warnings",
     "outlier_warnings",
-    "percent",
     "prior_warnings",
     "synthetic_warning",
 ]
@@ -54,12 +54,6 @@ _WIDE = 0.5
 """Smallest logarithmic standard deviation of a prior that is called wide."""
 _OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
 """Robust standard deviations, and relative deviation, beyond which a robot is named as an outlier."""
-
-
-def percent(share: float) -> str:
-    """A share in per cent, with two significant digits and no exponent up to 1e5."""
-    value = 100.0 * share
-    return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
 
 
 def check_plausible(problem: Problem, z: Samples) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.designs.answer import Alternative, Design
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.shown import percent
 
 __all__ = ["ALTERNATIVES", "lead_warnings"]
 
@@ -42,12 +43,12 @@ def lead_warnings(answer: Design) -> tuple[str, ...]:
         if lead < 0:
             said += (
                 f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best design within them, by "
-                f"{-100 * lead:.2g} % of it: wider ranges would hold a better one",
+                f"{percent(-lead)} of it: wider ranges would hold a better one",
             )
         elif lead < error[0]:
-            leads.setdefault(error, []).append(f"{ALTERNATIVES[other.name]} by {100 * lead:.2g} %")
+            leads.setdefault(error, []).append(f"{ALTERNATIVES[other.name]} by {percent(lead)}")
     return said + tuple(
-        f"the best design leads {' and '.join(led)}, less than the error of {100 * error:.2g} % {of}: it is surely the "
+        f"the best design leads {' and '.join(led)}, less than the error of {percent(error)} {of}: it is surely the "
         "better one only as far as they share that error"
         for (error, of), led in leads.items()
     )

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_reason
 from spirillum.designs.leads import ALTERNATIVES
+from spirillum.shown import percent
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -54,10 +55,10 @@ def table(answer: Answer, console: Console) -> None:
         _front(answer["front"], console)
     if "learned" in answer:
         known = answer["learned"]
-        best, rest = (100.0 * known[name]["value"] for name in ("error_of_the_best", "error_left_out"))
+        best, rest = (percent(known[name]["value"]) for name in ("error_of_the_best", "error_left_out"))
         words = f"learned from {known['solves']} designs that were solved for: the objective of the best was missed by "
         console.print(
-            f"{words}{best:.2g} %, those of the better half, each left out, by {rest:.2g} %",
+            f"{words}{best}, those of the better half, each left out, by {rest}",
             highlight=False,
             soft_wrap=True,
         )

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
+from spirillum.shown import percent
 from spirillum.swimming.answer import headline
 from spirillum.units import display_unit, in_unit
 
@@ -102,7 +103,7 @@ def _own_error(item: Answer) -> str:
     estimate = (
         ""
         if error["value"] is None
-        else f"{100 * error['value']:.2g} % of the forward velocity, against "
+        else f"{percent(error['value'])} of the forward velocity, against "
         f"{error.get('against', 'another resolution')}; "
     )
     return f"known error of {item['model']}: {estimate}{error['statement']}"

@@ -7,7 +7,7 @@ from rich.markup import escape
 
 from spirillum.calibration.fit_warnings import CALLED
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import counted
+from spirillum.shown import counted, percent
 
 __all__ = ["table"]
 
@@ -26,7 +26,7 @@ def table(answer: Answer, console: Console) -> None:
         apart = _apart(item["difference"])
         one = answer["robots"] == 1  # a single tail does not tell by how much a model misses others
         misses = [None if one else item["discrepancy"].get(name) for name in compared]
-        shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
+        shares = ["-" if miss is None else percent(miss["value"]) for miss in misses]
         rows.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
     console.print(rows)
     console.print(f"{escape(answer['verdict'])}", highlight=False, soft_wrap=True)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.shown import rows_of
+from spirillum.shown import percent, rows_of
 from spirillum.units import display_unit, in_unit
 
 __all__ = [
@@ -131,7 +131,7 @@ def show_reason(answer: Answer, console: Console) -> None:
 def show_error(error: Answer, console: Console) -> None:
     """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
-        share = f"{100 * error['value']:.2g} %"
+        share = percent(error["value"])
         against = error.get("against", "another resolution")
         said = f"error estimate: {share} of the forward velocity, against {against}"
         console.print(said, highlight=False, soft_wrap=True)

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
+from spirillum.shown import percent
 from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
@@ -101,7 +102,7 @@ def _conditions(comparison: ModelComparison) -> str:
 def _notes(comparison: ModelComparison) -> list[str]:
     found = [f"Percentages: difference from {comparison.reference} (dashed line)."]
     errors = {name: estimated_error(answer) for name, answer in comparison.predictions.items()}
-    known = [f"{name} {_percent(error)}" for name, error in errors.items() if error is not None]
+    known = [f"{name} {percent(error)}" for name, error in errors.items() if error is not None]
     if known:
         found.append(f"Bars in a): the error of the speed by the model's own refinement ({', '.join(known)}).")
     silent = [name for name, error in errors.items() if error is None]
@@ -116,11 +117,7 @@ def _notes(comparison: ModelComparison) -> list[str]:
     return found
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
-
-
-def _signed_percent(share: float) -> str:
+def _signedpercent(share: float) -> str:
     digits = 1 if abs(share) < 0.0995 else 0
     return f"{100 * share:+.{digits}f} %".replace("-", "−")
 
@@ -145,7 +142,7 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
         axes.plot(value, place, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
         if name != comparison.reference and reference != 0:
             axes.annotate(
-                _signed_percent(value / reference - 1.0),
+                _signedpercent(value / reference - 1.0),
                 (value * (1 + (error or 0.0)), place),
                 xytext=(6 if value >= 0 else -6, 0),
                 textcoords="offset points",

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.calibration.least_squares import FEWEST_LEFT
+from spirillum.shown import percent
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.style import COLOURS, PAGE, Scale, look_of_model, plain, styled
 
@@ -149,7 +150,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     assert found.least_squares is not None  # noqa: S101 - profiles are those of a fit by least squares
     fit = found.least_squares
     held = " and ".join(
-        f"{100.0 * share:.2g} % of the {name.replace('_', ' ')} "
+        f"{percent(share)} of the {name.replace('_', ' ')} "
         f"({'middle of its prior' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
         for name, share in fit.discrepancy.items()
     )
