@@ -21,7 +21,8 @@ def table(answer: Answer, console: Console, rows: int = 10) -> None:
     for item in answer["candidates"][:rows]:
         sizes = [f"{1e3 * item[name]['value']:g}" for name in ("channel_diameter", "wavelength", "amplitude")]
         name, share = min(item["narrowing"].items(), key=lambda pair: pair[1]["value"])
-        told = f"{name} to {100 * share['value']:.0f} %"
+        words = name.replace("_", " ").replace("[", " [")  # wraps between words
+        told = f"{words} to {100 * share['value']:.0f} %"
         behind = item["behind_the_best"]
         apart = "-" if item is first else f"{behind['value']:.3f} +- {behind['standard_error']:.2g}"
         size = f"{sizes[1]} x {sizes[2]}"
