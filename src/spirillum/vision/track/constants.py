@@ -348,12 +348,6 @@ class StripeConstants:
     """Loss over that of a uniform colour below which the named colours are not tried as initial ones."""
     faces: float = radians(60.0)
     """Largest angle from the direction towards the camera at which an edge is surely read, rad."""
-    still: float = 0.25
-    """Quantile over the frames of what stays while a line on a bare seal comes and goes."""
-    fewest_still: int = 4
-    """Fewest frames for it."""
-    whole_width: float = radians(120.0)
-    """Width below which a stretch of one colour is seen whole, with what lies on either side, rad."""
     fits: float = 0.25
     """Loss over that of one even colour from which on the stripes are not those that are stated.
 
@@ -428,6 +422,24 @@ class WidthConstants:
     """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
     together: float = 2.5
     """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
+
+
+@dataclass(frozen=True)
+class SingleLineConstants:
+    """A single painted line (`single_line`)."""
+
+    bare: float = radians(200.0)
+    """Width of a stretch of one colour from which on it fills the view while the rest faces away, rad."""
+    contrast: float = 30.0
+    """Least change of a colour as the line comes or goes, of 255."""
+    clear: float = 6.0
+    """The same over the scatter of what does not change."""
+    samples: int = 2
+    """Fewest angles on a frame that the line covers."""
+    frames: int = 4
+    """Fewest frames on which it does, on which it is read, and on which an angle is seen."""
+    kept: float = 0.5
+    """Least difference of the learnt colours of line and seal over that of what was seen to move."""
 
 
 @dataclass(frozen=True)
@@ -740,6 +752,7 @@ STEADINESS = SteadinessConstants()
 COLOURS = ColourConstants()
 STRIPES = StripeConstants()
 WIDTHS = WidthConstants()
+SINGLE_LINE = SingleLineConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()

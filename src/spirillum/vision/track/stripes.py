@@ -25,7 +25,8 @@ from spirillum.vision.track.colours import (
     width_seen,
     without_glare,
 )
-from spirillum.vision.track.constants import STRIPES
+from spirillum.vision.track.constants import SINGLE_LINE, STRIPES
+from spirillum.vision.track.single_line import is_single, seen_line
 from spirillum.vision.track.widths import edge_shifts
 
 __all__ = ["Stripes"]
@@ -115,16 +116,20 @@ class Stripes:
         profiles = np.array([profile for profile, _ in found])
         scales = np.array([scale for _, scale in found])
         steep = scales > 0.45 * scales.max(axis=1, keepdims=True)
+        if is_single(self.stripes):
+            self._learn_line(profiles, scales, steep)
+            return
         facing = profiles[steep & np.isfinite(profiles).all(axis=2)]
         palettes = colour_classes(facing, self.names)
         start = palettes[1]
         seen_steep = np.where(steep[..., None], profiles, np.nan)
         palette, verdict = order_seen(seen_steep, self.angles, palettes, self.stripes, self.names)
         clear = without_glare(profiles, (palette, *palettes[1:]))
-        self.appearance = self._refined(profiles, clear, scales, palette)
+        even = np.zeros((self.angles.size, 3))
+        self.appearance = self._refined(profiles, clear, scales, palette, even)
         least = self._typical_loss(profiles, scales, self.appearance)
         if least > STRIPES.good:
-            other = self._refined(profiles, clear, scales, start)
+            other = self._refined(profiles, clear, scales, start, even)
             loss = self._typical_loss(profiles, scales, other)
             self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
         if not told_apart(facing, palettes):
@@ -155,14 +160,42 @@ class Stripes:
         else:
             self.fits = True
 
+    def _learn_line(self, profiles: Samples, scales: Samples, facing: np.ndarray) -> None:
+        """Learn the appearance of a single line: from what moves, for a highlight stays where it is."""
+        line = seen_line(profiles, facing, self.order)
+        if line is None:
+            self.flags = (_line_flag("stripes-do-not-pass", "no painted line is seen to move over the seal"),)
+            return
+        self.appearance = self._refined(profiles, profiles, scales, line.palette, line.sheen)
+        fits = np.array([self._fit(p, s, self.appearance) for p, s in zip(profiles, scales, strict=True)])
+        count = np.count_nonzero(self._told(fits))
+        contrast, first = (float(np.linalg.norm(np.diff(p, axis=0))) for p in (self.appearance.palette, line.palette))
+        if count < SINGLE_LINE.frames:
+            few = f"the painted line can be read on {count} of the {len(fits)} frames looked at"
+            self.flags = (_line_flag("stripes-unreadable", few),)
+        elif (
+            self._typical_loss(profiles, scales, self.appearance) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first
+        ):
+            sentence = (
+                f"what moves over the seal does not look like a {self._line_words()}; the body's rotation is not "
+                "given: check robot.stripes"
+            )
+            self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
+        else:
+            self.fits = True
+
+    def _line_words(self) -> str:
+        """The line in words, as `line of 15 degrees, white on black`."""
+        counts = np.bincount(self.order, minlength=2)
+        line, seal = self.names[int(np.argmin(counts))], self.names[int(np.argmax(counts))]
+        return f"line of {360.0 * counts.min() / counts.sum():.0f} degrees, {line} on {seal}"
+
     def _as_wide(self, profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
         """Whether stripes are seen as wide as stated; of patterns with several widths the fit alone says so."""
-        widths = {
-            wide for wide in runs_of(self.stripes) if wide * 2.0 * np.pi / len(self.stripes) < STRIPES.whole_width
-        }
-        if len(widths) != 1:
+        runs = {2.0 * np.pi / len(self.stripes) * run for run in runs_of(self.stripes)}
+        if len(runs) != 1:
             return True
-        stated = widths.pop() * 2.0 * np.pi / len(self.stripes)
+        stated = runs.pop()
         return not abs(np.log(width_seen(profiles, self.angles, palettes, stated) / stated)) > STRIPES.width_range
 
     def _typical_loss(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> float:
@@ -177,26 +210,6 @@ class Stripes:
         if self.readable == 1.0:
             return np.ones(len(fits), dtype=bool)
         return np.asarray(fits[:, 3] >= STRIPES.ambiguous * fits[:, 2])
-
-    def _sheen_of(self, profiles: Samples, palette: Samples) -> Samples:
-        """Sheen along the angle to begin with, (n, 3): what stays while a line comes and goes; zeros where none does.
-
-        A highlight on a dark seal would else be taken for the only line on it: it is there on every frame.
-
-        Args:
-            profiles: colours along the angle, (f, n, 3).
-            palette: colours of the classes, (classes, 3).
-        """
-        if self.readable == 1.0:
-            return np.zeros((self.angles.size, 3))
-        counts = np.bincount(self.order, minlength=len(palette))
-        ground = palette[int(np.argmax(counts))]
-        dark = ground.sum() <= palette.sum(axis=1).mean()
-        seen = np.isfinite(profiles).all(axis=2).sum(axis=0) >= STRIPES.fewest_still
-        still = np.zeros((self.angles.size, 3))
-        still[seen] = np.nanquantile(profiles[:, seen], STRIPES.still if dark else 1.0 - STRIPES.still, axis=0)
-        least = still[seen].min(axis=0) if seen.any() else np.zeros(3)
-        return np.asarray(np.where(seen[:, None], np.maximum(still - np.minimum(ground, least), 0.0), 0.0))
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
         """Rotation angle of the body about +x, modulo `period`, and its standard error, rad; NaN where unreadable.
@@ -270,16 +283,19 @@ class Stripes:
     def _fit(self, profile: Samples, scale: Samples, appearance: _Appearance) -> Samples:
         """The result of `stripe_fit`; NaN where too little is in view."""
         edges = np.diff(appearance.palette[np.append(self.order, self.order[0])], axis=0)
-        cut = max(STRIPES.cut * appearance.residual, STRIPES.edge_cut * float(np.median(np.linalg.norm(edges, axis=1))))
+        apart = np.linalg.norm(edges[np.diff(self.order, append=self.order[0]) != 0], axis=1)
+        cut = max(STRIPES.cut * appearance.residual, STRIPES.edge_cut * float(np.median(apart)))
         answer, losses = np.full(8, np.nan), np.empty(max(24, round(self.period / np.deg2rad(4.0))))
         settings = self.period, STRIPES.lamp_tint, cut, 0.3 * appearance.residual, appearance.blur
         known = profile, scale, appearance.trust, self.angles, appearance.shade, self.order, appearance.palette
         stripe_fit(*known, settings, losses, answer)
         return answer
 
-    def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Appearance:
+    def _refined(
+        self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples, sheen: Samples
+    ) -> _Appearance:
         """Colours, shading and blur by alternating fits; profiles with glare enter only the last of them."""
-        even = np.column_stack([np.ones((self.angles.size, 3)), self._sheen_of(profiles, palette)])
+        even = np.column_stack([np.ones((self.angles.size, 3)), sheen])
         appearance = _Appearance(palette, even, 1.0, STRIPES.first_residual, np.ones(self.angles.size))
         for repeat in range(STRIPES.repeats):
             if repeat in (2, STRIPES.repeats - 1):
@@ -342,6 +358,15 @@ class Stripes:
         usual = np.median(rough) + 1.0
         trust = 1.0 / (1.0 + STRIPES.doubt * (rough / usual) ** 2)
         return _Appearance(palette, light, appearance.blur, float(np.median(residuals)), trust / trust.max())
+
+
+def _line_flag(name: str, what: str) -> Flag:
+    """A flag on a single line of which too little is seen."""
+    sentence = (
+        f"{what}; the body's rotation is not given: film it for longer, while the line passes in front of the camera, "
+        "or paint more lines"
+    )
+    return Flag(name, sentence, ("body_rotation_rate",))
 
 
 def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) -> Samples:
