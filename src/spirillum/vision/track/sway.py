@@ -47,7 +47,7 @@ def swayed_by(still: Steadied, motion: Motion, setup: Setup, sight: Sight) -> Sw
     reach = max(float(np.ptp(right)), float(np.ptp(down)))
     jump = _largest_jump(motion.time, motion.x) / pixel
     sentence = (
-        f"the camera swayed by {reach:.1f} pixels from end to end: all pictures were moved to where the first one lies, "
+        f"the camera swayed by {reach:.1f} pixels from end to end: all pictures were moved to where the first lies, "
         "by what stands still in them; put the camera on a stand to be sure"
     )
     drift, flags = abs(parallax) * speed * pixel, [Flag("camera-swayed", sentence)]
