@@ -36,7 +36,7 @@ STYLES = ("virtual", "flat", "light-table")
 VARIANTS = ("", "uneven", "bare", "one-colour", "line", "bars", "stuck", "small", "fast-tail")
 PATTERNS = {
     "line": ("white", *("black",) * 23),
-    "bars": ("black", "white", "white", *("black", "white") * 2, "black", "black", *("white",) * 3),
+    "bars": (*("black",) * 3, "white", "black", *("white",) * 3),  # no three neighbours come twice
 }
 """Seals of other stripes than the paper's, which the robot's file states."""
 FPS = 25.0

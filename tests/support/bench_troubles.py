@@ -318,7 +318,7 @@ TROUBLES = (
     Trouble("small robot", "a body of 12 mm, 2 seconds", _first(2.0), variant="small"),
     Trouble("stripes uneven", "widths differ by up to a fifth", _none, variant="uneven"),
     Trouble("one painted line", "15 degrees wide, white on black; it faces the camera at first", _none, variant="line"),
-    Trouble("bars", "twelve, black and white, some of one colour side by side", _none, variant="bars"),
+    Trouble("bars", "eight, black and white, of which no three neighbours come twice", _none, variant="bars"),
     Trouble("seal bare", "no stripes, though the setup names them", _none, variant="bare", known=_WITHOUT_BODY),
     Trouble("seal of one colour", "instead of stripes", _none, variant="one-colour", known=_WITHOUT_BODY),
     Trouble("body stuck", "it does not turn, the tail does", _none, variant="stuck", known=_WITHOUT_BODY),
