@@ -148,6 +148,18 @@ def test_one_painted_line_is_read_where_it_faces_the_camera(
     assert 0.3 < stripes.readable < 0.5
 
 
+def test_a_line_that_never_passes_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    """Turned away all along; the lamp's highlight is no line."""
+    said = str(list(LINE)).replace("'", '"')
+    flat = film(flat_pictures, stripes=LINE, frames=20, body_rate=-np.pi / 20, body_angle=2.6, noise=2.0)
+    stripes, pictures, _ = learnt(flat, tmp_path, robot_stripes=said)
+    stripes.learn(shining(flat, pictures))
+    (flag,) = stripes.flags
+    assert flag.name == "stripes-do-not-pass"
+    assert flag.spoils == ("body_rotation_rate",)
+    assert not stripes.fits
+
+
 def test_bars_of_several_widths_are_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
     said = str(list(BARS)).replace("'", '"')
     flat = film(flat_pictures, stripes=BARS, frames=12)

@@ -41,6 +41,7 @@ _IMPLIED = {
         "stripes-do-not-pass",
         "short-turn",
     },
+    "stripes-do-not-pass": {"stripes-unreadable", "short-turn"},
     "tail-does-not-fit": {"tail-unreadable"},
     "not-the-robot": {*_FOLLOWING, "nothing-moves"},
     "nose-on-the-other-side": {

@@ -43,9 +43,11 @@ def seen_line(profiles: Samples, facing: np.ndarray, order: Whole) -> SeenLine |
         order: class of each stripe, (s,).
     """
     seen = np.where(facing[..., None], profiles, np.nan)
-    often = np.isfinite(seen).all(axis=2).sum(axis=0) >= SINGLE_LINE.frames
+    known = np.asarray(np.isfinite(seen).all(axis=2))
+    often = known.sum(axis=0) >= SINGLE_LINE.frames
     if not often.any():
         return None
+    seen = seen[known[:, often].sum(axis=1) > 0]
     still = np.full(seen.shape[1:], np.nan)
     still[often] = np.nanmedian(seen[:, often], axis=0)
     change = seen - still
