@@ -417,7 +417,7 @@ class WidthConstants:
     other_size: float = 0.015
     """Standard deviation of what wrong scale, diameter and heights add to all widths alike. Assumed."""
     size: float = 0.005
-    """Standard uncertainty of the same, where widths are learnt from a part of a turn. Assumed."""
+    """Standard uncertainty of what wrong sizes and heights add to widths learnt from a part of a turn. Assumed."""
     printed: float = 0.01
     """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
     together: float = 2.5
@@ -433,7 +433,7 @@ class SingleLineConstants:
     contrast: float = 30.0
     """Least change of a colour as the line comes or goes, of 255."""
     clear: float = 6.0
-    """The same over the scatter of what does not change."""
+    """Least change of a colour over the scatter of what does not change."""
     samples: int = 2
     """Fewest angles on a frame that the line covers."""
     frames: int = 4
