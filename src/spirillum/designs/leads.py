@@ -40,7 +40,7 @@ def lead_warnings(answer: Design) -> tuple[str, ...]:
         if not (other.keeps and math.isfinite(other.objective) and best):
             continue
         lead = sign * (best - other.objective) / abs(best)
-        if lead < 0:
+        if lead < -_ALIKE and other.name == "today":
             said += (
                 f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best design within them, by "
                 f"{percent(-lead)} of it: wider ranges would hold a better one",

@@ -236,7 +236,7 @@ def _free_run(
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
-    fastest = speed_limit(steady.batch, float(np.linalg.norm(dataset["velocity"].values, axis=-1).max()))
+    fastest = speed_limit(steady.batch, dataset["velocity"].values)
     way = [*vertical_drift(dataset), *(limit.caution() for limit in broken([fastest]))]
     dataset.attrs["warnings"] = "\n".join([*way, *said])
     dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], fastest.value)

@@ -85,7 +85,7 @@ def run_in_tube(
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
-    fastest = speed_limit(steady.batch, float(np.linalg.norm(dataset["velocity"].values, axis=-1).max()))
+    fastest = speed_limit(steady.batch, dataset["velocity"].values)
     stuck = held_by_friction(
         links,
         forward=float(dataset["mean_forward_velocity_steady"]),

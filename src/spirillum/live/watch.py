@@ -46,7 +46,7 @@ class Readings:
         return np.array(self.rows).T
 
 
-def motion_flags(readings: Readings, robot: Robot, period: float, hand: int, readable: float = 1.0) -> tuple[Flag, ...]:
+def motion_flags(readings: Readings, robot: Robot, period: float, hand: int, readable: float) -> tuple[Flag, ...]:
     """Flags on the motion in the last seconds.
 
     Args:
@@ -63,8 +63,7 @@ def motion_flags(readings: Readings, robot: Robot, period: float, hand: int, rea
     of_tail = unwrapped(time, phase, phase_error, 2.0 * np.pi, "tail")[1]
     motion = Motion(time, x, body, tail)
     odd = (*nothing_moves(motion, robot), *contradictions(motion, robot, hand))
-    still = no_stripe_passes(motion, robot, bare=0.0 < readable < 1.0)
-    return (*of_body, *of_tail, *odd, *still)
+    return (*of_body, *of_tail, *odd, *no_stripe_passes(motion, robot, readable=readable))
 
 
 class CameraWatch:

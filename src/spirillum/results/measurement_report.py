@@ -14,6 +14,7 @@ from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
+from spirillum.shown import percent
 from spirillum.version import versions
 from spirillum.view.figures.measurement import measurement_figures
 from spirillum.vision.setup import stripes_of
@@ -65,8 +66,8 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
         interrupted=measurement.interrupted,
         synthetic=any(trial.synthetic for trial in measurement.trials),
         overview=[picture for picture in pictures if picture.name == "trials"],
-        scale=f"{100 * scale.relative_uncertainty:.2g} %",
-        sources=[(name, f"{100 * share:.2g} %") for name, share in sources],
+        scale=percent(scale.relative_uncertainty),
+        sources=[(name, percent(share)) for name, share in sources],
         aliasing=_aliasing(measurement),
         intervals=any(math.isfinite(item.low) for trial in measurement.trials for item in trial.quantities.values()),
         files=[name for name in measurement.files if not name.startswith("figures/")],

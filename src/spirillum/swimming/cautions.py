@@ -46,8 +46,9 @@ def _reynolds_limit(what: str, value: Samples, flag: str = "reynolds-number") ->
     return Limit.of(f"Reynolds number ({what})", value, "at most", _LARGEST_REYNOLDS, "1", _INERTIA, flag)
 
 
-def speed_limit(batch: RobotBatch, speed: float) -> Limit:
-    """What has to hold of the largest speed of a run, m/s, in any direction, for the answer to be accurate."""
+def speed_limit(batch: RobotBatch, velocity: Samples) -> Limit:
+    """What has to hold of the largest speed of a run, by its velocities, (n, 3), m/s, for an accurate answer."""
+    speed = float(np.linalg.norm(velocity, axis=-1).max())
     value = batch.density * speed * batch.body_diameter / batch.viscosity
     return _reynolds_limit(f"body diameter, at the largest speed of the run, {1e3 * speed:.4g} mm/s", value)
 

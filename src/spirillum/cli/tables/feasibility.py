@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
+from spirillum.shown import percent
 from spirillum.units import for_people, in_unit, shown_in
 
 __all__ = ["table"]
@@ -28,14 +29,14 @@ def table(answer: Answer, console: Console) -> None:
         for name, item in answer["intervals"].items():
             reach = item["half_width"]
             unit = for_people(reach["unit"])
-            share = "-" if item["share"] is None else f"{100 * item['share']:.2g} %"
+            share = "-" if item["share"] is None else percent(item["share"])
             rows.add_row(name.replace("_", " "), f"{shown_in(reach['value'], unit):.2g}", unit, share)
         console.print(rows)
         console.print(f"basis: {answer['basis']}", highlight=False, soft_wrap=True)
-    scale, parts = 100 * answer["scale_uncertainty"], answer["scale_sources"]
-    words = ", ".join(f"{name} {100 * share:.2g} %" for name, share in sorted(parts.items(), key=lambda item: -item[1]))
+    scale, parts = percent(answer["scale_uncertainty"]), answer["scale_sources"]
+    words = ", ".join(f"{name} {percent(share)}" for name, share in sorted(parts.items(), key=lambda item: -item[1]))
     console.print(
-        f"standard uncertainty of lengths: {scale:.2g} %{' (' + words + ')' if words else ''}",
+        f"standard uncertainty of lengths: {scale}{' (' + words + ')' if words else ''}",
         highlight=False,
         soft_wrap=True,
     )

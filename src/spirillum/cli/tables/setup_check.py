@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer
+from spirillum.shown import percent
 
 __all__ = ["table"]
 
@@ -13,11 +14,11 @@ __all__ = ["table"]
 def table(answer: Answer, console: Console) -> None:
     """Text of `setup check`."""
     console.print(f"{escape(answer['file'])}: valid, robot {escape(answer['robot'])}", highlight=False, soft_wrap=True)
-    total = 100 * answer["scale_uncertainty"]
+    total = percent(answer["scale_uncertainty"])
     parts = sorted(answer["scale_sources"].items(), key=lambda item: -item[1])
-    words = ", ".join(f"{name} {100 * share:.2g} %" for name, share in parts)
+    words = ", ".join(f"{name} {percent(share)}" for name, share in parts)
     console.print(
-        f"standard uncertainty of lengths from heights and scale: {total:.2g} %{': ' + words if words else ''}",
+        f"standard uncertainty of lengths from heights and scale: {total}{': ' + words if words else ''}",
         highlight=False,
         soft_wrap=True,
     )

@@ -117,7 +117,7 @@ def _notes(comparison: ModelComparison) -> list[str]:
     return found
 
 
-def _signedpercent(share: float) -> str:
+def _signed_percent(share: float) -> str:
     digits = 1 if abs(share) < 0.0995 else 0
     return f"{100 * share:+.{digits}f} %".replace("-", "−")
 
@@ -142,7 +142,7 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
         axes.plot(value, place, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
         if name != comparison.reference and reference != 0:
             axes.annotate(
-                _signedpercent(value / reference - 1.0),
+                _signed_percent(value / reference - 1.0),
                 (value * (1 + (error or 0.0)), place),
                 xytext=(6 if value >= 0 else -6, 0),
                 textcoords="offset points",

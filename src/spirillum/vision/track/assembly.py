@@ -100,7 +100,7 @@ def track_of(
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
-    odd += no_stripe_passes(motion, body.robot, bare=0.0 < stripes.readable < 1.0)
+    odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)

@@ -127,10 +127,10 @@ class Stripes:
         clear = without_glare(profiles, (palette, *palettes[1:]))
         even = np.zeros((self.angles.size, 3))
         self.appearance = self._refined(profiles, clear, scales, palette, even)
-        least = self._typical_loss(profiles, scales, self.appearance)
+        least = self._typical_loss(self._fits(profiles, scales, self.appearance))
         if least > STRIPES.good:
             other = self._refined(profiles, clear, scales, start, even)
-            loss = self._typical_loss(profiles, scales, other)
+            loss = self._typical_loss(self._fits(profiles, scales, other))
             self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
         if not told_apart(facing, palettes):
             sentence = (
@@ -167,15 +167,13 @@ class Stripes:
             self.flags = (_line_flag("stripes-do-not-pass", "no painted line is seen to move over the seal"),)
             return
         self.appearance = self._refined(profiles, profiles, scales, line.palette, line.sheen)
-        fits = np.array([self._fit(p, s, self.appearance) for p, s in zip(profiles, scales, strict=True)])
+        fits = self._fits(profiles, scales, self.appearance)
         count = np.count_nonzero(self._told(fits))
         contrast, first = (float(np.linalg.norm(np.diff(p, axis=0))) for p in (self.appearance.palette, line.palette))
         if count < SINGLE_LINE.frames:
             few = f"the painted line can be read on {count} of the {len(fits)} frames looked at"
             self.flags = (_line_flag("stripes-unreadable", few),)
-        elif (
-            self._typical_loss(profiles, scales, self.appearance) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first
-        ):
+        elif self._typical_loss(fits) >= STRIPES.fits or contrast < SINGLE_LINE.kept * first:
             sentence = (
                 f"what moves over the seal does not look like a {self._line_words()}; the body's rotation is not "
                 "given: check robot.stripes"
@@ -198,9 +196,12 @@ class Stripes:
         stated = runs.pop()
         return not abs(np.log(width_seen(profiles, self.angles, palettes, stated) / stated)) > STRIPES.width_range
 
-    def _typical_loss(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> float:
+    def _fits(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> Samples:
+        """The results of `stripe_fit` on some frames, (f, 8)."""
+        return np.array([self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)])
+
+    def _typical_loss(self, fits: Samples) -> float:
         """Median over the frames of the loss relative to that of a uniform colour."""
-        fits = np.array([self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)])
         ratios = np.where(np.isfinite(fits[:, 0]), fits[:, 2] / fits[:, 4], 1.0)
         told = ratios[self._told(fits)]
         return float(np.median(told)) if told.size else 1.0
@@ -317,9 +318,8 @@ class Stripes:
         width = 2.0 * np.pi / len(self.order)
         sums, weights = np.zeros_like(appearance.palette), np.zeros(len(appearance.palette))
         models, wanted, good_at, residuals, squares = [], [], [], [], []
-        fits = [self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)]
-        losses = np.array([a[2] / a[4] if np.isfinite(a[0]) else np.inf for a in fits])
-        losses[~self._told(np.array(fits))] = np.inf
+        fits = self._fits(profiles, scales, appearance)
+        losses = np.where(np.isfinite(fits[:, 0]) & self._told(fits), fits[:, 2] / fits[:, 4], np.inf)
         best = np.argsort(losses)[: max(3, int(0.8 * np.isfinite(losses).sum()))]
         shade, sheen = appearance.shade[:, :3], appearance.shade[:, 3:]
         for which in best[np.isfinite(losses[best])]:

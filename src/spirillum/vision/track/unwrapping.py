@@ -271,19 +271,20 @@ def nothing_moves(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
     return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
 
 
-def no_stripe_passes(motion: Motion, robot: Robot, *, bare: bool = False) -> tuple[Flag, ...]:
+def no_stripe_passes(motion: Motion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:
     """Flag a body that stays where it is while its tail turns: shades of the lamp may have been taken for stripes.
 
     Args:
         motion: the robot's motion.
         robot: the robot; body and tail of one with a fixed joint are one.
-        bare: whether one colour alone faces the camera in a part of a turn. A highlight that stays looks like a single
-            line that stands still, however little the tail turned.
+        readable: share of a turn in which something of the stripes faces the camera. Below 1 a highlight that stays
+            looks like a single line that stands still, however little the tail turned.
     """
     known = motion.body_angle[np.isfinite(motion.body_angle)]
     turns = abs(_slope(motion.time, motion.tail_phase)[1]) / (2.0 * np.pi)
     fixed = robot.drive is not None and robot.drive.joint == "fixed"
-    if fixed or known.size < UNWRAPPING.fewest_frames or (turns < UNWRAPPING.tail_turns and not bare):
+    least_turns = 0.0 if 0.0 < readable < 1.0 else UNWRAPPING.tail_turns
+    if fixed or known.size < UNWRAPPING.fewest_frames or turns < least_turns:
         return ()
     low, high = np.quantile(known, [0.02, 0.98])
     if high - low > UNWRAPPING.seen_to_pass:

@@ -87,12 +87,13 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     shifts = np.full((int(known.sum()), count), np.nan)
     np.put_along_axis(shifts, which, edges[known], axis=1)
     places, scatter = _places(shifts)
-    off = float(np.ptp(places[np.isfinite(places)])) if np.isfinite(places).any() else 0.0
+    seen = np.isfinite(places)
+    off = float(np.ptp(places[seen])) if seen.any() else 0.0
     if off < max(WIDTHS.uneven, WIDTHS.clear * scatter):
         return untouched
     if (wide := _not_of_paint(places)) is not None:
         return Evened(angle, error, (wide,))
-    seen, turned = np.isfinite(places), float(np.ptp(angle[known]))
+    turned = float(np.ptp(angle[known]))
     if (size := _another_size(places)) is not None:
         share, flag = size
         return Evened(angle, error, (flag,), 0.5 * abs(share) * turned)
@@ -112,6 +113,12 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     return Evened(better, surer, (Flag("uneven-stripes", sentence),), drift)
 
 
+def _off_even(places: Samples) -> Samples:
+    """Differences of the widths that are known from even ones, over these, from the shift of each edge, rad."""
+    off: Samples = np.diff(np.append(places, places[0])) * places.size / (2.0 * np.pi)
+    return off[np.isfinite(off)]
+
+
 def _not_of_paint(places: Samples) -> Flag | None:
     """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side.
 
@@ -121,9 +128,7 @@ def _not_of_paint(places: Samples) -> Flag | None:
     Args:
         places: shift of each edge, rad, (stripes,); NaN where unknown.
     """
-    count = places.size
-    off = np.diff(np.append(places, places[0])) * count / (2.0 * np.pi)
-    off = off[np.isfinite(off)]
+    count, off = places.size, _off_even(places)
     if not off.size:
         return None
     scatter = WIDTHS.painted * np.sqrt(max(count - off.size, 0) / (off.size * (count - 1)))
@@ -150,9 +155,7 @@ def _another_size(places: Samples) -> tuple[float, Flag] | None:
     Args:
         places: shift of each edge, rad, (stripes,); NaN where unknown.
     """
-    count = places.size
-    off = np.diff(np.append(places, places[0])) * count / (2.0 * np.pi)
-    off = off[np.isfinite(off)]
+    count, off = places.size, _off_even(places)
     if not 1 < off.size < count:
         return None
     whole = np.eye(off.size)
