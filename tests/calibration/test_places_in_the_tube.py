@@ -180,6 +180,21 @@ def test_intervals_of_gap_and_pitch_hold_what_was_planted(tmp_path: Path) -> Non
     assert any("as many free numbers as the speed has means" in warning for warning in found.warnings)
 
 
+def test_a_posterior_that_piles_up_at_the_end_of_its_prior_says_so(one_gap: Path, tmp_path: Path) -> None:
+    """A robot a twentieth slower than at the least gap that a fit tries; at a gap inside, nothing is said."""
+    speed, tail, body = by_table(WIDE, 1e-4)
+    path = written(tmp_path / "slow.csv", {WIDE: (0.95 * speed, tail, 1.05 * body)}, error=0.005)
+    found = sp.calibrate(path, WIDE, model="tube", free="gap", sampling=SHORT)
+    said = [
+        sentence for sentence in found.warnings if "of the posterior lies in the outermost 5 % of its prior" in sentence
+    ]
+    assert len(said) == 1
+    assert "gap" in said[0]
+    assert "at the lower end of 0.0001 m" in said[0]
+    inside = sp.calibrate(one_gap / "o.csv", WIDE, model="tube", free="gap", sampling=SHORT)
+    assert not any("of the posterior lies" in sentence for sentence in inside.warnings)
+
+
 def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:
     truth = {WIDE: on_asperities(WIDE, 2e-5, 0.12, 5.0), NARROW: on_asperities(NARROW, 2e-5, 0.12, 9.0)}
     path = written(tmp_path / "o.csv", truth, trials=3)

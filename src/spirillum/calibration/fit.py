@@ -15,6 +15,7 @@ from spirillum.calibration.experiment import Experiment, Quantity, read_experime
 from spirillum.calibration.fit_warnings import (
     check_plausible,
     common_warnings,
+    edge_warnings,
     factor_misfit_warnings,
     friction_interval_warnings,
     friction_warnings,
@@ -165,10 +166,8 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     given, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
     sensitivity = friction_sensitivity(problem, fit.z, reading)
     predicted = _predicted(problem, fit.z, z, tau, rng)
-    # Where the moments give none, as where the fit misses less than the trials' errors, the middle of what may be.
-    discrepancy = {
-        name: _fitted(value or float(np.median(tau[name])), tau[name]) for name, value in fit.discrepancy.items()
-    }
+    # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
+    discrepancy = {name: _middle(tau[name]) for name in fit.discrepancy}
     warnings = [
         *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit),
@@ -218,6 +217,7 @@ def _by_posterior(
     wrong = [f"the posterior may not be used: {sentence}" for sentence in posterior.problems()]
     warnings = [
         *wrong,
+        *edge_warnings(problem, posterior.flat[:, : len(problem.coordinates)]),
         *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit),
         *narrow_channel_warnings(problem, values),

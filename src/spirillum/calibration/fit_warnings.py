@@ -13,6 +13,7 @@ from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
+from spirillum.calibration.parameters import LogUniform, Uniform
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 from spirillum.robust import mad_scale
@@ -23,6 +24,7 @@ __all__ = [
     "RATES_IN_RADIANS",
     "check_plausible",
     "common_warnings",
+    "edge_warnings",
     "factor_misfit_warnings",
     "friction_interval_warnings",
     "friction_warnings",
@@ -52,6 +54,8 @@ _IMPLAUSIBLE_DISTANCE = 5.0
 """Standard deviations from the median of a wide prior beyond which a fit is refused."""
 _WIDE = 0.5
 """Smallest logarithmic standard deviation of a prior that is called wide."""
+_EDGE, _PILED = 0.05, 0.4
+"""Outermost share of a bounded prior, and the share of a posterior in it from which on its end decides the interval."""
 _OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
 """Robust standard deviations, and relative deviation, beyond which a robot is named as an outlier."""
 
@@ -96,6 +100,34 @@ def prior_warnings(problem: Problem, z: Samples) -> list[str]:
         for item, place in zip(problem.coordinates, z, strict=True)
         if abs(place) > FAR
     ]
+
+
+def edge_warnings(problem: Problem, draws: Samples) -> list[str]:
+    """Posteriors that pile up at an end of their prior, which then decides their interval.
+
+    Args:
+        problem: the fit.
+        draws: coordinates of the posterior, (n, coordinates).
+    """
+    from scipy.special import ndtr
+
+    found = []
+    for item, place in zip(problem.coordinates, draws.T, strict=True):
+        if not isinstance(item.prior, Uniform | LogUniform):
+            continue
+        share = ndtr(place)  # of the prior below a draw
+        for end, value, near in (
+            ("lower", item.prior.low, float(np.mean(share < _EDGE))),
+            ("upper", item.prior.high, float(np.mean(share > 1.0 - _EDGE))),
+        ):
+            if near > _PILED:
+                found.append(
+                    f"{item.label}: {percent(near)} of the posterior lies in the outermost {percent(_EDGE)} of its "
+                    f"prior, at the {end} end of {value:.3g} {item.parameter.unit}".rstrip()
+                    + ": that end decides the interval, and the observations ask for a value beyond it, or the model "
+                    "lacks something"
+                )
+    return found
 
 
 def outlier_warnings(problem: Problem, z: Samples) -> list[str]:

@@ -312,7 +312,9 @@ def magnetic_sweep(
         str,
         typer.Option(autocompletion=complete_models, help="Hydrodynamic model: slender, as `predict` takes, or rft."),
     ] = "slender",
-    turns: Annotated[float, typer.Option(help="Turns of the field at each rate; the second half is averaged.")] = 60.0,
+    turns: Annotated[
+        float, typer.Option(help="Turns of the field in a stretch; the last of at most 25 is averaged.")
+    ] = 30.0,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it too: .png, .pdf or .svg.")] = None,
     accuracy: Accuracy = None,
     settings: Settings = None,

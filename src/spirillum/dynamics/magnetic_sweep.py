@@ -217,7 +217,7 @@ def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[str]:
     return [
         f"at {open_.size} of {rates.size} rates, {show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}, "
         f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns: those numbers depend on "
-        "how long the field is given"
+        f"how long the field is given, and on the start, at which the axis is pushed aside by {show(_TILT, 'deg')}"
     ]
 
 
