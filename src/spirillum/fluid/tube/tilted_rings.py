@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from threading import Lock
 from typing import NamedTuple
 
@@ -114,13 +115,14 @@ class TiltedRings(Rings):
     def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
         tiers = self._tiers(systems)
-        alike = [tier.averaged is tier.sample for tier in tiers]  # among those the wall's part is symmetric
+        # What plain tiers and others do to each other is symmetric; the waves of averaged ones are averaged both ways.
+        alike = [tier.averaged is tier.sample for tier in tiers]
         blocks = {
             (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size), order="F", dtype=self.precision)
             for a in range(len(tiers))
             for b in range(len(tiers))
             for s in range(len(systems))
-            if not (alike[a] and alike[b] and a > b)
+            if not alike[b] or (alike[a] and a <= b)
         }
         locks = {where: Lock() for where in blocks}
         nearest = min(tier.distance for tier in tiers)
@@ -130,8 +132,9 @@ class TiltedRings(Rings):
             reached = [(t, tier, count) for t, (tier, count) in enumerate(zip(tiers, orders, strict=True)) if count]
             sides = []
             for t, tier, count in reached:
-                targets = self._on_rings(waves, number, tier.sample, tier, count, nearest)
-                averages = targets if alike[t] else self._on_rings(waves, number, tier.averaged, tier, count, nearest)
+                own = partial(self._on_rings, waves, number, tier=tier, orders=count, away=nearest, as_=self.precision)
+                targets = own(tier.sample)
+                averages = targets if alike[t] else own(tier.averaged)
                 sides.append((targets, averages))
             for (a, tier_a, count_a), (targets, _) in zip(reached, sides, strict=True):
                 pressed = [times_layers(target, waves, number) for target in targets]
@@ -141,9 +144,7 @@ class TiltedRings(Rings):
                     far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
                     count = min(count_a, count_b, far)
                     for s in range(len(systems)) if count else ():
-                        left, right = (
-                            some[s][..., :count, :].astype(self.precision, copy=False) for some in (pressed, sources)
-                        )
+                        left, right = (some[s][..., :count, :] for some in (pressed, sources))
                         with locks[a, b, s]:
                             _add_product(left.reshape(len(left), -1), right.reshape(len(right), -1), blocks[a, b, s])
 
@@ -154,9 +155,6 @@ class TiltedRings(Rings):
             matrices[s][np.ix_(rows, columns)] -= block * duals[s][columns]
             if a != b and (b, a, s) not in blocks:
                 matrices[s][np.ix_(columns, rows)] -= block.T * duals[s][rows]
-
-    def _flat(self, values: Samples) -> Samples:
-        return values.astype(self.precision, copy=False).reshape(len(values), -1)
 
     def sent(
         self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
@@ -172,10 +170,9 @@ class TiltedRings(Rings):
             onto_wall = sent_to_wall(waves, number, points, forces)
             for tier in tiers:
                 count = waves.orders_between(number, 0.5 * (tier.distance + away))
-                for s, target in enumerate(
-                    self._on_rings(waves, number, tier.sample, tier, count, away) if count else ()
-                ):
-                    right = onto_wall[:, :, parities[s], :count].reshape(len(onto_wall), -1)
+                reached = self._on_rings(waves, number, tier.sample, tier, count, away, self.precision) if count else ()
+                for s, target in enumerate(reached):
+                    right = onto_wall[:, :, parities[s], :count].reshape(len(onto_wall), -1).astype(self.precision)
                     block = target.reshape(len(target), -1) @ right.T
                     with lock:
                         found[s][tier.unknowns[s]] += block
@@ -204,7 +201,14 @@ class TiltedRings(Rings):
         return each(on, range(waves.k.size))
 
     def _on_rings(
-        self, waves: Waves, number: int, sample: _Sample, tier: _Tier, orders: int, away: float
+        self,
+        waves: Waves,
+        number: int,
+        sample: _Sample,
+        tier: _Tier,
+        orders: int,
+        away: float,
+        as_: type[np.floating] = np.float64,
     ) -> list[Samples]:
         """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
 
@@ -213,19 +217,19 @@ class TiltedRings(Rings):
         """
         symmetric = self.seat.yaw == 0
         theta = midpoints(orders, tier.modes, whole=not symmetric)
-        onto = [projectors(theta, tier.modes, parity) for parity in (0, 1)]
+        onto = [[part.astype(as_) for part in projectors(theta, tier.modes, parity)] for parity in (0, 1)]
         sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
         panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
-        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3)) for waved in sources]
+        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3), as_) for waved in sources]
         some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
         for first in range(0, panels, some):
             chunk = slice(first, first + some)
             nodes = slice(first * order, (first + some) * order)
-            average = None if sample.average is None else sample.average[chunk]
+            average = None if sample.average is None else sample.average[chunk].astype(as_)
             rings = self._around(sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta)
             distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=1)
             for low, high, arc in waves.bands(number, distances, away, orders):
-                field = self._waves(waves, number, theta[arc], rings[arc], low, high)
+                field = self._waves(waves, number, theta[arc], rings[arc], low, high, as_)
                 for family, waved in enumerate(sources):
                     for column, parity in enumerate(waved):
                         for component, projector in enumerate(onto[family]):
@@ -248,7 +252,9 @@ class TiltedRings(Rings):
         points = np.stack([np.broadcast_to(x, shape), up, right], axis=-1)
         return self.seat.placed(points.reshape(-1, 3)).reshape(*shape, 3)
 
-    def _waves(self, waves: Waves, number: int, theta: Samples, placed: Samples, low: int, high: int) -> Samples:
+    def _waves(
+        self, waves: Waves, number: int, theta: Samples, placed: Samples, low: int, high: int, as_: type[np.floating]
+    ) -> Samples:
         """Waves of one k and some orders on arcs of rings.
 
         Args:
@@ -258,6 +264,7 @@ class TiltedRings(Rings):
             placed: points there, about the tube's axis, (angles, rings, 3), m.
             low: first order.
             high: order after the last.
+            as_: what they are kept as.
 
         Returns:
             component; even, odd; angle; ring; real, imaginary; order; wall component.
@@ -267,7 +274,7 @@ class TiltedRings(Rings):
         shape, k = placed.shape[:2], float(waves.k[number])
         x, y, z = np.moveaxis(placed, -1, 0)
         values = extensions(k, waves.radius, np.hypot(y, z).ravel(), high, low)
-        out = np.empty((3, 2, *shape, 2, high - low, 3))
+        out = np.empty((3, 2, *shape, 2, high - low, 3), as_)
         tilted_waves(
             values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, out, low
         )

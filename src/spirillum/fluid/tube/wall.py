@@ -193,7 +193,8 @@ def times_layers(waves_at: Samples, waves: Waves, number: int, first: int = 0) -
     """Waves (..., orders, 3) times the wall's single layer; some of the orders, from the first one, will do."""
     flat = np.moveaxis(waves_at, -2, 0)
     orders = len(flat)
-    product = np.matmul(flat.reshape(orders, -1, 3), weighted_layers(waves, number)[first : first + orders])
+    layers = weighted_layers(waves, number)[first : first + orders].astype(waves_at.dtype)
+    product = np.matmul(flat.reshape(orders, -1, 3), layers)
     pressed: Samples = np.moveaxis(product.reshape(flat.shape), 0, -2)
     return pressed
 
