@@ -17,7 +17,7 @@ from spirillum.fluid.tube.tabled import tabled
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
-from spirillum.robot.placement import Placement
+from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.swimming.balance import joined
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import swim_on_floor, weights_in_fluid, with_dry_friction
@@ -67,7 +67,7 @@ def solved(name: str, gap: float, pitch: float = 0.0) -> Speeds:
 
 def on_asperities(name: str, roughness: float, coefficient: float, tail_rate: float) -> Speeds:
     robot = load(name)
-    batch = RobotBatch.of(robot, placed(roughness))
+    batch = RobotBatch.of(robot, placed(float(gap_on_asperities(roughness))))
     model = tabled(batch)
     assert model is not None
     swum = swim_on_floor(batch, model, [robot], coefficient, tail_rate=np.array([tail_rate]), friction="none")
@@ -207,7 +207,7 @@ def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:
     write_calibration(found, tmp_path / "fitted", figures=False)
     file = tmp_path / "fitted" / "calibration.toml"
     answer = sp.predict(WIDE, model="tube", calibration=file, tail_rate=5.0)
-    assert answer.batch.placement.gap == pytest.approx(found.values["roughness"].value)
+    assert answer.batch.placement.gap == pytest.approx(found.values["roughness"].value / (1.0 + np.sqrt(0.5)))
     assert answer.forward_velocity == pytest.approx(found.predicted["advance"][0][0] * 5.0, rel=1e-6)
     assert answer.body_rotation_rate == pytest.approx(found.predicted["turning"][0][0] * 5.0, rel=1e-6)
 
@@ -356,3 +356,20 @@ def test_a_pitched_place_solved_without_any_table_lies_in_the_intervals(tmp_path
     for channel in ("[40 mm]", "[30 mm]"):
         assert found.values[f"gap{channel}"].low < 4e-4 < found.values[f"gap{channel}"].high
         assert found.values[f"pitch{channel}"].low < 0.03 < found.values[f"pitch{channel}"].high
+
+
+@pytest.mark.parametrize("name", [WIDE, NARROW])
+def test_a_fitted_roughness_is_that_on_which_a_run_comes_to_rest(name: str) -> None:
+    """At rest between its heavier and its lighter end, at mid-length; dry friction keeps it where its film has gone."""
+    roughness = 2e-5
+    run = sp.simulate(
+        name,
+        model="tube",
+        placement=placed(roughness),
+        roughness=roughness,
+        in_tube={"wait": "300 s", "friction_coefficient": 0.3},
+        timing={"duration": "0.1 s"},
+    ).isel(time=0)
+    length = load(name).body.length - load(name).body.diameter
+    middle = float(run["wall_gap"]) + 0.5 * length * abs(np.sin(float(run["wall_pitch"])))
+    assert middle == pytest.approx(float(gap_on_asperities(roughness)), rel=0.03)

@@ -76,6 +76,17 @@ def test_a_thin_film_is_drawn_as_thick_as_a_fiftieth_of_the_body(run: xr.Dataset
     assert asked[0].yaw == 0.06
 
 
+def test_the_force_of_a_film_that_is_drawn_thicker_is_not_given(run: xr.Dataset, monkeypatch: Any) -> None:
+    """It is nearly all in the film. Nothing is solved here."""
+    thin = run.isel(time=[0]).assign(wall_gap=("time", [1e-6]), wall_yaw=("time", [0.06]), offset=("time", [0.011]))
+    monkeypatch.setattr("spirillum.dynamics.flow_of_run.tube_flow_field", lambda *_: None)
+    flow = sp.flow_of_run(thin, 0.0)
+    answer = flow.to_dict()
+    assert answer["held_force"]["value"] is None
+    assert answer["lifted"]["value"] == pytest.approx(0.02 * sp.load("biorob2012-wide").body.diameter - 1e-6)
+    assert any("nor the force across the tube is that of the run" in line for line in flow.warnings)
+
+
 def test_the_sample_that_is_taken_is_told(run: xr.Dataset, monkeypatch: Any) -> None:
     """Nothing is solved: what carries the warning is what is asked here."""
     monkeypatch.setattr("spirillum.dynamics.flow_of_run.tube_flow_field", lambda *_: None)

@@ -18,7 +18,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.announced import TABLE_TAKES
 from spirillum.fluid.tube.tabled import TabledTube, tables_of
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.placement import Placement
+from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
@@ -27,8 +27,8 @@ from spirillum.swimming.preparation import prepare_all
 __all__ = ["ROUGHNESS_BAND", "Ranges", "place_ranges", "tube_forward"]
 
 ROUGHNESS_BAND = (1e-4, 1e-2)
-"""Least and largest height of asperities over the body's radius: from polished surfaces (1 um for the paper's robot),
-the thinnest film of a table, to burrs and seams of moulded parts (0.1 mm)."""
+"""Least and largest height of asperities over the body's radius: from polished surfaces (1 um for the paper's robot) to
+burrs and seams of moulded parts (0.1 mm)."""
 _NAMED = 6
 
 Ranges = dict[str, tuple[float, float]]
@@ -49,7 +49,7 @@ def place_ranges(batch: RobotBatch, model: SwimmerModel, names: Sequence[str]) -
     for _, one in batch.blocks(1):
         radius = 0.5 * float(one.body_diameter[0])
         rough = (ROUGHNESS_BAND[0] * radius, ROUGHNESS_BAND[1] * radius)
-        known = {"gap": rough[0]} if "roughness" in names else {}
+        known = {"gap": gap_on_asperities(rough[0])} if "roughness" in names else {}
         places = band_places(one.placed(Placement().model_copy(update=known)), model)
         gaps = [place.gap or 0.0 for place in places]
         # The steepest pitch depends on the gap; what holds at every gap is the least of them.

@@ -241,7 +241,7 @@ _LISTED = (
     ),
     Parameter(
         "roughness",
-        "height of the asperities on which the robot lies: its gap, one for all channels",
+        "height of the asperities on which the robot lies, which decides its gap, one for all channels",
         "m",
         "all",
         ("tube",),
@@ -316,13 +316,13 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
         raise InputError("free = 'friction' together with 'shared_friction'; allowed: one of them")
     if "gap" in names and "roughness" in names:
         raise InputError(
-            "free = 'gap' together with 'roughness': a robot that lies on its asperities has their height for its gap; "
-            "allowed: one of them"
+            "free = 'gap' together with 'roughness': the height of its asperities decides the gap of a robot that lies "
+            "on them; allowed: one of them"
         )
     if "friction_coefficient" in names and "roughness" not in names:
         raise InputError(
             "free = 'friction_coefficient' without 'roughness': dry friction acts where the robot lies on its "
-            "asperities, whose height is then its gap; allowed: roughness too"
+            "asperities, whose height then decides its gap; allowed: roughness too"
         )
     bound = [name for name in names if PARAMETERS[name].needs_motor] if "friction" in names else []
     if bound:

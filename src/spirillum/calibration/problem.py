@@ -27,6 +27,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
+from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 
@@ -92,7 +93,7 @@ class Problem:
         values = self._all_values(z)
         found = {name: values[:, places] for name, places in self._places.items()}
         if "roughness" in found:  # a robot that lies on its asperities
-            found["gap"] = found["roughness"]
+            found["gap"] = gap_on_asperities(found["roughness"])
         return found
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
@@ -66,6 +67,8 @@ class Moment(NamedTuple):
     """Twist of the rotor, m/s and rad/s, (6,)."""
     mean_flow: float
     """Mean flow through the tube, m/s."""
+    lifted: float
+    """How much further off the wall than in the run it is drawn, m."""
 
 
 def flow_of_run(
@@ -80,8 +83,9 @@ def flow_of_run(
 
     Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
     wall. No force and torque but weight, contact and a field act on the robot. A film thinner than a fiftieth of the
-    body's diameter is drawn as thick as that, with the same velocities, and a warning says so: to resolve it would take
-    many minutes. A yawed robot takes one to three minutes, as it has no mirror image.
+    body's diameter is drawn as thick as that, with the same velocities: to resolve it would take many minutes. The
+    sideways force is then not given, and a warning says so. A yawed robot takes one to three minutes, as it has no
+    mirror image.
 
     Args:
         run: its file, or its dataset.
@@ -99,7 +103,8 @@ def flow_of_run(
     if progress is not None:
         progress(OF_A_RUN, 0, 1)
     field = tube_flow_field(at.prediction.batch, at.body, at.rotor, at.phase, at.mean_flow)
-    return Flow(at.prediction, field, at.phase, cast("Frame", frame)).with_held_force()
+    flow = Flow(at.prediction, field, at.phase, cast("Frame", frame), lifted=at.lifted)
+    return replace(flow, held_force=float("nan")) if at.lifted > 0.0 else flow.with_held_force()
 
 
 def moment_of_run(
@@ -132,9 +137,7 @@ def moment_of_run(
     now = _sample(dataset, int(np.argmin(np.abs(times - moment))))
     nearest = float(now["time"])
     if abs(nearest - moment) > _SAME_TIME * float(np.min(np.diff(times), initial=np.inf)):
-        said = (
-            f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
-        )
+        said = f"the run has no sample at {moment:.7g} s: the flow is that at the nearest one, {nearest:.7g} s"
         now = now.assign_attrs(warnings="\n".join([said, now.attrs["warnings"]]))
     return _motion(now, resolution)
 
@@ -187,8 +190,8 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     if gap < drawn:
         warnings.append(
             f"the film of {show(gap, 'um')} under the body is thinner than is resolved: the robot is drawn "
-            f"{show(drawn - gap, 'um')} further off the wall, with the same velocities, and the pressure in the "
-            "film is not that of the run"
+            f"{show(drawn - gap, 'um')} further off the wall, with the same velocities, and neither the pressure in "
+            "the film nor the force across the tube is that of the run"
         )
     nothing = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
@@ -212,7 +215,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         motion="free",
         fitted_by=now.attrs["fitted_by"],
     )
-    return Moment(found, phase, body, rotor, mean_flow)
+    return Moment(found, phase, body, rotor, mean_flow, max(drawn - gap, 0.0))
 
 
 @contextmanager

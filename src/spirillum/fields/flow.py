@@ -76,8 +76,10 @@ class Flow(Shown):
     """Sideways force on the robot from outside, N.
 
     Of a robot whose lateral motion is held: what holds it at this phase; far away in unbounded fluid the flow is its.
-    At a moment of a free run: weight, contact and a field.
+    At a moment of a free run: weight, contact and a field; NaN where it is drawn `lifted`.
     """
+    lifted: float = 0.0
+    """How much further off the wall than at that moment of its run a robot on a thin film is drawn, m."""
 
     @property
     def robot(self) -> Robot:
@@ -115,6 +117,7 @@ class Flow(Shown):
             **{name: quantity(getattr(motion, name), unit_of(name)) for name in _MOTION},
             **({} if self.seat is None else {"plug_velocity": quantity(motion.plug_velocity, "m/s")}),
             "held_force": quantity(self.held_force, "N", direction="sideways"),
+            **({} if self.lifted == 0.0 else {"lifted": quantity(self.lifted, "m")}),
             "placement": motion.placement,
             "references": list(motion.references),
         }
@@ -390,6 +393,7 @@ def _attributes(flow: Flow) -> dict[str, Any]:
         "tail_rotation_rate": motion.tail_rotation_rate,
         **({} if flow.seat is None else {"plug_velocity": motion.plug_velocity}),
         "held_force": flow.held_force,
+        **({} if flow.lifted == 0.0 else {"lifted": flow.lifted}),
         "placement": json.dumps(motion.placement),
         "settings": json.dumps(motion.robot.model_dump(), sort_keys=True),
         "references": " ".join(motion.references),

@@ -26,7 +26,7 @@ from spirillum.fitted.calibration_file import (
 )
 from spirillum.fitted.posterior_content import Content
 from spirillum.robot.options import Calibration, FittedTo
-from spirillum.robot.placement import Placement
+from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class PosteriorFile:
         """A placement with the fitted gap and pitch where it leaves them open; level if only the gap was fitted.
 
         Args:
-            robot: the robot; a gap or pitch is that of its own channel, a roughness the gap in every channel.
+            robot: the robot; a gap or pitch is that of its own channel, a roughness decides the gap in every channel.
             placement: what is asked for.
             draw: number of a draw; None: the middle.
         """
@@ -143,8 +143,8 @@ class PosteriorFile:
         diameter = robot.channel.diameter if robot.channel else np.inf
         own = [place for place, fitted in enumerate(self.channels) if np.isclose(diameter, fitted, rtol=1e-6, atol=0.0)]
         found = {name: values[name][..., own[0]] for name in _PLACE if name in values and own}
-        if "roughness" in values and robot.channel is not None:  # on its asperities the robot has their height for gap
-            found["gap"] = values["roughness"][..., 0]
+        if "roughness" in values and robot.channel is not None:  # a robot that lies on its asperities
+            found["gap"] = gap_on_asperities(values["roughness"][..., 0])
         return found
 
     def central(self, robot: Robot) -> Robot:

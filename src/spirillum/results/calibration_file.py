@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import Estimate
+from spirillum.robot.placement import gap_on_asperities
 from spirillum.version import versions
 
 __all__ = ["calibration_text"]
@@ -132,10 +133,12 @@ def _placement_tables(found: Calibrated) -> list[str]:
     lines = []
     for place, diameter in enumerate(found.experiment.channels):
         own = {
-            "gap" if item.parameter.name == "roughness" else item.parameter.name: found.values[item.label].value
+            item.parameter.name: found.values[item.label].value
             for item in found.problem.coordinates
             if item.parameter.name in _PLACE and item.channel in (None, place)
         }
+        if "roughness" in own:
+            own["gap"] = float(gap_on_asperities(own["roughness"]))
         if own:
             lines += ["", "[[placement]]", f"channel_diameter = {_length(diameter)}", "", "[placement.placement]"]
             if "gap" in own:

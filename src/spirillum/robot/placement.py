@@ -8,14 +8,31 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.arrays import Samples
 from spirillum.robot.arguments import Options
 from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw
 from spirillum.units import show
 
-__all__ = ["Ends", "Placement"]
+__all__ = ["Ends", "Placement", "gap_on_asperities"]
 
 Ends = Literal["open", "closed"]
 """Ends of the channel: both open into a bath, or closed (no net flux)."""
+
+
+def gap_on_asperities(roughness: Samples | float) -> Samples:
+    """Gap of a level robot whose two ends rest on asperities that carry half of its weight W each.
+
+    They carry N(h) = W (s/h - 1)^2 at a gap h of the mean surfaces (see `spirillum.kernels.contacts`), so that W/2
+    makes h = s/(1 + sqrt(1/2)).
+
+    Args:
+        roughness: height s of the asperities, m.
+
+    Returns:
+        The gap h, m.
+    """
+    found: Samples = np.asarray(roughness, dtype=float) / (1.0 + np.sqrt(0.5))
+    return found
 
 
 class Placement(Options):
