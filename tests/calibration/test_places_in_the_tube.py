@@ -210,6 +210,11 @@ def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:
     assert answer.batch.placement.gap == pytest.approx(found.values["roughness"].value / (1.0 + np.sqrt(0.5)))
     assert answer.forward_velocity == pytest.approx(found.predicted["advance"][0][0] * 5.0, rel=1e-6)
     assert answer.body_rotation_rate == pytest.approx(found.predicted["turning"][0][0] * 5.0, rel=1e-6)
+    run = sp.simulate(WIDE, calibration=file, timing={"duration": "0.05 s"})
+    assert run.attrs["motion"] == "free"
+    assert "dry friction is fitted, and acts on a free robot: the run is free" in run.attrs["warnings"]
+    with pytest.raises(InputError, match="motion = 'held' knows no dry friction"):
+        sp.simulate(WIDE, calibration=file, motion="held", timing={"duration": "0.05 s"})
 
 
 def test_predictions_with_a_posterior_lie_where_it_does(one_gap: Path) -> None:

@@ -164,3 +164,17 @@ def test_fitted_numbers_have_their_units(made: Callable[..., Path]) -> None:
     for name, item in said.items():
         assert (item["value"], item["level"]) == (fit.values[name].value, 0.95)
         assert item["low"] < item["value"] < item["high"]
+
+
+def test_a_model_that_explains_nothing_is_named_and_the_others_are_ranked(tmp_path: Path) -> None:
+    """Robots as slow as with dry friction: no gap is thin enough, and factors of sbt explain anything."""
+    rows = [f"{channel},25,2.5,{n},{speed},{rate},{body}" for n in (1, 2) for channel, speed, rate, body in
+            ((40, 0.07 + 1e-3 * n, 1.1, -0.0035), (30, 0.024 + 1e-3 * n, 0.8, -0.0017))]  # fmt: skip
+    path = tmp_path / "slow.csv"
+    head = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
+    path.write_text("\n".join(["# synthetic", head, *rows]))
+    found = sp.rank_models(path, models=["tube", "sbt"], sampling=SHORT)
+    assert [item.model for item in found.ranked] == ["sbt"]
+    assert any(line.startswith("tube is not ranked, it does not explain the observations") for line in found.warnings)
+    with pytest.raises(InputError, match="no value of it explains"):
+        sp.calibrate(path, ["biorob2012-wide", "biorob2012-narrow"], model="tube", free="gap,pitch")

@@ -26,6 +26,10 @@ WIDE = "biorob2012-wide"
         (["predict", WIDE, "--phases", "2.5"], "--phases = '2.5' is not allowed; allowed: a whole number"),
         (["prepare", WIDE, "--workers", "0"], "--workers = '0' is not allowed; allowed: greater than or equal to 1"),
         (["render", WIDE, "-o", "film.mp4", "--trouble", ""], "trouble ''; allowed: lost-frames"),
+        (
+            ["simulate", WIDE, "--model", "tube", "-o", "x.nc", "--roughness", "1nm", "--wait", "100s"],
+            "roughness = 0.001 um; allowed: at least 0.18 um, because thinner films are not resolved",
+        ),
         (["predict", WIDE, "--model", "cfd"], "model = 'cfd'; allowed: auto, sbt, rft"),
         (["predict", WIDE, "--model", "perrin"], "model = 'perrin'"),
         (

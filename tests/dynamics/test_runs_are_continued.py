@@ -119,6 +119,8 @@ def test_the_run_that_is_read_is_not_written_over(early: Path, run: Any) -> None
         lambda found: found | {"step": 0.0},
         lambda found: found | {"state": [float("nan"), *found["state"][1:]]},
         lambda found: found | {"state": [*found["state"][:3], 5.0, *found["state"][4:]]},
+        lambda found: found | {"state": [50.0, *found["state"][1:]]},
+        lambda found: found | {"state": [*found["state"][:10], 1e200, *found["state"][11:]]},
         lambda found: found | {"state": [10**400, *found["state"][1:]]},
         lambda found: found | {"more": 1},
     ],
@@ -147,6 +149,15 @@ def test_a_damaged_run_is_not_continued(
         change(dataset.load()).to_netcdf(tmp_path / "damaged.nc")
     with pytest.raises(InputError, match=words):
         simulated("0.6 s", in_tube={"continued": tmp_path / "damaged.nc"})
+
+
+def test_a_duration_too_short_for_two_more_samples_is_named(early: Path) -> None:
+    with xr.open_dataset(early) as dataset:
+        end = float(dataset["time"][-1])
+    with pytest.raises(
+        InputError, match=f"already ends at t = {end:.6g} s, and less than 2 samples lie between it and"
+    ):
+        simulated(f"{end + 1e-7} s", in_tube={"continued": early})
 
 
 def test_rows_of_a_flow_beyond_the_run_change_nothing(tmp_path: Path) -> None:

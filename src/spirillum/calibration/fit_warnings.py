@@ -14,8 +14,7 @@ from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.parameters import LogUniform, Uniform
-from spirillum.calibration.problem import Problem
-from spirillum.errors import InputError
+from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.robust import mad_scale
 from spirillum.shown import percent
 
@@ -68,8 +67,8 @@ def check_plausible(problem: Problem, z: Samples) -> None:
         z: coordinates of the best fit.
 
     Raises:
-        InputError: if the median misfit exceeds a factor of ten, or a parameter with a wide prior lies more than five
-            standard deviations from its middle.
+        UnexplainedError: if the median misfit exceeds a factor of ten, or a parameter with a wide prior lies more than
+            five standard deviations from its middle.
     """
     source, model = problem.experiment.source, problem.model.name
     for name, values in problem.predicted_at(z).items():
@@ -78,14 +77,14 @@ def check_plausible(problem: Problem, z: Samples) -> None:
             off = np.abs(np.log(np.abs(ratio.mean / values)))[ratio.seen]
         if float(np.median(off)) > np.log(_IMPLAUSIBLE_FACTOR):
             factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values))[ratio.seen])))
-            raise InputError(
+            raise UnexplainedError(
                 f"{source}: the observed {CALLED[name]} is typically {factor:.3g} times what model '{model}' can "
                 "explain; allowed: within a factor of ten (are the columns in mm, mm/s and Hz?)"
             )
     for item, place in zip(problem.coordinates, z, strict=True):
         if abs(place) > _IMPLAUSIBLE_DISTANCE and getattr(item.prior, "spread", 0.0) >= _WIDE:
             value = problem.values_at(z)[item.label]
-            raise InputError(
+            raise UnexplainedError(
                 f"{source}: {item.label} comes out as {value:.3g}; allowed: observations that a number nearer to its "
                 f"prior explains ({item.prior.words(item.parameter.unit)}; are the columns in mm, mm/s and Hz?)"
             )

@@ -16,7 +16,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE
-from spirillum.calibration.problem import Problem
+from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.errors import InputError
 from spirillum.units import display_unit, in_unit
 
@@ -194,7 +194,7 @@ def _check_blind(problem: Problem, z: Samples) -> None:
     value = problem.values_at(z)[item.label]
     unit = display_unit(value, item.parameter.unit)
     end = f"{in_unit(value, item.parameter.unit, unit)} {unit}".rstrip()
-    raise InputError(
+    raise UnexplainedError(
         f"free = '{item.label}': the fit drives it to the end of its range, {end}, and no value of it explains "
         f"{source}; allowed: another model, or other free parameters"
     )

@@ -31,9 +31,14 @@ from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 
-__all__ = ["Problem", "Progress", "posed", "stated_spread"]
+__all__ = ["Problem", "Progress", "UnexplainedError", "posed", "stated_spread"]
 
 Progress = Callable[[str, int, int], None]
+
+
+class UnexplainedError(InputError):
+    """Observations that no plausible values of a model's free numbers explain."""
+
 
 _FACTOR_SPREADS = {"body_drag": (2.0, 1.0), "body_rotation": (1.0, 1.0)}
 _COEFFICIENT_SPREAD = 0.5

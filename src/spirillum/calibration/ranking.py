@@ -25,7 +25,7 @@ from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, synthetic_warni
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate, free_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
-from spirillum.calibration.problem import Progress
+from spirillum.calibration.problem import Progress, UnexplainedError
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
@@ -203,27 +203,35 @@ def rank_models(
         progress: told what is being done.
 
     Raises:
-        InputError: for wrong input, or a single model.
+        InputError: for wrong input, a single model, or observations that none of the models explains.
     """
     wanted = free_by_model(models, free)
     if prepare and "tube" not in wanted:
         raise InputError(
             f"prepare with models {', '.join(wanted)}, which take no tables; allowed: with 'tube' among them"
         )
-    fits = {}
+    fits: dict[str, Calibrated] = {}
+    failed: list[UnexplainedError] = []
+    said = [] if robots is not None else [PAPER_ROBOTS_TAKEN]
     for name, names in wanted.items():
-        fits[name] = fit_model(
-            observations,
-            PAPER_ROBOTS if robots is None else robots,
-            model=name,
-            free=names,
-            method="posterior",
-            sampling=sampling,
-            prepare=prepare and name == "tube",
-            progress=progress,
-        )
+        try:
+            fits[name] = fit_model(
+                observations,
+                PAPER_ROBOTS if robots is None else robots,
+                model=name,
+                free=names,
+                method="posterior",
+                sampling=sampling,
+                prepare=prepare and name == "tube",
+                progress=progress,
+            )
+        except UnexplainedError as error:
+            failed.append(error)
+            said.append(f"{name} is not ranked, it does not explain the observations: {str(error).partition(';')[0]}")
+    if not fits:
+        raise failed[0]
     found = ranked_fits(fits)
-    return found if robots is not None else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
+    return replace(found, warnings=(*said, *found.warnings))
 
 
 def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None) -> dict[str, tuple[str, ...]]:
@@ -278,10 +286,10 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
         warnings.simplefilter("ignore")  # what they warn of is said below, in our words
         for name, fit in fits.items():
             found[name] = loo(posterior_tree(fit), pointwise=True, var_name="robot")
-        table = compare(found)
-    best = np.asarray(found[str(table.index[0])].elpd_i).reshape(-1)
+        order = [str(name) for name in compare(found).index] if len(found) > 1 else list(found)
+    best = np.asarray(found[order[0]].elpd_i).reshape(-1)
     ranked = []
-    for name in (str(index) for index in table.index):
+    for name in order:
         each = np.asarray(found[name].elpd_i).reshape(-1)
         gap = each - best
         ranked.append(

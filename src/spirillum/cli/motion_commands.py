@@ -44,7 +44,8 @@ _FullModel = Annotated[
 _RunMotion = Annotated[
     str | None,
     typer.Option(
-        help="free (lateral motion and tilt released) or held; else free, if the model of the calibration can be."
+        help="free (lateral motion and tilt released) or held; else free, but held with a calibration of sbt, or of a "
+        "place in the tube without dry friction."
     ),
 ]
 

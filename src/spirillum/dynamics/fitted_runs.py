@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
@@ -49,7 +50,8 @@ def chosen_run(
 
     Args:
         model: name of the model, or `auto`; a free robot then moves in its tube where it has a table.
-        motion: `free` or `held`; None: `held` with a fitted model of the axial entries or of one place, else `free`.
+        motion: `free` or `held`; None: `held` with a fitted model of the axial entries, or of one place without dry
+            friction, else `free`.
         robot: the robot.
         placement: where it starts.
         calibration: calibration file; None without one.
@@ -81,6 +83,10 @@ def chosen_run(
         return choice, motion or "free", said
     said.append(f"the run takes model '{choice.model}': {choice.reason}")
     chosen = find_swimmer_model(choice.model)
+    contact = calibrated_contact(calibration) if posterior is None else posterior.contact()
+    if motion is None and chosen.placed and contact.friction_coefficient:
+        said.append("dry friction is fitted, and acts on a free robot: the run is free")
+        return choice, "free", said
     if motion is None and (chosen.axial_only or chosen.placed):
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
         said.append(f"model '{choice.model}' {why}: the run is held, with two degrees of freedom")

@@ -148,7 +148,7 @@ def free_motion(
     laid = Laid(table, placed, asked, height, contact, tail_rate, friction, weight)
     held, links, start = let_go(ready, laid)
     state = laid_down(ready, links, start)
-    check_roughness(links.roughness, float(links.gaps(state).min()))
+    check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
     check_in_table(links, state, observed_at(links, state)[kernel.OUTSIDE])
     gap = float(observed_at(links, state)[rigid_links.FILM])
     _check_until(until, gap)

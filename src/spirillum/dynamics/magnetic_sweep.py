@@ -169,7 +169,12 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
     time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
     before = None
     for _ in range(_MOST_STRETCHES):
-        run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
+        try:
+            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
+        except InputError as error:
+            raise InputError(
+                f"rates: at {show(rate, 'Hz')} {str(error).partition(';')[0]}; allowed: rates nearer to step-out"
+            ) from error
         mean = _averaged(here, rate, run.time, run.states)
         if before is not None and mean.agrees(before):
             return mean, True

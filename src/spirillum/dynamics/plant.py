@@ -178,7 +178,7 @@ class Plant:
         else:
             links, start = self._in(self._table, placed)
             first = laid_down(own, links, start)
-            check_roughness(links.roughness, float(links.gaps(first).min()))
+            check_roughness(links.roughness, float(links.gaps(first).min()), self.robot.body.diameter)
             check_in_table(links, first, observed_at(links, first)[tube.OUTSIDE])
             self._links = links
         on = own.drive.duty

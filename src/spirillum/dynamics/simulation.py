@@ -81,7 +81,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
             calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without. A free
             robot without a table for its tube then takes `slender`, too, and a warning says so.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
-            `free`, but `held` where the model is that of a posterior or calibration and cannot be free.
+            `free`, but `held` where the model is that of a posterior or calibration and knows the axial entries only,
+            or was fitted to one place in the tube without dry friction.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.

@@ -13,6 +13,7 @@ from spirillum.dynamics.averages import stretches_on
 from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.start import reach_of
 from spirillum.dynamics.timing import Timetable
 from spirillum.dynamics.tube_integration import (
@@ -42,6 +43,10 @@ _FEWEST = 2
 """Moments of the shortest run."""
 _UNIT = 1e-6
 """Error of a quaternion's length that is rounding."""
+_MOST = 1e9
+"""Largest number of a checkpoint that is taken, SI."""
+_ASIDE = 1e-3
+"""What a checkpoint's place may be aside of the samples around it, beyond the way of the run, m."""
 
 
 def tube_run(
@@ -83,15 +88,16 @@ def tube_run(
     first: Samples | Checkpoint
     if isinstance(start, StartPlace):
         laid = laid_down(steady.robot, robot, start)
-        check_roughness(robot.roughness, float(robot.gaps(laid).min()))
+        check_roughness(robot.roughness, float(robot.gaps(laid).min()), steady.robot.body.diameter)
         check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)
     else:
         first = _checkpoint(start)
         moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])
-        if moments.size < 2:
+        if moments.size <= _FEWEST:
             raise InputError(
-                f"the run already ends at t = {moments[0]:.6g} s; allowed: a longer duration, to continue it"
+                f"the run already ends at t = {moments[0]:.6g} s, and less than {_FEWEST} samples lie between it and "
+                f"{moments[-1]:.8g} s; allowed: a longer duration, to continue it"
             )
     run = integrate_in_tube(robot, first, moments, times.switches, reach, progress)
     if run.time.size < _FEWEST:
@@ -153,9 +159,18 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
         raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {kernel.STATES}")
     quaternion = state[rigid_links.ATTITUDE : rigid_links.PHASE]
     sound = np.isfinite([time, step, *state]).all() and abs(float(np.linalg.norm(quaternion)) - 1.0) < _UNIT
-    if not sound or not 0.0 <= time <= float(dataset["time"][-1]) or step <= 0.0:
+    within = 0.0 <= time <= float(dataset["time"][-1]) and step > 0.0 and np.abs(state).max() <= _MOST
+    if not sound or not within or not _near(dataset, time, state):
         raise InputError(f"the run's checkpoint is not where the run ends; {allowed}")
     return Checkpoint(time, step, tuple(state.tolist()))
+
+
+def _near(dataset: xr.Dataset, time: float, state: Samples) -> bool:
+    """Whether a checkpoint's place is near that of the samples around it: between them it was not noted."""
+    positions, times = numbers_of(dataset, "position", ("axis",), (3,)), numbers_of(dataset, "time")
+    there = np.array([np.interp(time, times, along) for along in positions.T])
+    way = np.ptp(positions, axis=0) + _ASIDE
+    return bool(np.all(np.abs(state[rigid_links.POSITION : rigid_links.POSITION + 3] - there) <= way))
 
 
 def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Mapping[str, Any]:

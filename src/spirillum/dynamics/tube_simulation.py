@@ -174,7 +174,8 @@ def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: flo
         _check_continued(placed, asked)
         return
     if roughness is not None and robot.channel is not None:
-        check_roughness(roughness, gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter))
+        gap = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
+        check_roughness(roughness, gap, robot.body.diameter)
 
 
 def _check_continued(placed: Placement, asked: InTube) -> None:

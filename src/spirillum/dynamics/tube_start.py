@@ -9,6 +9,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
+from spirillum.fluid.tube.tabled import THINNEST_GAP
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.links import outlines_of
@@ -64,16 +65,22 @@ def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
     return state
 
 
-def check_roughness(roughness: float, gap: float) -> None:
-    """Refuse a start at which asperities are pressed by more than the robot's weight.
+def check_roughness(roughness: float, gap: float, diameter: float) -> None:
+    """Refuse asperities that films thinner than a table holds would cover, or that are pressed by more than the weight.
 
     Args:
         roughness: height of the asperities, m.
-        gap: smallest gap of the robot, m.
+        gap: smallest gap of the robot at its start, m.
+        diameter: of its body, m.
 
     Raises:
-        InputError: if they are.
+        InputError: for such asperities.
     """
+    if roughness < THINNEST_GAP * diameter:
+        raise InputError(
+            f"roughness = {show(roughness, 'um')}; allowed: at least {show(THINNEST_GAP * diameter, 'um')}, because "
+            "thinner films are not resolved"
+        )
     if gap < 0.5 * roughness:
         raise InputError(
             f"roughness = {show(roughness, 'um')} with a gap of {show(gap, 'um')} at the start: asperities would "

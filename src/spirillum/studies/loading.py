@@ -235,7 +235,7 @@ def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
         if robot.channel is not None:
             gap = gap_of(study.placement, robot.body.diameter, 0.5 * robot.channel.diameter)
             try:
-                check_roughness(study.contact.roughness, gap)
+                check_roughness(study.contact.roughness, gap, robot.body.diameter)
             except InputError as error:
                 raise InputError(f"{name}: contact.{error}") from error
 

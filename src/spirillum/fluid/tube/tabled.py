@@ -26,9 +26,9 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.options import ModelOptions
 
-__all__ = ["TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
+__all__ = ["THINNEST_GAP", "TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
 
-_THINNEST_GAP = 1e-5
+THINNEST_GAP = 1e-5
 """Thinnest gap over the body's diameter: the thinnest film that is tabulated."""
 _HELD = [0, 1, 3, 4]
 """Places of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
@@ -117,7 +117,7 @@ class TabledTube(Tube):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        seats = seat_limits(batch, part, thinnest_gap=_THINNEST_GAP, wire_film=0.0)
+        seats = seat_limits(batch, part, thinnest_gap=THINNEST_GAP, wire_film=0.0)
         return [*Slender().part_domain(batch, part), *seats]
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
