@@ -182,7 +182,7 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
                     f"model '{problem.model.name}' misses the {CALLED[name]} from tail to tail, its fitted numbers "
                     "stand for what it lacks, and hold for these tails"
                 )
-        elif size.value > _LARGE_MISFIT and fit.discrepancy[name] > 0:  # else the middle of what may be
+        elif min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT:  # the residuals say so, and not the prior alone
             found.append(
                 f"model '{problem.model.name}' misses the {CALLED[name]} by {percent(size.value)} from tail to tail, "
                 "beyond the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for "
