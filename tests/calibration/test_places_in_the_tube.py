@@ -213,6 +213,7 @@ def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:
     run = sp.simulate(WIDE, calibration=file, timing={"duration": "0.05 s"})
     assert run.attrs["motion"] == "free"
     assert "dry friction is fitted, and acts on a free robot: the run is free" in run.attrs["warnings"]
+    assert "the calibration is of robots that are held at their places" in run.attrs["warnings"]
     with pytest.raises(InputError, match="motion = 'held' knows no dry friction"):
         sp.simulate(WIDE, calibration=file, motion="held", timing={"duration": "0.05 s"})
 

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.warnings import CALIBRATED_HELD
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -86,11 +87,13 @@ def chosen_run(
     contact = calibrated_contact(calibration) if posterior is None else posterior.contact()
     if motion is None and chosen.placed and contact.friction_coefficient:
         said.append("dry friction is fitted, and acts on a free robot: the run is free")
-        return choice, "free", said
+        motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed):
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
         said.append(f"model '{choice.model}' {why}: the run is held, with two degrees of freedom")
         return choice, "held", said
+    if motion != "held" and chosen.placed and posterior is None:
+        said.append(CALIBRATED_HELD)
     return choice, motion or "free", said
 
 

@@ -22,7 +22,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
-__all__ = ["FITTED_HELD", "Fitted", "fitted_of", "friction_acts"]
+__all__ = ["CALIBRATED_HELD", "FITTED_HELD", "Fitted", "fitted_of", "friction_acts"]
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 """Fitted fields that act on `rft` alone."""
@@ -32,6 +32,11 @@ FITTED_HELD = (
     "intervals are of that motion, and need not hold the observations that were fitted"
 )
 """Said of a free motion in the tube over a posterior."""
+CALIBRATED_HELD = (
+    "the calibration is of robots that are held at their places; this one is let go and finds its own, and need not "
+    "swim as it was observed"
+)
+"""Said of a free motion in the tube with a calibration file."""
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ __all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "TILTED", "announcement"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "12 to 18 minutes of one core"
-"""What it takes to make the table of one robot; estimated from what four tails at once took."""
+TABLE_TAKES = "12 to 28 minutes of one core"
+"""What it takes to make the table of one robot, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
 """Progress messages that are to be read, too."""
-_SECONDS = 10.0
-"""Time that a place takes one process, s: for the paper's robots; near the glass it is three times as long."""
+_SECONDS = (10.0, 17.0)
+"""Time that a place takes one process of a fast and of a slow machine, s; near the glass it is three times as long."""
 
 
 def announcement(places: int, workers: int, kept: int) -> str:
@@ -24,9 +24,10 @@ def announcement(places: int, workers: int, kept: int) -> str:
         kept: number of these places that were solved for before, such as by a preparation that was interrupted.
     """
     remaining = places - kept
-    minutes = max(round(remaining * _SECONDS / max(workers, 1) / 60.0), 1)
+    least, most = (max(round(remaining * seconds / max(workers, 1) / 60.0), 1) for seconds in _SECONDS)
+    minutes = f"about {least} min" if least == most else f"{least} to {most} min"
     before = f", {kept} of them kept from before, {remaining} still to solve for" if kept else ""
     return (
-        f"{ANNOUNCED}: it is made now, once, from {places} places{before}, in about {minutes} min with "
+        f"{ANNOUNCED}: it is made now, once, from {places} places{before}, in {minutes} with "
         f"{'1 process' if workers == 1 else f'{workers} processes'}"
     )
