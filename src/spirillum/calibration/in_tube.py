@@ -49,7 +49,7 @@ def place_ranges(batch: RobotBatch, model: SwimmerModel, names: Sequence[str]) -
     for _, one in batch.blocks(1):
         radius = 0.5 * float(one.body_diameter[0])
         rough = (ROUGHNESS_BAND[0] * radius, ROUGHNESS_BAND[1] * radius)
-        known = {"gap": gap_on_asperities(rough[0])} if "roughness" in names else {}
+        known = {"gap": float(gap_on_asperities(rough[0]))} if "roughness" in names else {}
         places = band_places(one.placed(Placement().model_copy(update=known)), model)
         gaps = [place.gap or 0.0 for place in places]
         # The steepest pitch depends on the gap; what holds at every gap is the least of them.
