@@ -15,7 +15,7 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import NullLocator
 
 from spirillum.arrays import Values
-from spirillum.units import Hz, show
+from spirillum.units import Hz
 from spirillum.view.figures.scene import HALO
 from spirillum.view.figures.section import draw_glass, draw_section
 from spirillum.view.figures.sheet import Sheet, add_letters
@@ -305,9 +305,9 @@ def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
     """Where in its tube the robot lies, and what the fluid is made to do."""
     placement, motion = flow.prediction.placement, flow.prediction
     film = placement["gap"]["value"]
-    yield f"gap {film / lengths.factor:.4g} {lengths.unit}" + (
-        f" (in the run {show(film - flow.lifted, 'um')})" if flow.lifted > 0.0 else ""
-    )
+    own = Scale.of(np.array([film - flow.lifted]), "m")
+    in_run = f" (in the run {(film - flow.lifted) / own.factor:.4g} {own.unit})" if flow.lifted > 0.0 else ""
+    yield f"gap {film / lengths.factor:.4g} {lengths.unit}{in_run}"
     if flow.seat is not None and flow.seat.pitch:
         yield f"pitch {np.degrees(flow.seat.pitch):.4g}°"
     if flow.seat is not None and flow.seat.yaw:
