@@ -45,7 +45,6 @@ def earlier_run(
         raise InputError(f"in_tube.continued = {str(path)[:80]}: {what}; allowed: an earlier run of this robot")
     for needed in ("time", "azimuth", "body_angle", "tail_phase", "tail_angle"):
         numbers_of(found, needed)
-    numbers_of(found, "position", ("axis",), (3,))
     if not found.sizes.get("time"):
         raise InputError(f"in_tube.continued = {str(path)[:80]} has no samples; allowed: an earlier run of this robot")
     if changed := _changed(found, steady, links) or _switched_otherwise(found, switches):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_contact
+from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import CALIBRATED_HELD
 from spirillum.fluid.registry import find_swimmer_model
@@ -46,6 +46,7 @@ def chosen_run(
     placement: Placement,
     calibration: str | Path | None,
     posterior: PosteriorFile | None,
+    contact: FittedContact,
 ) -> tuple[ModelChoice, str, list[str]]:
     """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
@@ -57,6 +58,7 @@ def chosen_run(
         placement: where it starts.
         calibration: calibration file; None without one.
         posterior: posterior; None without one.
+        contact: roughness and dry friction of either.
 
     Returns:
         Both, and what was chosen instead of the usual, a sentence each.
@@ -84,7 +86,6 @@ def chosen_run(
         return choice, motion or "free", said
     said.append(f"the run takes model '{choice.model}': {choice.reason}")
     chosen = find_swimmer_model(choice.model)
-    contact = calibrated_contact(calibration) if posterior is None else posterior.contact()
     if motion is None and chosen.placed and contact.friction_coefficient:
         said.append("dry friction is fitted, and acts on a free robot: the run is free")
         motion = "free"

@@ -123,7 +123,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     own = load(robot)
     central = own if known is None else known.central(own)
-    choice, motion, said = chosen_run(model, motion, central, placed, calibration, known)
+    contact = calibrated_contact(calibration) if known is None else known.contact()
+    choice, motion, said = chosen_run(model, motion, central, placed, calibration, known, contact)
     model = choice.model
     posterior_name = "" if known is None else known.source
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
@@ -131,7 +132,6 @@ def simulate(  # noqa: PLR0913 - the options of the command
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
     walled = model == "tube" and not held
     fixed = placed if held and find_swimmer_model(model).placed else None
-    contact = calibrated_contact(calibration) if known is None else known.contact()
     if held:
         source = calibration if known is None else known.source
         _check_held(placed if fixed is None else Placement(), roughness, contact, str(source), weight=weight)

@@ -132,7 +132,9 @@ class TiltedRings(Rings):
             reached = [(t, tier, count) for t, (tier, count) in enumerate(zip(tiers, orders, strict=True)) if count]
             sides = []
             for t, tier, count in reached:
-                own = partial(self._on_rings, waves, number, tier=tier, orders=count, away=nearest, as_=self.precision)
+                own = partial(
+                    self._on_rings, waves, number, tier=tier, orders=count, away=nearest, precision=self.precision
+                )
                 targets = own(tier.sample)
                 averages = targets if alike[t] else own(tier.averaged)
                 sides.append((targets, averages))
@@ -208,7 +210,7 @@ class TiltedRings(Rings):
         tier: _Tier,
         orders: int,
         away: float,
-        as_: type[np.floating] = np.float64,
+        precision: type[np.floating] = np.float64,
     ) -> list[Samples]:
         """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
 
@@ -217,19 +219,19 @@ class TiltedRings(Rings):
         """
         symmetric = self.seat.yaw == 0
         theta = midpoints(orders, tier.modes, whole=not symmetric)
-        onto = [[part.astype(as_) for part in projectors(theta, tier.modes, parity)] for parity in (0, 1)]
+        onto = [[part.astype(precision) for part in projectors(theta, tier.modes, parity)] for parity in (0, 1)]
         sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
         panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
-        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3), as_) for waved in sources]
+        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3), precision) for waved in sources]
         some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
         for first in range(0, panels, some):
             chunk = slice(first, first + some)
             nodes = slice(first * order, (first + some) * order)
-            average = None if sample.average is None else sample.average[chunk].astype(as_)
+            average = None if sample.average is None else sample.average[chunk].astype(precision)
             rings = self._around(sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta)
             distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=1)
             for low, high, arc in waves.bands(number, distances, away, orders):
-                field = self._waves(waves, number, theta[arc], rings[arc], low, high, as_)
+                field = self._waves(waves, number, theta[arc], rings[arc], low, high, precision)
                 for family, waved in enumerate(sources):
                     for column, parity in enumerate(waved):
                         for component, projector in enumerate(onto[family]):
@@ -253,7 +255,14 @@ class TiltedRings(Rings):
         return self.seat.placed(points.reshape(-1, 3)).reshape(*shape, 3)
 
     def _waves(
-        self, waves: Waves, number: int, theta: Samples, placed: Samples, low: int, high: int, as_: type[np.floating]
+        self,
+        waves: Waves,
+        number: int,
+        theta: Samples,
+        placed: Samples,
+        low: int,
+        high: int,
+        precision: type[np.floating],
     ) -> Samples:
         """Waves of one k and some orders on arcs of rings.
 
@@ -264,7 +273,7 @@ class TiltedRings(Rings):
             placed: points there, about the tube's axis, (angles, rings, 3), m.
             low: first order.
             high: order after the last.
-            as_: what they are kept as.
+            precision: in which they are kept.
 
         Returns:
             component; even, odd; angle; ring; real, imaginary; order; wall component.
@@ -274,7 +283,7 @@ class TiltedRings(Rings):
         shape, k = placed.shape[:2], float(waves.k[number])
         x, y, z = np.moveaxis(placed, -1, 0)
         values = extensions(k, waves.radius, np.hypot(y, z).ravel(), high, low)
-        out = np.empty((3, 2, *shape, 2, high - low, 3), as_)
+        out = np.empty((3, 2, *shape, 2, high - low, 3), precision)
         tilted_waves(
             values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, out, low
         )
