@@ -87,9 +87,9 @@ def test_one_trial_keeps_the_interval_that_it_states(tmp_path: Path) -> None:
         (
             [
                 "channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,body_rate_Hz,motor_rate_Hz",
-                "40,25,2.5,1.5,-0.067,1.43",
+                *("40,25,2.5,1.5,-0.067,1.43", "40,25,2.5,1.2,-0.12,1.08", "40,25,2.5,0.9,-0.17,0.73"),
             ],
-            "motor_rate_Hz: 1.43 is tail plus body rate; allowed: tail less body rate, 1.567",
+            "rows 2 to 4, column motor_rate_Hz: 1.43 is tail plus body rate in row 2; allowed: tail less body rate",
         ),
         (
             ["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,tail_rate_Hz_ci95", "40,25,2.5,1,-1"],

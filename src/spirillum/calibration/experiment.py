@@ -8,7 +8,7 @@ battery that runs down from trial to trial then does no harm.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,7 +20,16 @@ from spirillum.calibration.outliers import outlying_trials
 from spirillum.errors import InputError
 from spirillum.files import read_bytes
 from spirillum.files.limits import LARGEST_TABLE
-from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
+from spirillum.measurement.observations import (
+    Observation,
+    all_rates,
+    check_driven,
+    check_signs,
+    driven_sense,
+    observation_table,
+    read_observations,
+)
+from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.robot.robot import Robot
 from spirillum.swimming.discrepancy import error_of_mean
@@ -30,6 +39,10 @@ __all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
 
+_FEWEST_EQUAL = 3
+"""Rows of equal speed that were not measured, if they are of that many tails, or have that many digits."""
+_NEAR_ZERO = 3.0
+"""Standard errors within which a mean may be backwards by chance."""
 _FLOOR = 0.1
 """Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
 
@@ -119,8 +132,8 @@ class Experiment:
     """Whether the file says that its numbers were made by a program."""
     outliers: tuple[str, ...] = ()
     """Trials that are far off the others of their tail, a sentence each."""
-    copies: tuple[str, ...] = ()
-    """Trials of one tail that are equal in every number, a sentence each tail."""
+    doubts: tuple[str, ...] = ()
+    """What is doubtful of the rows, such as trials of one tail that are equal in every number, a sentence each."""
 
     @property
     def size(self) -> int:
@@ -172,8 +185,8 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
                 f"channel of a robot that was given ({', '.join(f'{c * 1e3:g} mm' for c in sorted(by_channel))})"
             )
         _check_name(path, item, robot, robots)
-        _check_row(path, item, robot)
         groups.setdefault(item.tail, []).append(item)
+    _check_signs(path, observations, by_channel)
     _check_variety(path, observations)
     _check_zeros(path, observations)
     items = list(groups.values())
@@ -199,7 +212,10 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         source=path.name,
         sha256=hashlib.sha256(read_bytes(path, "an observations file", LARGEST_TABLE)).hexdigest(),
         synthetic="synthetic" in " ".join(comments).lower(),
-        copies=tuple(sentence for group in items for sentence in _copies(group)),
+        doubts=(
+            *convention_doubt(all_rates(observations)),
+            *(sentence for group in items for sentence in _copies(group)),
+        ),
         outliers=outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
 
@@ -229,24 +245,24 @@ def _check_name(path: Path, item: Observation, robot: Robot, robots: Sequence[Ro
         )
 
 
-def _check_row(path: Path, item: Observation, robot: Robot) -> None:
-    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    driven = -robot.hand if reverse else robot.hand
-    check_signs(path, item, driven, robot.tail.handedness)
-    if item.body_rate * driven > 0:
-        raise InputError(
-            f"{path}, row {item.row}, column body_rate_Hz: {item.body_rate / (2 * np.pi):.4g}; allowed: "
-            f"{'negative' if driven > 0 else 'positive'}, for the body turns against the "
-            f"{robot.tail.handedness}-handed tail"
-        )
+def _check_signs(path: Path, observations: Sequence[Observation], by_channel: Mapping[float, Robot]) -> None:
+    """A tail turns the way that it is driven, and the body against it."""
+    for robot in by_channel.values():
+        items = [item for item in observations if by_channel[round(item.channel_diameter, 9)] is robot]
+        check_driven(path, items, robot)
+        reason = f"for the body turns against the {robot.tail.handedness}-handed tail"
+        check_signs(path, items, ["body_rate_Hz"], -driven_sense(robot), reason)
 
 
 def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
-    """Speeds that are all equal were not measured."""
+    """Speeds that are all equal were not measured, but those of one tail that are read to a digit or two."""
     rows = [item for item in observations if np.isfinite(item.forward_velocity)]
-    if len(rows) >= 3 and len({item.forward_velocity for item in rows}) == 1:
+    if len(rows) < _FEWEST_EQUAL or len({item.forward_velocity for item in rows}) > 1:
+        return
+    digits = len(f"{1e3 * rows[0].forward_velocity:.9e}".rpartition("e")[0].rstrip("0").replace(".", "").lstrip("-"))
+    if len({item.tail for item in rows}) >= _FEWEST_EQUAL or digits >= _FEWEST_EQUAL:
         raise InputError(
-            f"{path}, rows {rows[0].row} to {rows[-1].row}, column forward_velocity_mm_s: all are "
+            f"{path}, {rows_in_words(item.row for item in rows)}, column forward_velocity_mm_s: all are "
             f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
         )
 
@@ -268,17 +284,15 @@ def _copies(items: Sequence[Observation]) -> list[str]:
 def _check_direction(path: Path, items: Sequence[Observation]) -> None:
     """A trial that swims the other way than all others of its tail, and no less fast, has a wrong sign."""
     speeds = np.array([item.forward_velocity for item in items])
-    for place, item in enumerate(items):
+    for place, speed in enumerate(speeds.tolist()):
         others = np.delete(speeds, place)
         others = others[np.isfinite(others)]
         if others.size == 0 or np.ptp(np.sign(others)) > 0:
             continue
         typical = float(np.median(others))
-        if speeds[place] * typical < 0 and abs(speeds[place]) > 0.5 * abs(typical):
-            raise InputError(
-                f"{path}, row {item.row}, column forward_velocity_mm_s: {1e3 * speeds[place]:.4g}, while the other "
-                f"trials of its tail swim at {1e3 * typical:.4g}; allowed: the same sign as these"
-            )
+        if abs(speed) > 0.5 * abs(typical):
+            reason = f"as the other trials of its tail, which swim at {1e3 * typical:.4g}"
+            check_signs(path, items, ["forward_velocity_mm_s"], float(np.sign(typical)), reason)
 
 
 @dataclass(frozen=True)
@@ -292,6 +306,12 @@ class _Trials:
     freedom: float
     stated: float = float("nan")
     """Relative standard error of one trial, root mean square over those that state one."""
+
+    @property
+    def is_near_zero(self) -> bool:
+        """Whether the mean is not told from 0 by the scatter of the trials, or by their stated errors."""
+        error = np.sqrt(self.squares / self.freedom) if self.freedom else self.stated * abs(self.mean)
+        return bool(abs(self.mean) * np.sqrt(self.trials) <= _NEAR_ZERO * error)
 
 
 @dataclass(frozen=True)
@@ -324,10 +344,9 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
             _of_trials(motor, m),
             _of_trials(tail).mean,
         )
-    if found.advance.mean * hand <= 0:
-        rows = ", ".join(str(item.row) for item in items)
+    if found.advance.mean * hand <= 0 and not found.advance.is_near_zero:
         raise InputError(
-            f"{path}, row {rows}, column forward_velocity_mm_s: the mean is backwards; allowed: a robot that swims the "
+            f"{path}, {rows_in_words(item.row for item in items)}, column forward_velocity_mm_s: the mean is backwards; allowed: a robot that swims the "
             "way that its tail drives"
         )
     return found

@@ -272,7 +272,7 @@ def synthetic_warning(source: str) -> str:
 def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]:
     """Warnings common to all methods."""
     experiment = problem.experiment
-    found = [*experiment.copies]
+    found = [*experiment.doubts]
     if experiment.synthetic:
         found.append(synthetic_warning(experiment.source))
     if "gap" in problem.free and "pitch" not in problem.free:

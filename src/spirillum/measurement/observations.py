@@ -7,9 +7,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from spirillum.errors import InputError
 from spirillum.formats.tables import Row, Table, check_known, check_present, number_in, read_table
-from spirillum.measurement.statistics import Mean, mean_with_interval
+from spirillum.measurement.rate_checks import Rates, check_motor_rates, first_of, rows_in_words, wrong_signs
+from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
+from spirillum.robot.robot import Robot
 from spirillum.units import Hz
 
 __all__ = [
@@ -17,7 +21,10 @@ __all__ = [
     "RATES",
     "Observation",
     "Observed",
+    "all_rates",
+    "check_driven",
     "check_signs",
+    "driven_sense",
     "observation_table",
     "read_observations",
     "summarised",
@@ -27,16 +34,14 @@ _MM = 1e-3
 _KEYS = {"channel_diameter_mm": _MM, "wavelength_mm": _MM, "amplitude_mm": _MM}
 RATES = {"forward_velocity_mm_s": _MM, "tail_rate_Hz": Hz, "body_rate_Hz": Hz, "motor_rate_Hz": Hz}
 """Measured columns and their factor to SI."""
+_FIELDS = tuple(name.rpartition("_")[0].removesuffix("_mm") for name in RATES)
+"""Fields of an `Observation` for the measured columns."""
 _INTERVALS = {f"{name}_ci95": factor for name, factor in RATES.items()}
 COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 """All columns; those after the trial number may be left out or left empty."""
 _NEEDED = tuple(_KEYS)
 _WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
-_CONTRADICTION = 0.2
-"""Largest difference between the motor's rate and tail less body rate, relative."""
-_CONFUSED = 0.25
-"""Distance of a motor's rate from tail plus body rate, over its other distances, below which it is that sum."""
 _LARGEST_NUMBER = 1e6
 _SMALLEST_RATE = 1e-6 * Hz
 
@@ -95,7 +100,16 @@ def read_observations(path: str | Path) -> list[Observation]:
     _check_header(table)
     found = [_observation(row) for row in table.rows()]
     _check_duplicates(table.path, found)
+    check_motor_rates(table.path, all_rates(found))
     return found
+
+
+def all_rates(observations: Iterable[Observation]) -> Rates:
+    """The rows that hold tail, body and motor rate."""
+    rows = [item for item in observations if not item.motor_derived and math.isfinite(item.tail_rate - item.body_rate)]
+    columns = [(item.tail_rate, item.body_rate, item.motor_rate, math.hypot(*item.intervals[1:])) for item in rows]
+    tail, body, motor, half_width = np.array(columns, dtype=float).reshape(-1, 4).T
+    return Rates([item.row for item in rows], tail, body, motor, half_width / NORMAL)
 
 
 def observation_table(path: str | Path) -> Table:
@@ -132,7 +146,7 @@ def _observation(row: Row) -> Observation:
         raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
     velocity, tail, body, motor = rates
     motor_derived = math.isnan(motor)
-    motor = _motor_rate(place, tail, body, motor)
+    motor = tail - body if motor_derived else motor
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
@@ -163,24 +177,6 @@ def _check_trial(row: Row) -> None:
     number = number_in(row.text("trial"))
     if not math.isnan(number) and not number.is_integer():
         raise row.error("trial", row.text("trial"), "a whole number, or a name")
-
-
-def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
-    """omega_m = omega - Omega_x where it was not observed; where it was, both have to agree."""
-    difference = tail - body
-    if math.isnan(motor):
-        return difference
-    if abs(tail + body - motor) < _CONFUSED * min(abs(body), abs(difference - motor)):
-        raise InputError(
-            f"{place}, column motor_rate_Hz: {motor / Hz:.4g} is tail plus body rate; allowed: tail less body rate, "
-            f"{difference / Hz:.4g}, for all rates are signed about the same axis"
-        )
-    if abs(difference - motor) > _CONTRADICTION * abs(motor):
-        raise InputError(
-            f"{place}, column motor_rate_Hz: {motor / Hz:.4g}, but tail less body rate is {difference / Hz:.4g}; "
-            f"allowed: equal within {100 * _CONTRADICTION:.0f} %"
-        )
-    return motor
 
 
 def _number(row: Row, name: str, factor: float, least: float | None = None) -> float:
@@ -225,25 +221,48 @@ def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
             )
 
 
-def check_signs(path: str | Path, item: Observation, driven: float, handedness: str) -> None:
-    """A tail turns the way that it is driven.
+def check_signs(
+    path: str | Path, observations: Sequence[Observation], columns: Iterable[str], expected: float, reason: str
+) -> None:
+    """Refuse values whose sign contradicts the physics by more than their own error.
 
     Args:
         path: the file, for the sentence of an error.
-        item: the row.
-        driven: sign of the driven rate about +x.
-        handedness: of the tail, for the sentence.
+        observations: the rows of one robot.
+        columns: the columns to look at, of `RATES`.
+        expected: sign that the values should have.
+        reason: why, for the sentence.
 
     Raises:
-        InputError: if a rate's sign contradicts it.
+        InputError: if there are some; the sentence names column and rows.
     """
-    for name in ("tail_rate", "motor_rate"):
-        value = getattr(item, name)
-        if value * driven < 0:
+    for column in columns:
+        place = list(RATES).index(column)
+        values = [getattr(item, _FIELDS[place]) for item in observations]
+        stated = np.array([item.intervals[place] for item in observations]) / NORMAL
+        wrong = wrong_signs(np.array(values), expected, stated, [item.tail for item in observations])
+        if wrong.size:
+            rows, first = [observations[index].row for index in wrong], int(wrong[0])
             raise InputError(
-                f"{path}, row {item.row}, column {name}_Hz: {value / Hz:.4g}; allowed: "
-                f"{'positive' if driven > 0 else 'negative'}, as the {handedness}-handed tail is driven"
+                f"{path}, {rows_in_words(rows)}, column {column}: {values[first] / RATES[column]:.4g}{first_of(rows)}; "
+                f"allowed: {'positive' if expected > 0 else 'negative'}, {reason}"
             )
+
+
+def driven_sense(robot: Robot) -> float:
+    """Sign of the rate about +x at which a robot's tail is driven forwards."""
+    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+    return float(-robot.hand if reverse else robot.hand)
+
+
+def check_driven(path: str | Path, observations: Sequence[Observation], robot: Robot) -> None:
+    """Refuse rates of a tail that turns against the sense in which it is driven, see `check_signs`.
+
+    Raises:
+        InputError: if there are some; the sentence names column and rows.
+    """
+    reason = f"as the {robot.tail.handedness}-handed tail is driven"
+    check_signs(path, observations, ("tail_rate_Hz", "motor_rate_Hz"), driven_sense(robot), reason)
 
 
 def summarised(observations: Iterable[Observation]) -> dict[tuple[float, float, float], Observed]:

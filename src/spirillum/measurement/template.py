@@ -8,7 +8,8 @@ from typing import Any
 
 from spirillum.answer import envelope
 from spirillum.files import new_file, output_target
-from spirillum.measurement.observations import COLUMNS, Observation, read_observations
+from spirillum.measurement.observations import COLUMNS, Observation, all_rates, read_observations
+from spirillum.measurement.rate_checks import convention_doubt
 
 __all__ = ["new_observations_file", "observations_answer"]
 
@@ -55,7 +56,7 @@ def observations_answer(path: str | Path) -> dict[str, Any]:
         "channels": len({item.tail[0] for item in items}),
         "measured": {name: sum(_measured(item, name) for item in items) for name in names},
     }
-    return envelope("observations", content, ())
+    return envelope("observations", content, convention_doubt(all_rates(items)))
 
 
 def _measured(item: Observation, name: str) -> bool:

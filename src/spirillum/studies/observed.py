@@ -14,7 +14,7 @@ from spirillum.errors import InputError
 from spirillum.measurement.observations import (
     Observation,
     Observed,
-    check_signs,
+    check_driven,
     read_observations,
     summarised,
 )
@@ -68,7 +68,8 @@ def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
                 f"wavelength {item.wavelength * 1e3:g} mm and amplitude {item.amplitude * 1e3:g} mm; "
                 "allowed: tails of the study"
             )
-        _check_signs(path, item, tails[item.tail])
+    for robot, items in _by_robot(observations, tails):
+        check_driven(path, items, robot)
     means = summarised(observations)
     rows = [means.get(tail) for tail in tails]
     columns = {name: _column(rows, name, 0) for name in _NAMES}
@@ -99,9 +100,14 @@ def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
     return found
 
 
-def _check_signs(path: str | Path, item: Observation, robot: Robot) -> None:
-    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    check_signs(path, item, -robot.hand if reverse else robot.hand, robot.tail.handedness)
+def _by_robot(
+    observations: Sequence[Observation], tails: Mapping[tuple[float, float, float], Robot]
+) -> list[tuple[Robot, list[Observation]]]:
+    found: dict[int, tuple[Robot, list[Observation]]] = {}
+    for item in observations:
+        robot = tails[item.tail]
+        found.setdefault(id(robot), (robot, []))[1].append(item)
+    return list(found.values())
 
 
 def _column(rows: Sequence[Observed | None], name: str, item: int) -> PerRobot:
