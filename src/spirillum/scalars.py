@@ -5,7 +5,10 @@ from __future__ import annotations
 from numbers import Integral, Real
 from typing import Any, TypeGuard
 
-__all__ = ["is_number", "is_true_or_false", "is_whole"]
+__all__ = ["is_number", "is_true_or_false", "is_whole", "plain_minus"]
+
+_MINUS_SIGNS = dict.fromkeys(map(ord, "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"), "-")
+"""Minus sign, hyphens, dashes and wide forms, which word processors and PDF files put for `-`."""
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -25,3 +28,8 @@ def is_true_or_false(value: Any) -> bool:
 
 def _is_another_kind(value: Any) -> bool:
     return is_true_or_false(value) or type(value).__name__ == "timedelta64"
+
+
+def plain_minus(text: str) -> str:
+    """A text in which minus signs and dashes of Unicode are `-`."""
+    return text if text.isascii() else text.translate(_MINUS_SIGNS)

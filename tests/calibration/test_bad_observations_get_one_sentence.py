@@ -53,8 +53,6 @@ def written(folder: Path, *lines: str) -> Path:
             [HEADER, *(f"{row.rpartition(',')[0]},0" for row in GOOD)],
             "row 2, column body_rate_Hz: 0, as in all rows; allowed: what was observed, or an empty column",
         ),
-        ([row.replace(",", ";") for row in (HEADER, *GOOD)], "columns are separated by semicolons; allowed: commas"),
-        ([row.replace(",", "\t") for row in (HEADER, *GOOD)], "columns are separated by tabs; allowed: commas"),
     ],
 )
 def test_wrong_observations_name_row_and_column(

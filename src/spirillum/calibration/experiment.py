@@ -28,6 +28,7 @@ from spirillum.measurement.observations import (
     driven_sense,
     observation_table,
     read_observations,
+    unread_columns,
 )
 from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
@@ -195,7 +196,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
     _check_rates(path, observations, ratios)
-    comments = observation_table(path).comments
+    table = observation_table(path)
     return Experiment(
         robots=tuple(
             with_tail(by_channel[group[0].tail[0]], group[0].wavelength, group[0].amplitude) for group in items
@@ -211,8 +212,9 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         correlation=_correlation([(found.advance.values, found.turning.values) for found in ratios]),
         source=path.name,
         sha256=hashlib.sha256(read_bytes(path, "an observations file", LARGEST_TABLE)).hexdigest(),
-        synthetic="synthetic" in " ".join(comments).lower(),
+        synthetic="synthetic" in " ".join(table.comments).lower(),
         doubts=(
+            *unread_columns(table),
             *convention_doubt(all_rates(observations)),
             *(sentence for group in items for sentence in _copies(group)),
         ),
@@ -346,8 +348,8 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
         )
     if found.advance.mean * hand <= 0 and not found.advance.is_near_zero:
         raise InputError(
-            f"{path}, {rows_in_words(item.row for item in items)}, column forward_velocity_mm_s: the mean is backwards; allowed: a robot that swims the "
-            "way that its tail drives"
+            f"{path}, {rows_in_words(item.row for item in items)}, column forward_velocity_mm_s: the mean is "
+            "backwards; allowed: a robot that swims the way that its tail drives"
         )
     return found
 

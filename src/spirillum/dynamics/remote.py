@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
-from spirillum.formats.tables import number_in, read_table
+from spirillum.formats.tables import read_series
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["DUTY_COLUMNS", "Switch", "Window", "read_duty", "schedule", "windows_of"]
@@ -16,6 +16,7 @@ DUTY_COLUMNS = ("time_s", "duty")
 """Columns of a duty file; each row holds until the next one."""
 _WHAT = "a duty file (CSV with the columns time_s and duty)"
 _LARGEST = 64 << 20
+_LIMITS = dict(zip(DUTY_COLUMNS, ((0.0, 1e9), (0.0, 1.0)), strict=True))
 
 Window = tuple[float, float]
 """Start and stop of a time in which the motor is on, s."""
@@ -92,34 +93,5 @@ def read_duty(path: str | Path) -> list[Switch]:
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
-    table = read_table(path, _WHAT, largest=_LARGEST)
-    path = table.path
-    if table.header != DUTY_COLUMNS:
-        shown = ", ".join(table.header)[:80]
-        raise InputError(f"{path} has the columns '{shown}'; allowed: {', '.join(DUTY_COLUMNS)}")
-    if not table.below:
-        raise InputError(f"{path} holds no rows; allowed: a header line and at least one row")
-    switches: list[Switch] = []
-    for number, cells in table.below:
-        switch = _row(path, number, cells)
-        if switches and switch.time <= switches[-1].time:
-            raise InputError(
-                f"{path}, row {number}: time_s = {switch.time:g} does not follow {switches[-1].time:g}; allowed: times "
-                "that increase"
-            )
-        switches.append(switch)
+    switches = [Switch(*row) for row in read_series(path, _WHAT, _LIMITS, _LARGEST)]
     return switches if switches[0].time == 0 else [Switch(0.0, 0.0), *switches]
-
-
-def _row(path: Path, number: int, cells: Sequence[str]) -> Switch:
-    if len(cells) != len(DUTY_COLUMNS):
-        raise InputError(f"{path}, row {number} has {len(cells)} cells; allowed: {len(DUTY_COLUMNS)}")
-    values = []
-    for name, cell, most in zip(DUTY_COLUMNS, cells, (1e9, 1.0), strict=True):
-        value = number_in(cell)
-        if not 0.0 <= value <= most:
-            raise InputError(
-                f"{path}, row {number}: {name} = {cell.strip()[:40]}; allowed: a number from 0 to {most:g}"
-            )
-        values.append(value)
-    return Switch(*values)

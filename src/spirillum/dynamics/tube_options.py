@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
-from spirillum.formats.tables import number_in, read_table
+from spirillum.formats.tables import read_series
 from spirillum.robot.arguments import Options, in_range, refusal
 from spirillum.robot.fields import Angle, Time
 from spirillum.robot.load import with_resolution
@@ -25,7 +25,7 @@ FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
 _WHAT = "a flow file (CSV with the columns time_s and flow_mm_s)"
 _LARGEST = 64 << 20
-_LIMITS = ((0.0, 1e9), (-1e6, 1e6))
+_LIMITS = dict(zip(FLOW_COLUMNS, ((0.0, 1e9), (-1e6, 1e6)), strict=True))
 
 
 def _file(what: str) -> BeforeValidator:
@@ -101,24 +101,5 @@ def read_flow(path: str | Path) -> Samples:
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
-    table = read_table(path, _WHAT, largest=_LARGEST)
-    if table.header != FLOW_COLUMNS:
-        shown = ", ".join(table.header)[:80]
-        raise InputError(f"{table.path} has the columns '{shown}'; allowed: {', '.join(FLOW_COLUMNS)}")
-    if not table.below:
-        raise InputError(f"{table.path} holds no rows; allowed: a header line and at least one row")
-    found: list[list[float]] = []
-    for number, cells in table.below:
-        place = f"{table.path}, row {number}"
-        if len(cells) != len(FLOW_COLUMNS):
-            raise InputError(f"{place} has {len(cells)} cells; allowed: {len(FLOW_COLUMNS)}")
-        values = [number_in(cell) for cell in cells]
-        for name, cell, value, (low, high) in zip(FLOW_COLUMNS, cells, values, _LIMITS, strict=True):
-            if not low <= value <= high:
-                raise InputError(f"{place}: {name} = {cell.strip()[:40]}; allowed: a number from {low:g} to {high:g}")
-        if found and values[0] <= found[-1][0]:
-            raise InputError(
-                f"{place}: time_s = {values[0]:g} does not follow {found[-1][0]:g}; allowed: times that increase"
-            )
-        found.append(values)
+    found = read_series(path, _WHAT, _LIMITS, _LARGEST)
     return np.array(found) * (1.0, 1e-3)

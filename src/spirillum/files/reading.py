@@ -16,12 +16,17 @@ from typing import Any, BinaryIO
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS
 from spirillum.files.names import checked_path
+from spirillum.files.numbers import separator_of, with_plain_numbers
 
 __all__ = ["checked_file", "csv_rows", "opened", "parse_toml", "read_bytes", "read_json", "read_text", "read_toml"]
 
 _QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
 _LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """Where Python ends a line."""
+_AROUND = " \t\r\n\v\f\xa0\u2007\u2009\u202f\ufeff"
+"""Spaces and byte-order marks around a cell."""
+_SEPARATOR_LINE = re.compile(r"\s*\"?sep=([,;\t])\"?\s*", re.I)
+"""First line by which spreadsheets state the separator."""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_LEVELS}}}")
 
 
@@ -112,7 +117,9 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
     try:
         text = read_bytes(path, what, largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not text (byte {error.start} is not UTF-8); allowed: {what}") from error
+        raise InputError(
+            f"{path} is not text (byte {error.start} is not UTF-8); allowed: {what}, saved as UTF-8"
+        ) from error
     if not text.strip():
         raise InputError(f"{path} is empty; allowed: {what}")
     return text
@@ -158,7 +165,9 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
 def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
     """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
 
-    Lines that start with `#` are comments. They are left out, and so are rows of commas alone, as spreadsheets write.
+    Commas, semicolons or tabulators separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines
+    that start with `#` are comments. They are left out, and so are rows of separators alone, the line `sep=` and empty
+    columns at the end, as spreadsheets write.
 
     Args:
         text: what stands in the file.
@@ -169,23 +178,35 @@ def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
         InputError: if it is not CSV, or has too many rows or cells.
     """
     _check_extent(text, path, what)
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    reader = csv.reader((f"{line}\n" for _, line in lines), strict=True)
-    found: list[tuple[int, list[str]]] = []
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,;\t\ufeff")]
+    lines = [(number, line) for number, line in lines if not line.lstrip(" \t\ufeff").startswith("#")]
+    stated = _SEPARATOR_LINE.fullmatch(lines[0][1]) if lines else None
+    separator = stated[1] if stated else separator_of([line for _, line in lines])
+    lines = lines[1:] if stated else lines
+    reader = csv.reader((f"{line}\n" for _, line in lines), strict=True, delimiter=separator)
+    found: list[list[str]] = []
+    numbers: list[int] = []
     first = 0
     try:
         for cells in reader:
-            found.append((lines[first][0], [cell.strip() for cell in cells]))
+            numbers.append(lines[first][0])
+            found.append([cell.strip(_AROUND) for cell in cells])
             first = reader.line_num  # a cell in quotation marks may go over several lines
     except csv.Error as error:
         raise InputError(f"{path} is not CSV ({error}); allowed: {what}") from error
-    return found
+    return list(zip(numbers, with_plain_numbers(_without_empty_ends(found), separator), strict=True))
+
+
+def _without_empty_ends(rows: list[list[str]]) -> list[list[str]]:
+    """Rows without the columns at the end that are empty in all of them."""
+    width = max((len(cells) for cells in rows), default=0)
+    filled = max((place for cells in rows for place, cell in enumerate(cells, 1) if cell), default=0)
+    return [cells[:filled] for cells in rows] if filled < width else rows
 
 
 def _check_extent(text: str, path: Path, what: str) -> None:
     """Refuse a text that would make more rows or cells than fit into memory, before it is taken apart."""
-    rows, cells = sum(map(text.count, _LINE_ENDS)), text.count(",")
+    rows, cells = sum(map(text.count, _LINE_ENDS)), max(map(text.count, ",;\t"))
     if rows > 2 * MOST_ROWS or cells > MOST_CELLS:
         raise InputError(
             f"{path} has {rows} lines and {cells} commas; allowed: {what} of at most {MOST_ROWS} rows and "

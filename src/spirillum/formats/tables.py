@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import checked_path, csv_rows, read_text
 from spirillum.files.limits import LARGEST_TABLE, MOST_COLUMNS
+from spirillum.files.numbers import number_hint, number_in
 from spirillum.formats.parquet import parquet_table
 
-__all__ = ["Row", "Table", "check_known", "check_present", "number_in", "read_readings", "read_table"]
+__all__ = ["Row", "Table", "check_known", "check_present", "read_readings", "read_series", "read_table"]
 
 _LARGEST_NUMBER = 1e12
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
-
-
-def number_in(text: str) -> float:
-    """A cell's text as a decimal number; NaN for all else, such as `inf`, `1_000` or digits of other scripts."""
-    return float(text) if _NUMBER.fullmatch(text) else math.nan
+_WORD = re.compile(r"[^\W_]+")
+_ALIKE = 0.8
+"""Likeness of two words, from 0 to 1, from which on one may be a misspelling of the other."""
+_NOTES = ("note", "comment", "remark")
+"""With what the name of a column begins that is nobody's but the user's."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Row:
             return math.nan
         value = number_in(text)
         if not low <= value <= high:
-            raise self.error(name, text, allowed)
+            raise self.error(name, text, f"{allowed}{number_hint(text)}")
         return value
 
     def error(self, name: str, text: str, allowed: str) -> InputError:
@@ -99,6 +100,12 @@ class Table:
     def column(self, name: str) -> int | None:
         """Place of a column of the first header row."""
         return self.header.index(name) if name in self.header else None
+
+    def free_columns(self, known: Collection[str]) -> list[str]:
+        """Names of the columns that are not read, and hold something."""
+        places = [place for place, name in enumerate(self.header) if name not in known]
+        filled = [place for place in places if any(cells[place] for _, cells in self.below if len(cells) > place)]
+        return [self.header[place] or "(without a name)" for place in filled]
 
     def rows(self) -> list[Row]:
         """All rows.
@@ -142,7 +149,7 @@ def read_table(
 
 
 def read_readings(path: str | Path, what: str, headers: int = 1) -> Table:
-    """Read a CSV file of readings, and check that it holds some, in columns between commas.
+    """Read a CSV file of readings, and check that it holds some, in several columns.
 
     Args:
         path: the file.
@@ -156,27 +163,40 @@ def read_readings(path: str | Path, what: str, headers: int = 1) -> Table:
     if not table.below:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
     width = len(table.header)
-    if width == 1 and (other := next((mark for mark in ";\t|" if mark in table.header[0]), None)):
-        raise InputError(f"{path}: its columns are separated by {other!r}; allowed: commas")
+    if width == 1 and "|" in table.header[0]:
+        raise InputError(f"{path}: its columns are separated by '|'; allowed: commas, semicolons or tabulators")
     if width > MOST_COLUMNS:
         raise InputError(f"{path} has {width} columns; allowed: at most {MOST_COLUMNS}")
     return table
 
 
 def check_known(table: Table, allowed: Sequence[str]) -> None:
-    """Refuse columns of other names than the allowed ones, and those that stand twice.
+    """Refuse columns that may be meant as one of the allowed ones, and names that stand twice.
+
+    Other columns are free: those without a word that an allowed name has, or nearly has.
 
     Raises:
         InputError: if there is one; the sentence names the nearest allowed name.
     """
+    words = {word for name in allowed for word in _words(name)} - {"s"}
     for name in table.header:
-        if name not in allowed:
+        if name in allowed:
+            if table.header.count(name) > 1:
+                raise InputError(f"{table.path}: column '{name}' stands twice; allowed: once")
+        elif not name.lower().startswith(_NOTES) and _resembles(name, words):
             raise InputError(
                 f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, allowed)}; allowed: "
-                f"{', '.join(allowed)}"
+                f"{', '.join(allowed)}, and notes, whose names begin with note"
             )
-        if table.header.count(name) > 1:
-            raise InputError(f"{table.path}: column '{name}' stands twice; allowed: once")
+
+
+def _resembles(name: str, words: Collection[str]) -> bool:
+    """Whether a word of a name is one of some words, but for a letter."""
+    return any(get_close_matches(word, words, n=1, cutoff=_ALIKE) for word in _words(name))
+
+
+def _words(name: str) -> list[str]:
+    return [word.lower() for word in _WORD.findall(name)]
 
 
 def check_present(table: Table, needed: Sequence[str]) -> None:
@@ -190,3 +210,40 @@ def check_present(table: Table, needed: Sequence[str]) -> None:
         raise InputError(
             f"{table.path}: column '{missing[0]}' is missing; allowed: a header line with {', '.join(needed)}"
         )
+
+
+def read_series(
+    path: str | Path, what: str, limits: Mapping[str, tuple[float, float]], largest: int
+) -> list[tuple[float, ...]]:
+    """Read a CSV file of values over time.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        limits: name of each column, the time first, to its smallest and largest value.
+        largest: size of the file at most, bytes.
+
+    Returns:
+        The rows, in the order of `limits`.
+
+    Raises:
+        InputError: if the file or a cell is wrong, or time does not increase; the sentence names file, row and column.
+    """
+    table = read_table(path, what, largest=largest)
+    check_known(table, tuple(limits))
+    check_present(table, tuple(limits))
+    if not table.below:
+        raise InputError(f"{table.path} holds no rows; allowed: a header line and at least one row")
+    found: list[tuple[float, ...]] = []
+    for row in table.rows():
+        values = tuple(
+            row.number(name, name, low=low, high=high, blank=(), allowed=f"a number from {low:g} to {high:g}")
+            for name, (low, high) in limits.items()
+        )
+        if found and values[0] <= found[-1][0]:
+            name = next(iter(limits))
+            raise InputError(
+                f"{row.place}: {name} = {values[0]:g} does not follow {found[-1][0]:g}; allowed: times that increase"
+            )
+        found.append(values)
+    return found

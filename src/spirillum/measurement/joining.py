@@ -41,7 +41,8 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
         table = observation_table(path)
         comments += [line for line in table.comments if line not in comments]
         rows += [dict(zip(row.header, row.cells, strict=True)) for row in table.rows()]
-    used = [name for name in COLUMNS if any(row.get(name, "").strip() for row in rows)]
+    names = dict.fromkeys([*COLUMNS, *(name for row in rows for name in row if name)])
+    used = [name for name in names if any(row.get(name) for row in rows)]
     text = io.StringIO()
     writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.formats.tables import Row, Table, check_known, check_present, number_in, read_table
+from spirillum.files.numbers import number_in
+from spirillum.formats.tables import Row, Table, check_known, check_present, read_table
 from spirillum.measurement.rate_checks import Rates, check_motor_rates, first_of, rows_in_words, wrong_signs
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
 from spirillum.robot.robot import Robot
@@ -28,6 +29,7 @@ __all__ = [
     "observation_table",
     "read_observations",
     "summarised",
+    "unread_columns",
 ]
 
 _MM = 1e-3
@@ -42,6 +44,7 @@ COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 _NEEDED = tuple(_KEYS)
 _WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
+_MOST_SHOWN = 8
 _LARGEST_NUMBER = 1e6
 _SMALLEST_RATE = 1e-6 * Hz
 
@@ -91,7 +94,8 @@ def read_observations(path: str | Path) -> list[Observation]:
     """Read and check an observations file.
 
     Args:
-        path: tidy CSV, in which `#` starts a comment line, or the same columns in a Parquet file (`.parquet`).
+        path: tidy CSV, in which `#` starts a comment line, or the same columns in a Parquet file (`.parquet`). Columns
+            of other names are notes.
 
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
@@ -127,11 +131,17 @@ def observation_table(path: str | Path) -> Table:
     return table
 
 
+def unread_columns(table: Table) -> tuple[str, ...]:
+    """A sentence on the columns of an observations file that are not read; none without such columns."""
+    names = table.free_columns(COLUMNS)
+    if not names:
+        return ()
+    shown = ", ".join(name[:40] for name in names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
+    return (f"column{'' if len(names) == 1 else 's'} {shown}: not read, taken as notes",)
+
+
 def _check_header(table: Table) -> None:
     path, header = table.path, table.header
-    if len(header) == 1 and any(mark in header[0] for mark in ";\t"):
-        mark = "semicolons" if ";" in header[0] else "tabs"
-        raise InputError(f"{path}: columns are separated by {mark}; allowed: commas, and points in numbers")
     check_known(table, COLUMNS)
     check_present(table, _NEEDED)
     if not set(header) & set(RATES):

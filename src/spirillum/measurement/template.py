@@ -8,7 +8,14 @@ from typing import Any
 
 from spirillum.answer import envelope
 from spirillum.files import new_file, output_target
-from spirillum.measurement.observations import COLUMNS, Observation, all_rates, read_observations
+from spirillum.measurement.observations import (
+    COLUMNS,
+    Observation,
+    all_rates,
+    observation_table,
+    read_observations,
+    unread_columns,
+)
 from spirillum.measurement.rate_checks import convention_doubt
 
 __all__ = ["new_observations_file", "observations_answer"]
@@ -23,6 +30,7 @@ _TEMPLATE = """\
 #   with a positive rate, the body turns against it, and the motor's rate is the tail's less the body's.
 # trials: only for a row that is a mean over that many trials.
 # the columns *_ci95: half widths of 95 % intervals, where known: the error of this trial, or of the mean.
+# Further columns, such as note, are yours; they are not read.
 """
 
 
@@ -56,7 +64,8 @@ def observations_answer(path: str | Path) -> dict[str, Any]:
         "channels": len({item.tail[0] for item in items}),
         "measured": {name: sum(_measured(item, name) for item in items) for name in names},
     }
-    return envelope("observations", content, convention_doubt(all_rates(items)))
+    doubts = convention_doubt(all_rates(items))
+    return envelope("observations", content, (*unread_columns(observation_table(path)), *doubts))
 
 
 def _measured(item: Observation, name: str) -> bool:
