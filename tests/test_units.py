@@ -103,6 +103,84 @@ def test_si_values(kind: str, text: str, si: float) -> None:
     assert parse_quantity(text, KINDS[kind]) == pytest.approx(si, rel=1e-14, abs=0)
 
 
+@pytest.mark.parametrize(
+    ("kind", "texts", "si"),
+    [
+        ("length", "um|µm|μm|㎛|micron|microns|micrometer|Micrometre|UM", 1e-6),
+        ("length", "mm|㎜|mm.|millimeters|Millimetre", 1e-3),
+        ("length", "in|inch|inches|Inch|IN", 0.0254),
+        ("length", "ft|feet|foot", 0.3048),
+        ("velocity", "mm/s|mm/sec|mm/Sec|mm s^-1|mm s-1|mm·s⁻¹|mm⋅s⁻¹|mm.s-1|mm*s**-1|mm per second", 1e-3),
+        ("rate", "Hz|hz|HZ|rps|RPS|turn/s|turns/s|rev/s|r/s", 2 * math.pi),
+        ("rate", "rpm|RPM|Rpm|r/min|rev/min|U/min|turns per minute", math.pi / 30),
+        ("rate", "deg/s|Deg/s|°/s|º/s|degrees/sec", math.pi / 180),
+        ("angle", "deg|DEG|°|º|degree|Degrees", math.pi / 180),
+        ("viscosity", "Pa s|Pa·s|Pa.s|Pa-s|Pas|pa s|PA S|N s/m2|N·s/m²|kg/(m s)|kg m^-1 s^-1", 1.0),
+        ("viscosity", "mPa s|mPas|mPa.s|mPa·s|mPa-s|mpa s|cP|CP|cp|cps|cPs|centipoise|Centipoise", 1e-3),
+        ("density", "g/cm3|g/cm³|g cm-3|g/cc|g/ml|g/mL|kg/dm3|kg/L", 1e3),
+        ("mass", "kg|Kg|KG|kilogram|kilograms", 1.0),
+        ("mass", "ug|µg|mcg", 1e-9),
+        ("torque", "mN m|mNm|mN·m|mN.m|mN-m|N mm|Nmm", 1e-3),
+        ("torque", "pN nm|pNnm|pN·nm", 1e-21),
+        ("torque", "gf cm|gf.cm|gf·cm|gfcm", 9.80665e-5),
+        ("torque", "ozf in|ozf-in", 0.45359237 / 16 * 9.80665 * 0.0254),
+        ("viscosity", "psi s", 0.45359237 * 9.80665 / 0.0254**2),
+        ("magnetic field", "G|Gs|gauss|Gauss", 1e-4),
+        ("magnetic field", "mT|mt|millitesla", 1e-3),
+        ("magnetic moment", "A m^2|A m2|A·m²|Am2|Am²|A.m^2|J/T", 1.0),
+        ("magnetic moment", "emu|EMU|erg/G|mA m2", 1e-3),
+        ("charge", "mAh|mA h|mah|mA·h|mA hr", 3.6),
+        ("current", "mA|ma|milliamps", 1e-3),
+        ("voltage", "V|v|Volt|volts", 1.0),
+        ("resistance", "kohm|kOhm|kΩ|k\u2126", 1e3),
+        ("torque constant", "mN m/A|mNm/A|mN·m/A|mNm/amp", 1e-3),
+        ("back-emf constant", "mV/rpm|mV/RPM|V/krpm|V/kRPM", 0.03 / math.pi),
+        ("back-emf constant", "Vs/rad|V s/rad|V/(rad/s)|Vs", 1.0),
+        ("rotary friction", "Nms|Nms/rad|N m/(rad/s)|N·m·s", 1.0),
+        ("time", "min|MIN|mins|minutes", 60.0),
+    ],
+)
+def test_units_as_people_write_them(kind: str, texts: str, si: float) -> None:
+    for unit in texts.split("|"):
+        value = parse_quantity(f"0.5 {unit}", KINDS[kind])
+        assert value == pytest.approx(0.5 * si, rel=1e-12, abs=0), unit
+
+
+@pytest.mark.parametrize("sign", ["\u2212", "\u2013", "\u2010"])
+def test_minus_signs_of_unicode(sign: str) -> None:
+    assert parse_quantity(f"{sign}2e{sign}1 mm/s", KINDS["velocity"]) == -2e-4
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "words"),
+    [
+        ("magnetic field", "Oe", "field strength; allowed: the flux density in T: .* 1 Oe is 0.1 mT"),
+        ("magnetic field", "kA/m", "field strength; allowed: the flux density in T"),
+        ("torque", "kg cm", "is mass times length; allowed: .* N m"),
+        ("torque", "oz-in", "is mass times length"),
+        ("magnetic moment", "emu/g", r"is a moment per mass; allowed: .* A m\^2"),
+        ("length", "MM", "may mean Mm or mm; allowed: a unit of length"),
+        ("viscosity", "MPA S", "may mean MPa s or mPa s"),
+        ("viscosity", "CST", "kinematic viscosity"),
+        ("mass", "gr", r"is not a known unit; .* \(SI: kg\)"),  # gram or grain
+        ("length", "ms", r"is not a unit of length; .* \(SI: m\)"),
+        ("length", "s", "is not a unit of length"),
+        ("mass", "G", "is not a unit of mass"),
+        ("torque", "mN", "is not a unit of torque"),
+        ("viscosity", "kg/ms", "is not a unit of viscosity"),
+        ("length", "mil", "is not a known unit"),
+    ],
+)
+def test_ambiguous_and_other_units_name_what_is_allowed(kind: str, unit: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        parse_quantity(f"1 {unit}", KINDS[kind])
+
+
+def test_a_decimal_comma_is_named() -> None:
+    with pytest.raises(InputError, match=r"is not a unit; .* a decimal point in the number"):
+        parse_quantity("18,5 mm", KINDS["length"])
+
+
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_every_kinds_own_words_are_true(kind: str) -> None:
     """The example of a sentence is accepted, the ends of the range too, and what lies beyond is not."""

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
-from spirillum.scalars import is_number
+from spirillum.scalars import is_number, plain_minus
+from spirillum.unit_spelling import other_spellings, plain_unit, spelled_names
 
 if TYPE_CHECKING:
     import pint
@@ -39,10 +40,10 @@ _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
 )
 # Letters, products, quotients and one-digit powers: nothing that could be expensive to read.
-_UNIT = re.compile(r"(?:[^\W\d]|[ */·().°²³⁻¹]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
-_POWER_OF_A_POWER = re.compile(r"[\d²³¹]\s*(?:\*\*|\^|[²³¹])")
+_UNIT = re.compile(r"(?:[^\W\d]|[ */().°]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
+_POWER_OF_A_POWER = re.compile(r"\d\s*(?:\*\*|\^)")
 _LONGEST_UNIT = 40
-_OHM_SIGNS = {0x2126: " ohm", 0x03A9: " ohm"}
+_PREFIX = re.compile(r"([^\W\d]+)-(?=\s)")
 
 Hz = 2 * math.pi
 """One turn per second in rad/s."""
@@ -199,26 +200,79 @@ def _factor(unit: str, kind: Kind) -> float:
 
 def _factor_by_pint(unit: str, kind: Kind) -> float:
     """SI value of one `unit` as a quantity of `kind`, by parsing it with pint."""
-    unit = unit.translate(_OHM_SIGNS)
-    hint = f'allowed: a unit of {kind.name}, as in "{kind.example}"'
-    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit) or _POWER_OF_A_POWER.search(unit):
-        raise InputError(f'"{_clip(unit)}" is not a unit; {hint}')
+    hint = f'allowed: a unit of {kind.name}, as in "{kind.example}" (SI: {kind.unit.replace("**", "^")})'
+    plain = plain_unit(unit)
+    if len(plain) > _LONGEST_UNIT or not _UNIT.fullmatch(plain) or _POWER_OF_A_POWER.search(plain):
+        comma = ", and a decimal point in the number" if unit.startswith(",") else ""
+        raise InputError(f'"{_clip(unit)}" is not a unit; {hint}{comma}')
+    found = _in_si(plain, kind)
+    if found is not None:
+        return found
+    others: list[str] = []
+    for loose in (False, True):
+        others += other_spellings(plain, _names(), loose=loose)
+        values = {text: value for text in others if (value := _in_si(text, kind)) is not None}
+        distinct = {f"{value:.12g}": text for text, value in reversed(values.items())}
+        if len(distinct) == 1:
+            return next(iter(values.values()))
+        if distinct:
+            raise InputError(f'"{unit}" may mean {" or ".join(sorted(distinct.values()))}; {hint}')
+    raise InputError(_refusal(unit, [plain, *others], kind, hint))
+
+
+def _in_si(unit: str, kind: Kind) -> float | None:
+    """SI value of one `unit` as a quantity of `kind`; None where it is unknown or measures something else."""
+    one = _quantity_of(unit)
+    for accepted in (kind.unit, kind.also):
+        if one is not None and accepted is not None and one.is_compatible_with(accepted):
+            return float(one.to(accepted).magnitude)
+    return None
+
+
+def _quantity_of(unit: str) -> Any:
+    """One `unit` as pint reads it; None where it is unknown."""
     registry = _registry()
     try:
-        one = registry.Quantity(1.0, registry.parse_units(unit))
-    except Exception as error:  # pint raises its own kinds and those of Python's tokenizer
-        raise InputError(f'"{unit}" is not a known unit; {hint}') from error
-    for accepted in (kind.unit, kind.also):
-        if accepted is not None and one.is_compatible_with(accepted):
-            return float(one.to(accepted).magnitude)
-    if kind.unit == "rad/s" and one.is_compatible_with("1/s"):
-        raise InputError(f'"{unit}" does not say what turns; allowed: rad/s, Hz, rpm, turn/s')
-    if kind.name == "viscosity" and one.is_compatible_with("m**2/s"):  # on the labels of silicone oils
-        raise InputError(
-            f'"{unit}" is a unit of kinematic viscosity; allowed: the dynamic one, which is that times the density: '
-            "1000 cSt of an oil of 970 kg/m^3 are 0.97 Pa s"
-        )
-    raise InputError(f'"{unit}" is not a unit of {kind.name}; {hint}')
+        return registry.Quantity(1.0, registry.parse_units(unit))
+    except Exception:  # pint raises its own kinds and those of Python's tokenizer
+        return None
+
+
+@lru_cache(maxsize=1)
+def _names() -> Mapping[str, frozenset[str]]:
+    prefixes = _PREFIX.findall((files("spirillum") / "units.txt").read_text(encoding="utf-8"))
+    return spelled_names(list(_registry()), prefixes)
+
+
+_OTHER_MEASURES = (
+    ("rad/s", "1/s", "does not say what turns; allowed: rad/s, Hz, rpm, turn/s"),
+    (
+        "Pa s",  # on the labels of silicone oils
+        "m**2/s",
+        "is a unit of kinematic viscosity; allowed: the dynamic one, which is that times the density: 1000 cSt of an "
+        "oil of 970 kg/m^3 are 0.97 Pa s",
+    ),
+    (
+        "T",
+        "A/m",
+        "is a unit of magnetic field strength; allowed: the flux density in T: without magnetised matter 1 Oe is "
+        "0.1 mT, and 1 kA/m is 1.257 mT",
+    ),
+    ("N m", "kg m", "is mass times length; allowed: force times length, as N m (SI): 1 kgf cm is 0.09807 N m"),
+    ("N m/A", "kg m/A", "has a mass for a force; allowed: N m/A (SI): 1 kgf cm/A is 0.09807 N m/A"),
+    ("A m**2", "A m**2/kg", "is a moment per mass; allowed: the moment, as A m^2 (SI)"),
+    ("A m**2", "A/m", "is a magnetisation; allowed: the moment, which is that times the volume, as A m^2 (SI)"),
+)
+"""SI unit of a kind, that of what is often given in its place, and the end of the sentence."""
+
+
+def _refusal(unit: str, spellings: Sequence[str], kind: Kind, hint: str) -> str:
+    """The sentence on a unit that is unknown, or measures something else in all its spellings."""
+    known = [one for one in map(_quantity_of, spellings) if one is not None]
+    for own, other, words in _OTHER_MEASURES:
+        if kind.unit == own and any(one.is_compatible_with(other) for one in known):
+            return f'"{unit}" {words}'
+    return f'"{unit}" is not a unit of {kind.name}; {hint}' if known else f'"{unit}" is not a known unit; {hint}'
 
 
 def _article(name: str) -> str:
@@ -252,7 +306,7 @@ def parse_quantity(value: object, kind: Kind) -> float:
         number, unit = value if isinstance(value, float) else float(max(-(10**300), min(value, 10**300))), ""
         shown = f"{value:.6g}" if isinstance(value, float) else _clip(f"{value:d}" if abs(value) < 10**30 else "(huge)")
     else:
-        found = _QUANTITY.fullmatch(value)
+        found = _QUANTITY.fullmatch(plain_minus(value))
         shown = f'"{_clip(value)}"'
         if found is None or len(value) > 200:
             raise InputError(

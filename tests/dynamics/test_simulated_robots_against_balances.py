@@ -270,7 +270,7 @@ def test_duty_file_and_windows_are_one_thing(tmp_path: Path) -> None:
         ("time_s,duty\n0,1\n1,1.01\n", "row 3: duty = 1.01"),
         ("time_s,duty\n0,nan\n", "row 2: duty = nan"),
         ("time_s,duty\n-1,1\n", "row 2: time_s = -1"),
-        ("time_s,duty\n0\n", "row 2 has 1 cells"),
+        ("time_s,duty\n0\n", "row 2: 1 cells; allowed: 2"),
         ("time,duty\n0,1\n", "columns 'time, duty'"),
         ("time_s,duty\n", "no rows"),
         ("", "empty"),

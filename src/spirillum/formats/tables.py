@@ -230,20 +230,25 @@ def read_series(
         InputError: if the file or a cell is wrong, or time does not increase; the sentence names file, row and column.
     """
     table = read_table(path, what, largest=largest)
+    if not set(limits) <= set(table.header):
+        shown = ", ".join(table.header)[:80]
+        raise InputError(f"{table.path} has the columns '{shown}'; allowed: {', '.join(limits)}")
     check_known(table, tuple(limits))
-    check_present(table, tuple(limits))
     if not table.below:
         raise InputError(f"{table.path} holds no rows; allowed: a header line and at least one row")
     found: list[tuple[float, ...]] = []
     for row in table.rows():
-        values = tuple(
-            row.number(name, name, low=low, high=high, blank=(), allowed=f"a number from {low:g} to {high:g}")
-            for name, (low, high) in limits.items()
-        )
+        values = tuple(number_in(row.text(name)) for name in limits)
+        for (name, (low, high)), value in zip(limits.items(), values, strict=True):
+            if not low <= value <= high:
+                text = row.text(name)
+                raise InputError(
+                    f"{row.place}: {name} = {text[:40]}; allowed: a number from {low:g} to {high:g}{number_hint(text)}"
+                )
         if found and values[0] <= found[-1][0]:
-            name = next(iter(limits))
             raise InputError(
-                f"{row.place}: {name} = {values[0]:g} does not follow {found[-1][0]:g}; allowed: times that increase"
+                f"{row.place}: {next(iter(limits))} = {values[0]:g} does not follow {found[-1][0]:g}; allowed: times "
+                "that increase"
             )
         found.append(values)
     return found
