@@ -9,6 +9,7 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -17,6 +18,7 @@ from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS
 from spirillum.files.names import checked_path
 from spirillum.files.numbers import separator_of, with_plain_numbers
+from spirillum.files.toml_hints import control_hint, parse_hint
 
 __all__ = ["checked_file", "csv_rows", "opened", "parse_toml", "read_bytes", "read_json", "read_text", "read_toml"]
 
@@ -146,11 +148,25 @@ def parse_toml(text: str, source: str, what: str) -> dict[str, Any]:
     if _DEEP_KEY.search(_QUOTED.sub("q", text)):  # the library's memory grows with the square of a key's parts
         raise InputError(f"{source} holds a key of more than {MOST_LEVELS} parts between dots; allowed: {what}")
     try:
-        return tomllib.loads(text)
+        found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source} is not TOML: {str(error)[:200]}; allowed: {what}") from error
+        reason = parse_hint(text, str(error)) or f"allowed: {what}"
+        raise InputError(f"{source} is not TOML: {str(error)[:200]}; {reason}") from error
     except (RecursionError, ValueError) as error:
         raise InputError(f"{source} holds values nested too deeply or too long; allowed: {what}") from error
+    if (hint := control_hint(text, set(_with_controls(found)))) is not None:
+        raise InputError(f"{source}, line {hint[0]}: {hint[1]}")
+    return found
+
+
+def _with_controls(value: Any) -> Iterator[str]:
+    """Texts in tables and lists that hold a control character for which TOML has a letter."""
+    if isinstance(value, str):
+        if any(sign in value for sign in "\b\t\n\f\r"):
+            yield value
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _with_controls(item)
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def _quantity(name: str) -> tuple[Kind, BeforeValidator, WithJsonSchema]:
 
 def _printable(text: str) -> str:
     if not all(c.isprintable() or c == "\n" for c in text):
-        raise ValueError("text without control characters")
+        raise ValueError("text without control characters, which \\ and a letter between double quotes are")
     return text
 
 

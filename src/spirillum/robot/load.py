@@ -167,6 +167,8 @@ def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelen
     try:
         parsed = parse_toml(f"value = {value}", option, "PATH=VALUE")
     except InputError:
+        if "\\" in value and value.startswith('"'):
+            raise
         return path, value
     return path, parsed["value"] if set(parsed) == {"value"} else value
 
