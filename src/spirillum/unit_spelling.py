@@ -70,7 +70,7 @@ def _meanings(word: str, power: str, names: Mapping[str, frozenset[str]], *, loo
         yield word + power
         return
     singular = lower.removesuffix("s") if len(lower) >= _LONGEST_SYMBOL else lower
-    known = sorted(names.get(lower) or names.get(singular, ()))
+    known = sorted(names.get(lower, frozenset()) or names.get(singular, frozenset()))
     if not loose and not word.isupper():
         known = [name for name in known if name[0] == word[0]] or known
     yield from (name + power for name in known)

@@ -97,7 +97,7 @@ def test_slow_trials_swim_either_way_by_chance(tmp_path: Path) -> None:
     rows = np.array([[40, 25, 2.5, speed, 1.2] for speed in speeds])
     assert read_experiment(written(tmp_path / "o.csv", rows, header), [load(WIDE)]).advance.trials[0] == 5
     rows[:, 3] = (1.18, 1.24, -1.17, 1.2, 1.21)
-    with pytest.raises(InputError, match=r"row 4, column forward_velocity_mm_s: -1.17; allowed: positive, as"):
+    with pytest.raises(InputError, match=r"row 4, column forward_velocity_mm_s: -1.17; allowed: the same sign"):
         read_experiment(written(tmp_path / "w.csv", rows, header), [load(WIDE)])
 
 

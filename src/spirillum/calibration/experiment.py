@@ -252,8 +252,9 @@ def _check_signs(path: Path, observations: Sequence[Observation], by_channel: Ma
     for robot in by_channel.values():
         items = [item for item in observations if by_channel[round(item.channel_diameter, 9)] is robot]
         check_driven(path, items, robot)
-        reason = f"for the body turns against the {robot.tail.handedness}-handed tail"
-        check_signs(path, items, ["body_rate_Hz"], -driven_sense(robot), reason)
+        sense = -driven_sense(robot)
+        allowed = f"{'positive' if sense > 0 else 'negative'}, for the body turns against the "
+        check_signs(path, items, ["body_rate_Hz"], sense, f"{allowed}{robot.tail.handedness}-handed tail")
 
 
 def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
@@ -293,8 +294,8 @@ def _check_direction(path: Path, items: Sequence[Observation]) -> None:
             continue
         typical = float(np.median(others))
         if abs(speed) > 0.5 * abs(typical):
-            reason = f"as the other trials of its tail, which swim at {1e3 * typical:.4g}"
-            check_signs(path, items, ["forward_velocity_mm_s"], float(np.sign(typical)), reason)
+            allowed = f"the same sign as the other trials of its tail, which swim at {1e3 * typical:.4g}"
+            check_signs(path, items, ["forward_velocity_mm_s"], float(np.sign(typical)), allowed)
 
 
 @dataclass(frozen=True)

@@ -232,7 +232,7 @@ def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
 
 
 def check_signs(
-    path: str | Path, observations: Sequence[Observation], columns: Iterable[str], expected: float, reason: str
+    path: str | Path, observations: Sequence[Observation], columns: Iterable[str], expected: float, allowed: str
 ) -> None:
     """Refuse values whose sign contradicts the physics by more than their own error.
 
@@ -241,7 +241,7 @@ def check_signs(
         observations: the rows of one robot.
         columns: the columns to look at, of `RATES`.
         expected: sign that the values should have.
-        reason: why, for the sentence.
+        allowed: what the sentence says is allowed.
 
     Raises:
         InputError: if there are some; the sentence names column and rows.
@@ -252,10 +252,10 @@ def check_signs(
         stated = np.array([item.intervals[place] for item in observations]) / NORMAL
         wrong = wrong_signs(np.array(values), expected, stated, [item.tail for item in observations])
         if wrong.size:
-            rows, first = [observations[index].row for index in wrong], int(wrong[0])
+            rows, first = [observations[index].row for index in wrong.tolist()], int(wrong[0])
             raise InputError(
                 f"{path}, {rows_in_words(rows)}, column {column}: {values[first] / RATES[column]:.4g}{first_of(rows)}; "
-                f"allowed: {'positive' if expected > 0 else 'negative'}, {reason}"
+                f"allowed: {allowed}"
             )
 
 
@@ -271,8 +271,9 @@ def check_driven(path: str | Path, observations: Sequence[Observation], robot: R
     Raises:
         InputError: if there are some; the sentence names column and rows.
     """
-    reason = f"as the {robot.tail.handedness}-handed tail is driven"
-    check_signs(path, observations, ("tail_rate_Hz", "motor_rate_Hz"), driven_sense(robot), reason)
+    sense = driven_sense(robot)
+    allowed = f"{'positive' if sense > 0 else 'negative'}, as the {robot.tail.handedness}-handed tail is driven"
+    check_signs(path, observations, ("tail_rate_Hz", "motor_rate_Hz"), sense, allowed)
 
 
 def summarised(observations: Iterable[Observation]) -> dict[tuple[float, float, float], Observed]:

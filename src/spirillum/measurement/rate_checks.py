@@ -122,7 +122,7 @@ def _check_contradictions(path: str | Path, rates: Rates) -> None:
     allowed = np.clip(_BEYOND * np.fmax(scatter, rates.error / size), _AGREE, _CONTRADICT)
     wrong = np.flatnonzero(np.abs(off) > allowed)
     if wrong.size:
-        rows, first = [rates.rows[place] for place in wrong], int(wrong[0])
+        rows, first = [rates.rows[place] for place in wrong.tolist()], int(wrong[0])
         raise InputError(
             f"{path}, {rows_in_words(rows)}, column motor_rate_Hz: {rates.motor[first] / Hz:.4g}, but tail less body "
             f"rate is {difference[first] / Hz:.4g}{first_of(rows)}; allowed: equal within {100 * allowed[first]:.0f} %"
