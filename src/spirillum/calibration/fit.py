@@ -19,6 +19,7 @@ from spirillum.calibration.fit_warnings import (
     factor_misfit_warnings,
     friction_interval_warnings,
     friction_warnings,
+    inertia_warnings,
     misfit_warnings,
     narrow_channel_warnings,
     outlier_warnings,
@@ -102,6 +103,7 @@ def fit_model(
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name != "friction")
     problem = posed(experiment, model, names, progress, assumed, prepare=prepare)
+    inertia_warnings(experiment)
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)

@@ -81,6 +81,7 @@ REASONS = (
     "gap-too-wide",
     "tail-in-wall",
     "gap-too-thin",
+    "beyond-stokes",
     "other",
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
@@ -253,6 +254,7 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
         part["error_estimate"] = np.stack(errors, axis=-1)
     valid = np.stack([result.valid for result in free], axis=-1)
     reason = _reasons(task.batch, task.model)[:, None]
+    reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
     if loaded.posterior is not None and task.model == loaded.posterior.model:
         part |= _intervals(task, loaded, loaded.posterior)

@@ -29,6 +29,7 @@ from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
 from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
+from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import friction_reading
 
 __all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over"]
@@ -64,7 +65,7 @@ def intervals_of(
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
     size = posterior.count
-    batch, drawn = _drawn(robot, model, posterior, draws, placement or Placement())
+    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, placement or Placement())
     rates = None if tail_rate is None else np.full(size, tail_rate)
     coefficient = draws.get("friction_coefficient") if model.placed else None
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rates, friction=friction)
@@ -126,7 +127,7 @@ def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile
     """
     draws = posterior.of(robot, np.random.default_rng(1))
     size = posterior.count
-    batch, drawn = _drawn(robot, model, posterior, draws, Placement())
+    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, Placement())
     coefficient = draws.get("friction_coefficient") if model.placed else None
     rate = np.full(size, robot.hand * (posterior.tail_rate or 1.0))
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rate, friction="none")

@@ -31,8 +31,6 @@ from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import (
     accuracy_limits,
     calibration_warnings,
-    flow_limit,
-    in_stokes_flow,
     no_band_warnings,
 )
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
@@ -43,6 +41,7 @@ from spirillum.swimming.loading import prepared
 from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
+from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option, show
 
@@ -281,7 +280,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     check = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = case.swim(batch)
     if not result.valid[0]:
-        raise InputError(case.why_not())
+        raise InputError(case.why_not(result))
     warnings = [
         *ready.warnings,
         *([choice.caution] if choice.caution else []),
@@ -358,8 +357,7 @@ class _Case:
         found = (
             self.model.stated_speed_error(self.batch) if check is None else float(speed_difference(check, result)[0])
         )
-        flow = flow_limit(self.batch, abs(self.batch.placement.flow or 0.0)).value
-        return in_stokes_flow(found, result.reynolds_number, result.tail_reynolds_number, flow)
+        return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
     def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
         """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
@@ -388,8 +386,11 @@ class _Case:
         """What to be careful about in what was fitted."""
         return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
 
-    def why_not(self) -> str:
+    def why_not(self, result: Swimming) -> str:
         """Why there is no steady motion."""
+        limits = reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number)
+        if problem := stokes_flow_problem(self.batch, limits):
+            return problem
         if self.rate is not None:
             paper = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x"
             return (
