@@ -29,6 +29,7 @@ __all__ = [
     "TailError",
     "said_of_tail",
     "speed_note",
+    "tail_error",
     "walls_left_out",
     "what_is_fitted",
 ]
@@ -95,7 +96,7 @@ def said_of_tail(batch: RobotBatch, errors: Mapping[tuple[float, float], TailErr
     closest = min(apart, key=lambda tail: float(np.linalg.norm(apart[tail])))
     name = "wavelength {:g} mm, amplitude {:g} mm".format(*closest)
     if np.linalg.norm(apart[closest]) < _SAME:
-        of, found = f"against a resolved wire of this tail ({name})", errors[closest]
+        of = f"against a resolved wire of this tail ({name})"
     else:
         most = int(np.argmax(np.abs(apart[closest])))
         factor = float(np.exp(abs(apart[closest][most])))
@@ -104,13 +105,18 @@ def said_of_tail(batch: RobotBatch, errors: Mapping[tuple[float, float], TailErr
             f"this tail by up to a factor of {factor:.3g} ({_SHAPE[most]} {_resolved_shape(*closest)[most]:.3g}, here "
             f"{own[most]:.3g})"
         )
-        found = _interpolated(own, errors)
-    drag, thrust, torque = (f"{value:+.{3 if abs(value) >= 100 else 2}g} %" for value in found)
+    drag, thrust, torque = (f"{value:+.{3 if abs(value) >= 100 else 2}g} %" for value in tail_error(batch, errors))
     return f"{of}: drag {drag}, thrust {thrust}, axial torque {torque} of the tail"
 
 
-def _interpolated(own: Samples, errors: Mapping[tuple[float, float], TailError]) -> TailError:
-    """Errors of a tail of this shape that is none of the resolved ones."""
+def tail_error(batch: RobotBatch, errors: Mapping[tuple[float, float], TailError]) -> TailError:
+    """Return the errors of a model on the tail of a batch of one, interpolated between the resolved tails.
+
+    Args:
+        batch: one robot.
+        errors: of the model, by resolved tail.
+    """
+    own = _shape(batch)
     at = np.log([_resolved_shape(*tail)[:_RESOLVED] for tail in errors])
     place = np.clip(np.log(own[:_RESOLVED]), at.min(axis=0), at.max(axis=0))
     known = np.log1p(0.01 * np.array(list(errors.values())))

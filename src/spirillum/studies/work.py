@@ -20,7 +20,7 @@ from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
-from spirillum.swimming.intervals import intervals_of
+from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
 from spirillum.swimming.steady import requirements, swim
 
 __all__ = [
@@ -323,6 +323,7 @@ def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Par
         robot = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction))
         for column, reading in enumerate(readings):
             found = intervals_of(robot, model, posterior, tail_rate=None, friction=reading)
+            found = found if knows_torque(robot, model) else without_torque(found)
             for name in WITH_INTERVALS:
                 part[f"{name}_interval_low"][number, column] = found.low[name]
                 part[f"{name}_interval_high"][number, column] = found.high[name]

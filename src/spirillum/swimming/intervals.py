@@ -32,8 +32,19 @@ from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import friction_reading
 
-__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over"]
+__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over", "knows_torque", "without_torque"]
 
+OF_TORQUE = (
+    "tail_torque",
+    "drive_torque",
+    "effective_friction",
+    "motor_residual_torque",
+    "shaft_power",
+    "friction_power",
+    "dissipated_power",
+    "hydrodynamic_efficiency",
+)
+"""Quantities that the torque of the model decides."""
 _ELECTRIC = ("torque_constant", "back_emf_constant")
 _WIRE_POINTS = 7
 
@@ -112,6 +123,20 @@ def intervals_over(
         {name: float(limits[name][place]) if name in limits else nan for name in values} for place in range(3)
     )
     return Intervals(low, high, middle)
+
+
+def knows_torque(robot: Robot, model: SwimmerModel) -> bool:
+    """Return whether the discrepancy of a model's torque is known: not where it leaves the walls of a robot's tube out.
+
+    Observations are of speeds and rates. What walls do to the torque moves none of them, for B_eff takes it up.
+    """
+    return model.placed or robot.channel is None
+
+
+def without_torque(found: Intervals) -> Intervals:
+    """Return the intervals without those of torques and of what follows from them."""
+    nan = dict.fromkeys(OF_TORQUE, float("nan"))
+    return Intervals({**found.low, **nan}, {**found.high, **nan}, found.middle)
 
 
 def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:

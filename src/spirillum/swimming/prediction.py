@@ -187,6 +187,10 @@ _IN_A_FLOW = (
     "the imposed flow does work on the robot too: efficiencies and cost of transport are of its velocity in the lab, "
     "and do not compare with those of a robot in fluid at rest"
 )
+_NO_TORQUE = (
+    "torques, B_eff and what follows from them have no intervals: model '{}' leaves the walls out, and no observed "
+    "speed or rate tells what these do to the torque; a fit with model 'tube' gives them"
+)
 _NO_WEIGHT = (
     "body.mass or tail.density is unset: nothing tells that its weight keeps the robot on the floor, where it is taken "
     "to lie; allowed: both of them, or its place (--gap, --eccentricity)"
@@ -266,13 +270,15 @@ def predict(  # noqa: PLR0913 - the options of the command
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     whose = posterior_for_of(posterior_for, drawn, ready)
-    intervals = None
+    intervals, torque = None, []
     if drawn is not None:
-        from spirillum.swimming.intervals import intervals_of  # loads compiled loops
+        from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque  # loads compiled loops
 
         intervals = intervals_of(
             ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
         )
+        if not knows_torque(ready, chosen):
+            intervals, torque = without_torque(intervals), [_NO_TORQUE.format(chosen.name)]
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
@@ -296,7 +302,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     idle = [] if drawn is None or over is None else fitted.outside_warnings(ready, chosen, drawn, friction=acts)
     if idle:
         intervals = None
-    warnings += idle or case.fitted_warnings()
+    warnings += idle or [*case.fitted_warnings(), *torque]
     return Prediction(
         robot=ready,
         model=chosen,
