@@ -157,7 +157,7 @@ def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Sa
     Raises:
         InputError: naming the least rate at which it does so far.
     """
-    found = {}
+    found: dict[str, str] = {}
     for rate, one, turned in zip(rates.tolist(), speed, turning, strict=True):
         limits = reynolds_limits(batch, body_reynolds(batch, one), tail_reynolds(batch, turned))
         if problem := stokes_flow_problem(batch, limits):
