@@ -4,7 +4,8 @@
 
 In a ```console block every line that starts with `$ ` is run: `spirillum ...`, or `echo $?` for the last exit code.
 Commands have to succeed unless `echo $?` follows. A line `...` stands for any lines. A block that shows no output at
-all is filled by --write, which also renews outputs without `...`. In a ```pycon block each `>>>` is run as a doctest.
+all is filled by --write, which also renews outputs without `...`. In a ```pycon block each `>>>` is run as a doctest,
+and renewed likewise. A ```python block has to compile, and below a line `<!-- run -->` to run.
 A ```toml or ```text block whose first line is `# NAME.toml` or `# NAME.csv` is a file that the commands of the page
 find. All blocks of a page share one temporary folder. A block below a line `<!-- slow -->` runs only with --slow or
 --write; no later block of its page may depend on it.
@@ -26,7 +27,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent
 WIDTH = "100"
-_FENCE = re.compile(r"^(<!-- slow -->\n)?```(console|pycon|toml|text)\n(.*?)^```$", re.M | re.S)
+_FENCE = re.compile(r"^(<!-- (?:slow|run) -->\n)?```(console|pycon|python|toml|text)\n(.*?)^```$", re.M | re.S)
 _FILE = re.compile(r"# ([\w-]+\.(?:toml|csv))\b")
 
 
@@ -97,15 +98,50 @@ def run_console(block: str, problems: list[str]) -> str:
     return "\n".join(renewed) + "\n"
 
 
-def run_python(block: str, names: dict[str, Any], page: Path, problems: list[str]) -> None:
-    """Run a pycon block as a doctest in the page's names."""
-    test = doctest.DocTestParser().get_doctest(block, names, page.name, str(page), 0)
-    report = io.StringIO()
-    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS, verbose=False)
-    runner.run(test, out=report.write, clear_globs=False)
+class _Session(doctest.DocTestRunner):
+    """Runs a doctest and keeps what each of its examples prints."""
+
+    def __init__(self) -> None:
+        super().__init__(optionflags=doctest.ELLIPSIS, verbose=False)
+        self.got: dict[int, str] = {}
+        """Output by the line of the example."""
+
+    def report_success(self, out: Any, test: doctest.DocTest, example: doctest.Example, got: str) -> None:  # noqa: ARG002
+        self.got[example.lineno] = got
+
+    def report_failure(self, out: Any, test: doctest.DocTest, example: doctest.Example, got: str) -> None:
+        self.got[example.lineno] = got
+        super().report_failure(out, test, example, got)
+
+
+def run_session(block: str, names: dict[str, Any], page: Path, problems: list[str]) -> str:
+    """Run a pycon block as a doctest in the page's names; return it with its outputs renewed."""
+    parser, session, report = doctest.DocTestParser(), _Session(), io.StringIO()
+    test = parser.get_doctest(block, names, page.name, str(page), 0)
+    session.run(test, out=report.write, clear_globs=False)
     names.update(test.globs)
-    if runner.summarize(verbose=False).failed:
+    if session.summarize(verbose=False).failed:
         problems.append(report.getvalue())
+    renewed = []
+    for piece in parser.parse(block):
+        if isinstance(piece, str):
+            renewed.append(piece)
+            continue
+        first, *more = piece.source.splitlines()
+        output = piece.want if "..." in piece.want else session.got.get(piece.lineno, piece.want)
+        lines = [line or "<BLANKLINE>" for line in output.splitlines()]
+        renewed += [f"{line}\n" for line in (f">>> {first}", *(f"... {line}".rstrip() for line in more), *lines)]
+    return "".join(renewed)
+
+
+def run_code(block: str, names: dict[str, Any] | None, page: Path, problems: list[str]) -> None:
+    """Compile a python block, and run it in the page's names; None: only compile it."""
+    try:
+        code = compile(block, page.name, "exec")
+        if names is not None:
+            exec(code, names)  # noqa: S102 - the documentation's own code
+    except Exception as error:
+        problems.append(f"a python block raises {type(error).__name__}: {error}\n{block}")
 
 
 def run_page(page: Path, *, slow: bool = False) -> tuple[list[str], str]:
@@ -116,12 +152,14 @@ def run_page(page: Path, *, slow: bool = False) -> tuple[list[str], str]:
 
     def run(found: re.Match[str]) -> str:
         mark, kind, block = found.groups()
-        if mark and not slow:
+        if mark and "slow" in mark and not slow:
             return found[0]
         if kind == "console":
             block = run_console(block, problems)
         elif kind == "pycon":
-            run_python(block, names, page, problems)
+            block = run_session(block, names, page, problems)
+        elif kind == "python":
+            run_code(block, names if mark else None, page, problems)
         elif named := _FILE.match(block):
             Path(named[1]).write_text(block, encoding="utf-8")
         return f"{mark or ''}```{kind}\n{block}```"

@@ -34,7 +34,7 @@ def _loaded(path: Path) -> ModuleType:
 
 BLOCKS = _loaded(DOCS / "run_blocks.py")
 LISTINGS = _loaded(DOCS / "write_listings.py")
-RUNNABLE = [page for page in BLOCKS.pages() if re.search(r"^```(console|pycon)$", page.read_text("utf-8"), re.M)]
+RUNNABLE = [page for page in BLOCKS.pages() if re.search(r"^```(console|pycon|python)$", page.read_text("utf-8"), re.M)]
 WITH_SLOW = [page for page in RUNNABLE if "<!-- slow -->" in page.read_text("utf-8")]
 LISTED = [page for page in sorted(DOCS.glob("*.md")) if LISTINGS.MARKED.search(page.read_text("utf-8"))]
 WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
@@ -67,6 +67,37 @@ def _compare(page: Path, *, slow: bool) -> None:
 @pytest.mark.parametrize("page", RUNNABLE, ids=lambda path: path.stem)
 def test_page_shows_what_its_commands_and_python_print(page: Path) -> None:
     _compare(page, slow=False)
+
+
+def test_a_stale_output_of_python_is_a_problem_and_is_renewed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```pycon\n>>> for number in (1, 2):\n...     print(number * 1.5)\n1.5\n3.1\n\n>>> 'a'\n...\n'a'\n```\n"
+        "```pycon\n>>> print('kept 17 ms')\nkept ... ms\n>>> print('a\\n\\nb')\na\n```\n",
+        encoding="utf-8",
+    )
+    problems, renewed = BLOCKS.run_page(page)
+    assert len(problems) == 2
+    assert "Got:\n    1.5\n    3.0\n" in problems[0]
+    page.write_text(renewed, encoding="utf-8")
+    assert "1.5\n3.0\n" in renewed
+    assert "kept ... ms" in renewed
+    assert "a\n<BLANKLINE>\nb\n" in renewed
+    assert BLOCKS.run_page(page) == ([], renewed)
+
+
+def test_python_without_prompts_compiles_and_runs_where_it_is_asked_to(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    for text, words in (
+        ("```python\nundefined.name\n```\n", None),
+        ("```python\nx = = 1\n```\n", "SyntaxError"),
+        ("<!-- run -->\n```python\nundefined.name\n```\n", "NameError"),
+        ("<!-- run -->\n```python\nx = 2\n```\n```pycon\n>>> x\n2\n```\n", None),
+    ):
+        page.write_text(text, encoding="utf-8")
+        problems, renewed = BLOCKS.run_page(page)
+        assert renewed == text
+        assert [words in problem for problem in problems] == [True] * (words is not None)
 
 
 @pytest.mark.slow

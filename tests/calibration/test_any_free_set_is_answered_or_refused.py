@@ -30,7 +30,7 @@ def test_a_number_of_the_motor_alone_is_fitted(made: Callable[..., Path], free: 
 
 
 def test_draws_that_differ_in_the_back_emf_alone_are_predicted(made: Callable[..., Path]) -> None:
-    problem = sp.calibrate(made(**SMALL), WIDE, free="back_emf_constant", method="least-squares").problem
+    problem = sp.calibrate(made(**SMALL), WIDE, free="back_emf_constant", method="least-squares", model="sbt").problem
     z = np.array([[-1.0], [0.0], [1.0]])
     together = problem.predicted(z)
     for n in range(3):
@@ -61,7 +61,7 @@ def test_an_interruption_while_sampling_prints_nothing(
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a worker of the tests ignores the signal
     try:
         with pytest.raises(KeyboardInterrupt):
-            sp.calibrate(made(**SMALL), WIDE)
+            sp.calibrate(made(**SMALL), WIDE, model="sbt")
     finally:
         signal.signal(signal.SIGINT, handler)
     assert capfd.readouterr() == ("", "")

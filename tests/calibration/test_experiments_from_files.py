@@ -44,7 +44,7 @@ def test_means_with_intervals_give_nearly_what_their_trials_give(made: Callable[
         cells += [b.value / 2 / np.pi, 1e3 * u.half_width, w.half_width / 2 / np.pi, b.half_width / 2 / np.pi]
         lines.append(",".join(f"{cell:.10g}" for cell in cells))
     (tmp_path / "means.csv").write_text("\n".join(lines) + "\n")
-    trials, means = (sp.calibrate(p, WIDE, method="least-squares") for p in (path, tmp_path / "means.csv"))
+    trials, means = (sp.calibrate(p, WIDE, method="least-squares", model="sbt") for p in (path, tmp_path / "means.csv"))
     for name, item in trials.values.items():
         assert means.values[name].value == pytest.approx(item.value, rel=0.01)
     # Without the trials nobody knows that rate and speed of a trial go together: its error looks larger.

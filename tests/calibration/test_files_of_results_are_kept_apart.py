@@ -16,7 +16,7 @@ WIDE = "biorob2012-wide"
 @pytest.fixture(scope="module")
 def found(made: Callable[..., Path]) -> Any:
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
-    return sp.calibrate(made(**small, seed=4), WIDE, method="least-squares")
+    return sp.calibrate(made(**small, seed=4), WIDE, method="least-squares", model="sbt")
 
 
 def small_figures(_found: Any) -> dict[str, Any]:

@@ -94,28 +94,28 @@ def test_what_no_observation_tells_stays_at_its_prior(made: Callable[..., Path],
 def test_a_slip_of_units_is_refused(made: Callable[..., Path], tmp_path: Path, factor: float, method: str) -> None:
     path = scaled(made(**FOUR, seed=5), tmp_path / "o.csv", "forward_velocity_mm_s", factor)
     with pytest.raises(InputError, match="allowed"):
-        sp.calibrate(path, WIDE, method=method)
+        sp.calibrate(path, WIDE, method=method, model="sbt")
 
 
 def test_a_trial_that_swims_against_the_others_is_refused(made: Callable[..., Path], tmp_path: Path) -> None:
     path = scaled(made(**FOUR, seed=5), tmp_path / "o.csv", "forward_velocity_mm_s", -1.0, slice(6, 7))
     with pytest.raises(InputError, match=r"row 9, column forward_velocity_mm_s: .* allowed: the same sign"):
-        sp.calibrate(path, WIDE, method="least-squares")
+        sp.calibrate(path, WIDE, method="least-squares", model="sbt")
 
 
 @pytest.mark.parametrize("method", ["least-squares", "paper"])
 def test_an_outlying_trial_is_named_by_its_row(made: Callable[..., Path], tmp_path: Path, method: str) -> None:
     path = made(**FOUR, seed=5)
-    assert not sp.calibrate(path, WIDE, method=method).experiment.outliers
+    assert not sp.calibrate(path, WIDE, method=method, model="sbt").experiment.outliers
     wrong = scaled(path, tmp_path / "o.csv", "forward_velocity_mm_s", 10.0, slice(6, 7))
-    found = sp.calibrate(wrong, WIDE, method=method)
+    found = sp.calibrate(wrong, WIDE, method=method, model="sbt")
     assert any(w.startswith("row 9, column forward_velocity_mm_s: ") and "an outlier" in w for w in found.warnings)
 
 
 def test_a_tail_that_is_off_all_others_is_named_by_its_rows(made: Callable[..., Path], tmp_path: Path) -> None:
     path = made(**FOUR | {"amplitudes": (1.5, 2.0, 2.5, 3.0)}, seed=5)
     wrong = scaled(path, tmp_path / "o.csv", "forward_velocity_mm_s", 3.0, slice(5, 10))
-    found = sp.calibrate(wrong, WIDE, method="least-squares")
+    found = sp.calibrate(wrong, WIDE, method="least-squares", model="sbt")
     assert any(w.startswith("row 8, 9, 10, 11, 12: the speed of channel 40 mm") for w in found.warnings)
 
 
@@ -134,7 +134,7 @@ def test_trials_that_are_equal_in_every_number_are_named(made: Callable[..., Pat
     ]
     copied = tmp_path / "copied.csv"
     copied.write_text("\n".join(",".join(row) for row in [*rows, rows[1], rows[1]]) + "\n")
-    said = sp.calibrate(copied, WIDE, method="least-squares").warnings
+    said = sp.calibrate(copied, WIDE, method="least-squares", model="sbt").warnings
     assert any(line.startswith("rows 2, 22, 23 are equal in every number: copies of one trial") for line in said)
 
 
@@ -145,7 +145,7 @@ def test_the_mean_of_a_robots_motor_has_the_errors_of_tail_and_body(tmp_path: Pa
     file.write_text(
         "\n".join([f"{names},forward_velocity_mm_s_ci95,tail_rate_Hz_ci95,body_rate_Hz_ci95", *rows]) + "\n"
     )
-    found = sp.calibrate(file, WIDE, method="least-squares")
+    found = sp.calibrate(file, WIDE, method="least-squares", model="sbt")
     assert not any("states no error" in line for line in found.warnings)
 
 
@@ -153,13 +153,13 @@ def test_one_tail_alone_is_not_said_to_be_missed(made: Callable[..., Path]) -> N
     """There the discrepancy is its prior, which says nothing of the model."""
     one = {"wavelengths": (25.0,), "amplitudes": (2.5,), "presets": (WIDE,)}
     for free in ("body_drag", None):
-        found = sp.calibrate(made(**one, seed=7), WIDE, free=free, method="least-squares")
+        found = sp.calibrate(made(**one, seed=7), WIDE, free=free, method="least-squares", model="sbt")
         assert not any("from tail to tail, beyond" in warning for warning in found.warnings)
         assert any("the intervals take what models of this kind miss by" in warning for warning in found.warnings)
 
 
 def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:
-    found = sp.calibrate(made(**FOUR, seed=5, drag=(60.0,)), WIDE, method="least-squares")
+    found = sp.calibrate(made(**FOUR, seed=5, drag=(60.0,)), WIDE, method="least-squares", model="sbt")
     assert any(w.startswith("body_drag = ") and "from the middle of its prior" in w for w in found.warnings)
     with pytest.raises(InputError, match="body_drag comes out as"):
         sp.calibrate(made(**FOUR, seed=5, drag=(600.0,)), WIDE, method="paper")
@@ -183,18 +183,22 @@ def test_a_wrong_model_is_said_to_miss_without_repeated_trials_too(made: Callabl
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     means = [lines[0].replace("trial,", "trials,"), *(line.replace(",1,", ",3,", 1) for line in lines[1:])]
     (tmp_path / "means.csv").write_text("\n".join(means) + "\n")
-    several = sp.calibrate(tmp_path / "means.csv", WIDE, method="least-squares").warnings
+    several = sp.calibrate(tmp_path / "means.csv", WIDE, method="least-squares", model="sbt").warnings
     assert any("has means without the scatter of their trials" in warning for warning in several)
     assert not any("observed once" in warning for warning in several)
 
 
 def test_a_number_that_was_pulled_far_is_not_called_unidentifiable(made: Callable[..., Path]) -> None:
-    found = sp.calibrate(made(**FOUR, seed=22, friction=3e-5), WIDE, method="least-squares", free="viscosity")
+    found = sp.calibrate(
+        made(**FOUR, seed=22, friction=3e-5), WIDE, method="least-squares", free="viscosity", model="sbt"
+    )
     assert any("standard deviations from the middle of its prior" in warning for warning in found.warnings)
     assert not any("hardly identifiable" in warning for warning in found.warnings)
     assert any("the rotor's own B_m alone, for friction.effective is unset" in warning for warning in found.warnings)
     rubbing = {"extends": WIDE, "friction": {"effective": "3e-5 N m s/rad"}}
-    known = sp.calibrate(made(**FOUR, seed=22, friction=3e-5), rubbing, method="least-squares", free="viscosity")
+    known = sp.calibrate(
+        made(**FOUR, seed=22, friction=3e-5), rubbing, method="least-squares", free="viscosity", model="sbt"
+    )
     assert not any("B_m" in warning for warning in known.warnings)
 
 
@@ -225,14 +229,16 @@ def test_friction_as_printed_says_that_it_does_not_give_the_rates_back(made: Cal
 def test_rates_in_radians_are_suspected(made: Callable[..., Path], tmp_path: Path) -> None:
     path = scaled(made(**FOUR, seed=24), tmp_path / "a.csv", "tail_rate_Hz", 2 * np.pi)
     path = scaled(path, tmp_path / "b.csv", "body_rate_Hz", 2 * np.pi)
-    found = sp.calibrate(path, WIDE, method="least-squares")
+    found = sp.calibrate(path, WIDE, method="least-squares", model="sbt")
     assert any("are the rates in Hz, turns a second, and not in rad/s" in warning for warning in found.warnings)
 
 
 def test_every_value_lies_inside_its_interval(made: Callable[..., Path]) -> None:
     free = "body_drag,viscosity,torque_constant,shared_friction"
     stated = {"motor.torque_constant": "20%"}
-    found = sp.calibrate(made(**FOUR, seed=25), WIDE, method="least-squares", free=free, assume_uncertainty=stated)
+    found = sp.calibrate(
+        made(**FOUR, seed=25), WIDE, method="least-squares", free=free, assume_uncertainty=stated, model="sbt"
+    )
     items = [*found.values.values(), *found.discrepancy.values(), *found.friction]
     assert all(item.low <= item.value <= item.high for item in items)
     assert all(item.value > 0 for item in found.discrepancy.values())

@@ -115,7 +115,7 @@ def test_a_fit_refuses_a_field_that_it_does_not_look_at(run: Callable[..., Any],
     ("command", "sentence"),
     [
         (("calibrate", "--set", "tail.wavelength=20 mm"), "tail.wavelength is set, and the observations say the"),
-        (("calibrate", "--prepare"), "prepare with model 'sbt', which takes no tables"),
+        (("calibrate", "--prepare", "--model", "sbt"), "prepare with model 'sbt', which takes no tables"),
         (("calibrate", "--method", "paper", "--seed", "1"), "--seed with method 'paper', which samples no posterior"),
         (("rank-models", "--set", "tail.amplitude=2 mm"), "tail.amplitude is set, and the observations say the"),
         (("rank-models", "--set", "calibration.rft.body_drag=30"), "calibration.rft.body_drag is set, and the fit"),

@@ -19,7 +19,7 @@ TRUTH = 1.1e-5
 
 
 def fitted(path: Path, robots: Any = WIDE, **options: Any) -> Any:
-    return sp.calibrate(path, robots, **{"method": "least-squares", **options})
+    return sp.calibrate(path, robots, **{"method": "least-squares", "model": "sbt", **options})
 
 
 @pytest.mark.parametrize("reading", ["rotor", "paper"])
@@ -59,7 +59,7 @@ def test_stated_uncertainties_widen_the_intervals_by_their_share(made: Callable[
         fitted(path, assume_uncertainty={"motor.torque_constant": 0.08, "fluid.viscosity": 0.1}),
     )
     change = alone.friction_sensitivity
-    for place, (one, other) in enumerate(zip(alone.friction, stated.friction, strict=True)):
+    for place, (one, other) in enumerate(zip(alone.friction_within_model, stated.friction_within_model, strict=True)):
         expected = np.sqrt(
             (0.5 * (one.high - one.low)) ** 2
             + (0.08 * change["motor.torque_constant"][place]) ** 2
@@ -67,7 +67,7 @@ def test_stated_uncertainties_widen_the_intervals_by_their_share(made: Callable[
         )
         assert 0.5 * (other.high - other.low) == pytest.approx(expected, rel=0.08)
         assert other.value == one.value
-    assert stated.friction_given == alone.friction
+    assert stated.friction_given == alone.friction_within_model
 
 
 def coverage(made: Callable[..., Path], count: int) -> tuple[float, float]:
@@ -86,7 +86,7 @@ def coverage(made: Callable[..., Path], count: int) -> tuple[float, float]:
             overrides={"fluid.viscosity": f"{viscosity} Pa s"},
         )
         found = fitted(path, PRESETS, assume_uncertainty={"fluid.viscosity": "14%"})
-        stated += [item.low <= TRUTH <= item.high for item in found.friction]
+        stated += [item.low <= TRUTH <= item.high for item in found.friction_within_model]
         unstated += [item.low <= TRUTH <= item.high for item in found.friction_given]
     return float(np.mean(stated)), float(np.mean(unstated))
 
@@ -124,7 +124,7 @@ def test_intervals_hold_the_truth_where_single_trials_state_their_errors(
     for seed in range(4):
         path = _with_stated_errors(exact, np.random.default_rng(seed), tmp_path / "observations.csv")
         found = fitted(path, PRESETS)
-        held += [item.low <= TRUTH <= item.high for item in found.friction]
+        held += [item.low <= TRUTH <= item.high for item in found.friction_within_model]
     # 95 % of 128 is 122; fewer than 113 or more than 127 would happen once in a thousand such tests.
     assert 113 <= sum(held) <= 127
     words = " ".join(found.warnings)
@@ -141,7 +141,9 @@ def test_the_scatter_of_trials_holds_their_stated_errors(made: Callable[..., Pat
         halves = [share and share * float(row.split(",")[6]) for row in rows]
         lines = [comment, f"{header},motor_rate_Hz_ci95", *(f"{row},{h}" for row, h in zip(rows, halves, strict=True))]
         (tmp_path / "stated.csv").write_text("\n".join(lines) + "\n")
-        widths.append(np.array([item.high - item.low for item in fitted(tmp_path / "stated.csv").friction]))
+        widths.append(
+            np.array([item.high - item.low for item in fitted(tmp_path / "stated.csv").friction_within_model])
+        )
     assert widths[1] == pytest.approx(widths[0], rel=1e-9)
     assert np.all(widths[2] > 2.0 * widths[0])
 
@@ -210,7 +212,7 @@ def test_wrong_statements_are_refused(
 ) -> None:
     options = [item if item.startswith("--") else f"--assume-uncertainty={item}" for item in given]
     with pytest.raises(SystemExit) as stopped:
-        main(["calibrate", str(made(**FOUR)), WIDE, "-o", str(tmp_path), "--no-figures", *options])
+        main(["calibrate", str(made(**FOUR)), WIDE, "--model=sbt", "-o", str(tmp_path), "--no-figures", *options])
     assert stopped.value.code == 2
     assert words in capsys.readouterr().err
 

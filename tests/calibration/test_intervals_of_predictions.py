@@ -23,7 +23,7 @@ WIDE = "biorob2012-wide"
 def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A posterior from tails of two amplitudes; the model misses each tail by 3 %."""
     small = {"presets": (WIDE,), "drag": (2.5,), "rotation": (0.8,), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
-    found = sp.calibrate(made(**small, seed=4), WIDE, sampling=SHORT)
+    found = sp.calibrate(made(**small, seed=4), WIDE, sampling=SHORT, model="sbt")
     assert found.converged
     folder = tmp_path_factory.mktemp("fitted")
     write_calibration(found, folder, figures=False)

@@ -14,7 +14,7 @@ PRESETS = ["biorob2012-wide", "biorob2012-narrow"]
 
 def test_planted_factors_come_back_without_noise(made: Callable[..., Path]) -> None:
     path = made(error=0.0, trials=1, drag=(2.2, 4.1), rotation=(0.7, 1.3))
-    found = sp.calibrate(path, PRESETS, method="least-squares")
+    found = sp.calibrate(path, PRESETS, method="least-squares", model="sbt")
     assert found.values["body_drag[40 mm]"].value == pytest.approx(2.2, rel=1e-6)
     assert found.values["body_rotation[30 mm]"].value == pytest.approx(1.3, rel=1e-6)
     assert any("observed once for each tail" in warning for warning in found.warnings)
@@ -48,9 +48,9 @@ def test_a_wrong_model_says_by_how_much_it_misses(made: Callable[..., Path]) -> 
 
 def test_the_answer_takes_less_than_a_second(made: Callable[..., Path]) -> None:
     path = made()
-    sp.calibrate(path, PRESETS, method="least-squares")
+    sp.calibrate(path, PRESETS, method="least-squares", model="sbt")
     start = time.process_time()  # other programs on the machine do not count
-    sp.calibrate(path, PRESETS, method="least-squares")
+    sp.calibrate(path, PRESETS, method="least-squares", model="sbt")
     assert time.process_time() - start < 1.0
 
 
@@ -76,7 +76,7 @@ def test_a_direction_that_nothing_sees_is_named_and_keeps_the_width_of_its_state
 def test_profiles_are_parabolas_with_the_curvature_of_the_covariance(made: Callable[..., Path]) -> None:
     from spirillum.calibration.identifiability import profiles
 
-    found = sp.calibrate(made(), PRESETS, method="least-squares")
+    found = sp.calibrate(made(), PRESETS, method="least-squares", model="sbt")
     assert found.least_squares is not None
     for profile in profiles(found.problem, found.least_squares, count=5):
         assert profile.misfit == pytest.approx([9.0, 2.25, 0.0, 2.25, 9.0], rel=0.03, abs=1e-6)

@@ -45,7 +45,7 @@ def test_chains_that_have_not_mixed_are_refused_loudly(
     made: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hasty = Sampling(ensembles=2, walkers=24, warm_up=2, steps=10, doublings=0)
-    found = sp.calibrate(made(), [WIDE, "biorob2012-narrow"], sampling=hasty)
+    found = sp.calibrate(made(), [WIDE, "biorob2012-narrow"], sampling=hasty, model="sbt")
     assert not found.converged
     assert found.warnings[0].startswith("the posterior may not be used")
     write_calibration(found, tmp_path, figures=False)
@@ -55,14 +55,14 @@ def test_chains_that_have_not_mixed_are_refused_loudly(
 
     monkeypatch.setattr("spirillum.calibration.posterior.Sampling", lambda **_: hasty)
     with pytest.raises(SystemExit) as stopped:
-        main(["calibrate", str(made()), WIDE, "biorob2012-narrow", "-o", str(tmp_path), "--no-figures"])
+        main(["calibrate", str(made()), WIDE, "biorob2012-narrow", "--model=sbt", "-o", str(tmp_path), "--no-figures"])
     assert stopped.value.code == 1
     assert "the posterior may not be used" in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_same_seed_gives_the_same_draws(made: Callable[..., Path]) -> None:
     few = Sampling(ensembles=2, walkers=24, warm_up=5, steps=20, doublings=0, seed=3)
-    settings: dict[str, Any] = {"robots": [WIDE, "biorob2012-narrow"], "sampling": few}
+    settings: dict[str, Any] = {"robots": [WIDE, "biorob2012-narrow"], "sampling": few, "model": "sbt"}
     first, second = (sp.calibrate(made(), **settings).posterior for _ in range(2))
     assert first is not None
     assert second is not None

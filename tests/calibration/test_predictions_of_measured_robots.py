@@ -109,7 +109,7 @@ def test_intervals_hold_the_truth_of_measured_robots() -> None:
 @pytest.fixture(scope="module")
 def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Any:
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.06}
-    found = sp.calibrate(made(**small, seed=4), WIDE, sampling=SHORT)
+    found = sp.calibrate(made(**small, seed=4), WIDE, sampling=SHORT, model="sbt")
     assert found.converged
     folder = tmp_path_factory.mktemp("measured")
     write_calibration(found, folder, figures=False)
@@ -141,7 +141,7 @@ def test_a_measured_robot_is_predicted_at_its_own_mean(fitted: Any) -> None:
 def test_the_own_drive_of_a_measured_robot_gives_back_its_rates(made: Callable[..., Path], tmp_path: Path) -> None:
     """B_eff was inferred with the body rate that was seen, and not with that of a draw, which the model misses."""
     one = {"presets": (WIDE,), "wavelengths": (25.0,), "amplitudes": (2.5,), "error": 0.002, "pace": 0.0005}
-    found = sp.calibrate(made(**one, seed=6), WIDE, sampling=SHORT)
+    found = sp.calibrate(made(**one, seed=6), WIDE, sampling=SHORT, model="sbt")
     write_calibration(found, tmp_path / "fitted", figures=False)
     answer = sp.predict(
         found.experiment.robots[0], posterior=tmp_path / "fitted" / "posterior.nc", posterior_for="measured"

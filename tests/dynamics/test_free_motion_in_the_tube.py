@@ -180,6 +180,7 @@ def test_where_inertia_rules_no_motion_has_an_error_estimate() -> None:
         with pytest.raises(sp.InputError, match=r"Reynolds number .* allowed: at most 10"):
             sp.predict(fast, motion=motion)
     assert np.isnan(sp.predict(fast, beyond_stokes=True).error_estimate)
+    fast = sp.load("biorob2012-wide", **{"fluid.viscosity": "20 mPa s", "model.beyond_stokes": "on"})
     run = sp.simulate(fast, model="tube", timing={"duration": "1 s"})
     assert "at the largest speed of the run" in run.attrs["warnings"]
     assert np.isnan(run.attrs["error_estimate"])

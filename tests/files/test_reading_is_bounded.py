@@ -36,7 +36,7 @@ def test_nobody_waits_for_a_pipe(pipe: Path, soon: Soon, kind: str) -> None:
         "robot": lambda: sp.load(pipe.rename(pipe.with_suffix(".toml"))),
         "study": lambda: sp.study(pipe),
         "run": lambda: sp.film(pipe, pipe.with_name("f.mp4")),
-        "observations": lambda: sp.calibrate(pipe, WIDE),
+        "observations": lambda: sp.calibrate(pipe, WIDE, model="sbt"),
         "video": lambda: _opened_video(pipe),
         "posterior": lambda: read_posterior(pipe),
     }
@@ -309,7 +309,7 @@ def test_names_that_are_none_get_a_sentence(name: str) -> None:
         lambda: sp.measure("a.mp4", name),
         lambda: sp.measure("a.mp4", "s.toml", marks=name),
         lambda: sp.study(observations=name),
-        lambda: sp.calibrate(name, WIDE),
+        lambda: sp.calibrate(name, WIDE, model="sbt"),
         lambda: sp.export(WIDE, f"{name}.stl"),
         lambda: sp.study({"title": "t", "robots": [WIDE]}, output=name),
         lambda: sp.virtual_experiment(output=name),

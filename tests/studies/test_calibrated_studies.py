@@ -26,7 +26,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A posterior of a synthetic experiment in both channels."""
     folder = tmp_path_factory.mktemp("fitted")
     path = synthetic(folder / "o.csv", wavelengths=(15.0, 20.0), amplitudes=(1.5, 2.5), discrepancy=0.02)
-    found = sp.calibrate(path, [WIDE, NARROW], sampling=SHORT)
+    found = sp.calibrate(path, [WIDE, NARROW], sampling=SHORT, model="sbt")
     assert found.converged
     write_calibration(found, folder, figures=False)
     return folder

@@ -91,7 +91,7 @@ def test_constants_of_the_motors_shaft_are_what_is_fitted(tmp_path: Any) -> None
     found = sp.calibrate(path, truth, method="paper", free="body_drag,body_rotation,friction")
     for item in found.friction:
         assert item.value == pytest.approx(4e-5, rel=1e-9)
-    fitted = sp.calibrate(path, truth, method="least-squares", free="torque_constant")
+    fitted = sp.calibrate(path, truth, method="least-squares", free="torque_constant", model="sbt")
     assert truth.motor is not None
     assert fitted.values["torque_constant"].value == pytest.approx(truth.motor.torque_constant, rel=1e-3)
 

@@ -40,7 +40,8 @@ class Calibrated(Shown):
     values: dict[str, Estimate]
     """Free numbers by label."""
     friction: tuple[Estimate, ...]
-    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed."""
+    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed. Without
+    interval where the error of the model's torque is not known."""
     friction_sensitivity: dict[str, Samples]
     """Change of B_eff of every robot per relative change of a constant of fluid or motor, N m s/rad, by its field."""
     friction_statement: str
@@ -59,6 +60,10 @@ class Calibrated(Shown):
     friction_given: tuple[Estimate, ...] = ()
     """B_eff of every robot with its constants as they are, on which predictions of these robots rest; empty where that
     is `friction`."""
+    friction_within_model: tuple[Estimate, ...] = ()
+    """B_eff of every robot with the stated uncertainties of its constants, were the model exact."""
+    model_reason: str = ""
+    """Why the model was fitted, in half a sentence; empty where it was named."""
     folder: Path | None = None
     """Folder of the files that were written, if any were."""
     files: tuple[str, ...] = ()
@@ -105,6 +110,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         "robots": experiment.size,
         "rows": sum(len(rows) for rows in experiment.rows),
         "model": problem.model.name,
+        **({"model_reason": found.model_reason} if found.model_reason else {}),
         "method": found.method,
         "friction": found.reading,
         "parameters": parameters,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,14 @@ from spirillum.calibration.fit_warnings import (
     factor_misfit_warnings,
     friction_interval_warnings,
     friction_warnings,
+    inertia_warnings,
     misfit_warnings,
     narrow_channel_warnings,
     outlier_warnings,
     prior_warnings,
 )
-from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement
+from spirillum.calibration.fitted_model import choose_fitted_model, is_fitted_in_tube
+from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement, torque_error
 from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.methods import METHODS
@@ -36,6 +39,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
 
 __all__ = ["RobotSource", "fit_model", "given_robots"]
 
@@ -58,7 +62,7 @@ def fit_model(
     observations: str | Path,
     robots: RobotSource | Sequence[RobotSource],
     *,
-    model: str = "sbt",
+    model: str = AUTO,
     free: str | Sequence[str] | None = None,
     method: str = "posterior",
     friction: str = "rotor",
@@ -72,8 +76,10 @@ def fit_model(
     Args:
         observations: observations file, see `docs/commands`.
         robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
-        model: hydrodynamic model.
-        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
+        model: hydrodynamic model; or `auto`: `tube` where every robot has the table of its tube, or `prepare` makes it,
+            and what is free is of that model; else `sbt`.
+        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted, or
+            with `tube` the gap.
         method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
         friction: reading under which B_eff follows from (18): `rotor` or `paper`.
         assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
@@ -92,16 +98,28 @@ def fit_model(
         raise InputError(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
-    names = free_names(free, find_swimmer_model(model).name)
-    if prepare and model != "tube":
+    if model != AUTO:
+        free_names(free, find_swimmer_model(model, AUTO).name)
+    if prepare and not is_fitted_in_tube(model, free, method):
         raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
     experiment = read_experiment(observations, given_robots(robots))
+    choice = choose_fitted_model(model, experiment, free, method, prepare=prepare)
+    names = free_names(free, choice.model)
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name != "friction")
-    problem = posed(experiment, model, names, progress, assumed, prepare=prepare)
+    problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare)
+    inertia_warnings(experiment)
+    found = _fitted_by(method, problem, friction, sampling, progress)
+    caution = (choice.caution,) if choice.caution else ()
+    return replace(found, model_reason=choice.reason, warnings=(*caution, *found.warnings))
+
+
+def _fitted_by(
+    method: str, problem: Problem, friction: str, sampling: Sampling | None, progress: Progress | None
+) -> Calibrated:
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)
@@ -163,7 +181,7 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
     draws = problem.values(z)
     values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
-    given, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
+    given, within, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
     sensitivity = friction_sensitivity(problem, fit.z, reading)
     predicted = _predicted(problem, fit.z, z, tau, rng)
     # Moments of a few residuals may give none, or one at the end of what may be: the middle of that is stated.
@@ -181,8 +199,9 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
         values=values,
         friction=friction,
         friction_given=given,
+        friction_within_model=within,
         friction_sensitivity=sensitivity,
-        friction_statement=friction_statement(problem, friction, sensitivity),
+        friction_statement=friction_statement(problem, within, sensitivity),
         predicted=predicted,
         discrepancy=discrepancy,
         error=fit.error,
@@ -211,7 +230,7 @@ def _by_posterior(
     tau, sigma = posterior.density.nuisances(chosen)
     discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
     error = {name: float(np.median(s)) for name, s in sigma.items()}
-    given, friction = _friction(problem, own, middle, error, reading, rng)
+    given, within, friction = _friction(problem, own, middle, error, reading, rng)
     sensitivity = friction_sensitivity(problem, middle, reading)
     values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
     wrong = [f"the posterior may not be used: {sentence}" for sentence in posterior.problems()]
@@ -230,8 +249,9 @@ def _by_posterior(
         values=values,
         friction=friction,
         friction_given=given,
+        friction_within_model=within,
         friction_sensitivity=sensitivity,
-        friction_statement=friction_statement(problem, friction, sensitivity),
+        friction_statement=friction_statement(problem, within, sensitivity),
         predicted=_predicted(problem, middle, own, tau, rng),
         discrepancy=discrepancy,
         error={name: float(np.median(every[f"error_{name}"])) for name in problem.quantities},
@@ -275,26 +295,34 @@ def _friction(
     error: Mapping[Quantity, float],
     reading: str,
     rng: np.random.Generator,
-) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...]]:
+) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...], tuple[Estimate, ...]]:
     """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it.
 
     Returns:
-        With the constants of fluid and motor as they are, and with their stated uncertainties.
+        With the constants of fluid and motor as they are; with their stated uncertainties; and with the error of the
+        model's torque too, without intervals where that is not known.
     """
     if "friction" not in problem.free:
-        return (), ()
+        return (), (), ()
     ratio = problem.experiment.motor_rate
     own_error = error.get("motor_rate", ratio.drawn_error(z.shape[0], rng))
     rates = ratio.mean + ratio.error_of_mean(own_error) * rng.normal(size=(z.shape[0], problem.experiment.size))
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
-    given = _estimates(middle, problem.friction(z, rates, reading))
-    if not problem.assumed:
-        return given, given
-    own = np.random.default_rng(2)  # one fluid and one motor for all tails
+    own = np.random.default_rng(2)  # one fluid, one motor and one model for all tails
     scaled = {
         name: np.exp(stated_spread(size) * own.normal(size=(z.shape[0], 1))) for name, size in problem.assumed.items()
     }
-    return given, _estimates(middle, problem.friction(z, rates, reading, scaled))
+    given = within = _estimates(middle, problem.friction(z, rates, reading))
+    if scaled:
+        within = _estimates(middle, problem.friction(z, rates, reading, scaled))
+    off = torque_error(problem)
+    if off is None:
+        nan = float("nan")
+        return given, within, tuple(Estimate(item.value, nan, nan) for item in given)
+    # In Stokes flow a torque that is off by a factor is that of a fluid whose viscosity is.
+    torque = np.exp(stated_spread(off) * own.normal(size=(z.shape[0], 1)))
+    scaled["viscosity"] = scaled.get("viscosity", 1.0) * torque
+    return given, within, _estimates(middle, problem.friction(z, rates, reading, scaled))
 
 
 def _estimates(middle: Samples, draws: Samples) -> tuple[Estimate, ...]:

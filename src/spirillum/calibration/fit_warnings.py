@@ -9,14 +9,16 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.estimate import Estimate
-from spirillum.calibration.experiment import Quantity
+from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.parameters import LogUniform, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
+from spirillum.robot.batch import RobotBatch
 from spirillum.robust import mad_scale
 from spirillum.shown import percent
+from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 
 __all__ = [
     "CALLED",
@@ -269,10 +271,24 @@ def synthetic_warning(source: str) -> str:
     return f"{source} says that its numbers are synthetic: nothing here is measured"
 
 
+def inertia_warnings(experiment: Experiment) -> list[str]:
+    """Return warnings of observations at Reynolds numbers at which Stokes flow is not accurate.
+
+    Raises:
+        InputError: if a robot was observed far outside Stokes flow.
+    """
+    batch = RobotBatch.of(experiment.robots)
+    rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
+    limits = reynolds_limits(
+        batch, body_reynolds(batch, experiment.advance.mean * rate), tail_reynolds(batch, experiment.tail_rate)
+    )
+    return list(check_stokes_flow(batch, limits).values())
+
+
 def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]:
     """Warnings common to all methods."""
     experiment = problem.experiment
-    found = [*experiment.doubts]
+    found = [*experiment.doubts, *inertia_warnings(experiment)]
     if experiment.synthetic:
         found.append(synthetic_warning(experiment.source))
     if "gap" in problem.free and "pitch" not in problem.free:

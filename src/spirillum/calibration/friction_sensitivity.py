@@ -14,6 +14,8 @@ from spirillum.arrays import Samples
 from spirillum.calibration.estimate import Estimate
 from spirillum.calibration.parameters import ASSUMABLE
 from spirillum.calibration.problem import Problem
+from spirillum.fluid.stated import CHECKED, tail_error
+from spirillum.robot.batch import RobotBatch
 
 __all__ = ["friction_sensitivity", "friction_statement"]
 
@@ -41,8 +43,27 @@ def friction_sensitivity(problem: Problem, z: Samples, reading: str) -> dict[str
     return found
 
 
+def torque_error(problem: Problem) -> float | None:
+    """Return half of the relative 95 % interval of the model's torque on the tails: the largest error that is known.
+
+    That of the wire, as against resolved wires, and of the table. None for a model that leaves the walls of the robots'
+    tubes out: nothing that is observed tells what these do to the torque.
+    """
+    if not problem.model.placed:
+        return None
+    robots = problem.experiment.robots
+    wire = max(abs(tail_error(RobotBatch.of(robot), CHECKED["slender"]).torque) for robot in robots)
+    return 0.01 * wire + problem.interpolation_error
+
+
 def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivity: Mapping[str, Samples]) -> str:
-    """What the intervals of B_eff take as exact, and how far it moves with each constant; empty without B_eff."""
+    """What the intervals of B_eff take as exact, and how far it moves with each constant; empty without B_eff.
+
+    Args:
+        problem: the fit.
+        friction: B_eff of every robot, were the model exact.
+        sensitivity: change of B_eff per relative change of each constant.
+    """
     middle = np.array([item.value for item in friction])
     middle = np.abs(middle[np.isfinite(middle)])
     if middle.size == 0 or not np.median(middle) > 0:
@@ -60,10 +81,15 @@ def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivi
         subject, verbs = "B_eff", verbs.replace("take ", "takes ", 1)
     elif exact:
         advice = f"; --assume-uncertainty {exact[0]}=5% would put 5 % into them"
-    return (
-        f"{subject} {verbs}: one per cent more of it moves B_eff by {moves}, medians of the tails{advice}; "
-        f"B_eff also holds what model '{problem.model.name}' misses of the torque, which no interval shows"
-    )
+    rests = f"{verbs}: one per cent more of it moves B_eff by {moves}, medians of the tails{advice}"
+    model, off = f"model '{problem.model.name}'", torque_error(problem)
+    if off is not None:
+        return f"{subject} {rests}; an error of {100 * off:.2g} % of the torque by {model} is in them"
+    missed = f"B_eff also holds what {model} misses of the torque, walls above all, so that it is given no interval"
+    if subject == "B_eff":
+        return f"{subject} {rests}; {missed}"
+    half = float(np.nanmedian([0.5 * (item.high - item.low) for item in friction]) / np.median(middle))
+    return f"were the model exact, {subject} would reach {100 * half:.2g} % to either side and {rests}; {missed}"
 
 
 def _listed(items: Sequence[str]) -> str:

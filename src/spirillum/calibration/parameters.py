@@ -16,12 +16,14 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.options import CALIBRATED
+from spirillum.swimming.model_choice import AUTO, WALLED
 
 __all__ = [
     "ASSUMABLE",
     "DEFAULT_FREE",
     "OBSERVED",
     "PARAMETERS",
+    "UNWALLED",
     "Coordinate",
     "LogNormal",
     "LogUniform",
@@ -31,6 +33,8 @@ __all__ = [
     "assumed_uncertainties",
     "check_not_set",
     "free_names",
+    "is_free_in",
+    "listed_names",
 ]
 
 
@@ -260,6 +264,8 @@ _LISTED = (
 PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _LISTED}
 """All parameters by name."""
 
+UNWALLED = "sbt"
+"""Model that is fitted where `auto` cannot take one with walls: the paper's, with factors on the body's drag."""
 DEFAULT_FREE = {
     **dict.fromkeys(CALIBRATED, ("body_drag", "body_rotation", "friction")),
     "rft": ("body_drag", "friction"),
@@ -289,6 +295,16 @@ class Coordinate:
     prior: Prior
 
 
+def listed_names(free: str | Sequence[str]) -> tuple[str, ...]:
+    """Return the names in a comma-separated text, or in a sequence."""
+    return tuple(name.strip() for name in (free.split(",") if isinstance(free, str) else free))
+
+
+def is_free_in(model: str, free: str | Sequence[str] | None) -> bool:
+    """Return whether a model has all these parameters; it has those of its own that are free where none is named."""
+    return free is None or all(name in PARAMETERS and model in PARAMETERS[name].models for name in listed_names(free))
+
+
 def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
     """Names of the free parameters.
 
@@ -301,7 +317,7 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
     """
     if free is None:
         return DEFAULT_FREE[model]
-    names = tuple(name.strip() for name in (free.split(",") if isinstance(free, str) else free))
+    names = listed_names(free)
     for name in names:
         if name not in PARAMETERS:
             raise InputError(f"free = '{name[:40]}'{did_you_mean(name, PARAMETERS)}; allowed: {', '.join(PARAMETERS)}")
@@ -353,25 +369,33 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
     Args:
         fields: dotted names of the fields that were set.
         free: names of the free parameters, as `free_names` takes them.
-        model: name of the model.
+        model: name of the model, or `auto`.
 
     Raises:
         InputError: for such a field, or wrong names.
     """
-    asked, known = set(fields), find_swimmer_model(model).name
+    asked = set(fields)
     observed = [field for field in OBSERVED if field in asked]
     if observed:
         raise InputError(
             f"{observed[0]} is set, and the observations say the {observed[0].partition('.')[2]} of each tail; "
             "allowed: other fields"
         )
-    for name in free_names(free, known):
-        field = _IN_PLACE_OF.get(name, "").format(model=known)
-        if field in asked:
-            raise InputError(
-                f"{field} is set, and the fit of '{name}' does not look at it; allowed: one of them (--free names what "
-                "is fitted)"
-            )
+    for known in _possible_models(model, free):
+        for name in free_names(free, known):
+            field = _IN_PLACE_OF.get(name, "").format(model=known)
+            if field in asked:
+                raise InputError(
+                    f"{field} is set, and the fit of '{name}' does not look at it; allowed: one of them (--free names "
+                    "what is fitted)"
+                )
+
+
+def _possible_models(model: str, free: str | Sequence[str] | None) -> tuple[str, ...]:
+    """Models that may be fitted, with `auto` those of which the free numbers are."""
+    if model != AUTO:
+        return (find_swimmer_model(model, AUTO).name,)
+    return tuple(name for name in (WALLED, UNWALLED) if is_free_in(name, free)) or (UNWALLED,)
 
 
 def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, float]:

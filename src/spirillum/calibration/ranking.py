@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL
 from spirillum.calibration.fit import RobotSource, fit_model
-from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, synthetic_warning
+from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, inertia_warnings, synthetic_warning
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate, free_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
@@ -327,6 +327,7 @@ def _cautions(ranked: Sequence[Ranked]) -> list[str]:
         )
     elif count < _MANY_ROBOTS:
         said.append(f"only {count} robots: differences of the log density are hardly known")
+    said += inertia_warnings(ranked[0].fit.experiment)
     if ranked[0].fit.experiment.synthetic:
         said.append(synthetic_warning(ranked[0].fit.experiment.source))
     return said

@@ -11,7 +11,15 @@ import typer
 
 from spirillum.calibration.methods import METHODS
 from spirillum.cli.inputs import given_options, loaded_robot, overrides_from
-from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
+from spirillum.cli.options import (
+    MODEL_PANEL,
+    Json,
+    Settings,
+    complete_auto_models,
+    complete_models,
+    complete_robots,
+    starting,
+)
 from spirillum.errors import InputError
 from spirillum.fluid.tube.announced import TABLE_TAKES
 
@@ -36,10 +44,21 @@ def calibrate(
     context: typer.Context,
     observations: _Observations,
     robot: _Robots,
-    model: NamedModel = "sbt",
+    model: Annotated[
+        str,
+        typer.Option(
+            autocompletion=complete_auto_models,
+            help="Hydrodynamic model: sbt, rft, slender, tube; or auto: tube where every robot has the table of its "
+            "tube (or with --prepare), else sbt.",
+            rich_help_panel=MODEL_PANEL,
+        ),
+    ] = "auto",
     free: Annotated[
         str | None,
-        typer.Option(metavar="NAME,...", help="Free parameters; else those that the paper fitted with this model."),
+        typer.Option(
+            metavar="NAME,...",
+            help="Free parameters; else those that the paper fitted with this model, with tube gap,friction.",
+        ),
     ] = None,
     method: Annotated[
         str,

@@ -22,7 +22,6 @@ __all__ = [
     "Json",
     "Model",
     "Motion",
-    "NamedModel",
     "NoCalibration",
     "Output",
     "Phases",
@@ -129,14 +128,6 @@ def _complete_friction(incomplete: str) -> list[str]:
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
-NamedModel = Annotated[
-    str,
-    typer.Option(
-        autocompletion=complete_models,
-        help="Hydrodynamic model: sbt, rft, slender or tube.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
 Model = Annotated[
     str,
     typer.Option(

@@ -35,6 +35,7 @@ from spirillum.swimming.answer import LEVEL, STEADY, Swimming
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.swimming.steady import friction_reading
 from spirillum.units import KINDS, parse_option, show
 
@@ -179,7 +180,9 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
             )
         worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
         kept = [words for words, excess in worst.items() if excess > 0]
-        why = f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion"
+        limits = reynolds_limits(searched.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
+        inertia = stokes_flow_problem(searched.drawn.batch, limits)
+        why = inertia.replace("; ", ", ") or (f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion")
     words = ", ".join(f"{path} = {with_unit(value, _unit(searched.space, path))}" for path, value in values.items())
     return (
         f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or swum, "
@@ -376,7 +379,9 @@ def _warnings(
         found += drive_warnings(known, stated.model, reading, swum, stated.tail_rate)
     found += fitted_of(None, unknowns.posterior).answer_warnings(known, stated.model, reading, stated.tail_rate)
     found += _near_step_out(built, swum)
+    limits = reynolds_limits(stated.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
     found += [limit.sentence() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
+    found += reynolds_warnings(limits).values()
     if any("end of its range" in words for words in bound_by):
         found.append("the best design lies at the end of a range: a wider one may hold a better design")
     return tuple(dict.fromkeys(found))

@@ -19,6 +19,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.swimming.answer import Intervals, Swimming
 from spirillum.swimming.discrepancy import PosteriorFor
 from spirillum.swimming.intervals import drawn_batch, intervals_over
+from spirillum.swimming.reynolds import without_reynolds_bound
 
 __all__ = ["DRAWS", "intervals_of_free_motion"]
 
@@ -52,10 +53,11 @@ def intervals_of_free_motion(
             f"posterior with motion 'free': its middle comes to no steady motion ({lying.statement}); allowed: motion "
             "'held', or `simulate` with the posterior"
         )
+    unbound = without_reynolds_bound(robot)  # the middle was refused, or allowed, for all
     rng, places = np.random.default_rng(1), posterior.places(DRAWS)
     swum: list[Swimming] = []
     steady = []
-    for number, (place, one) in enumerate(zip(places, posterior.drawn(robot, DRAWS, rng), strict=True)):
+    for number, (place, one) in enumerate(zip(places, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
             progress("draws of the posterior", number, len(places))
         held, links, _ = let_go(one, found.laid._replace(contact=posterior.contact(place)))

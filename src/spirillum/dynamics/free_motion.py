@@ -38,11 +38,11 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.swimming.answer import Swimming
-from spirillum.swimming.cautions import in_stokes_flow
 from spirillum.swimming.drives import current_at
 from spirillum.swimming.loading import prepared
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
+from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
 from spirillum.swimming.steady import Rates, swimming_of
 from spirillum.units import KINDS, parse_option, show
 
@@ -158,6 +158,8 @@ def free_motion(
     sign = float(np.sign(held.tail_rotation_rate))
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
+    limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
+    inertia = check_stokes_flow(batch, limits)
     checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
     stuck = held_by_friction(
         links,
@@ -167,13 +169,14 @@ def free_motion(
     )
     warnings = (
         *held.warnings,
+        *(said for said in inertia.values() if said not in held.warnings),
         *(checked.said if lies and not stuck else ()),
         *_said(run, links, weight=weight),
         *stuck,
     )
     known = lies and checked.known and not stuck
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
-    error = in_stokes_flow(error, swimming.reynolds_number, swimming.tail_reynolds_number)
+    error = in_stokes_flow(error, *limits)
     acts = friction_acts(held.friction, held.tail_rate)
     source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)

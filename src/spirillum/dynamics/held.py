@@ -25,6 +25,7 @@ from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.swimming.balance import friction_torques, rates_per_torque
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.reynolds import check_stokes_flow, motion_limits
 from spirillum.swimming.steady import calibrated_balance
 from spirillum.units import show
 
@@ -216,7 +217,8 @@ def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
     transient = motor_transient(batch.electrics, response.slip, moments, switches)
     dataset = _dataset(prediction, batch.electrics, response, transient, switches)
     averages = _averages(dataset, prediction, switches, end)
-    said = [*prediction.warnings, *unused]
+    limits = motion_limits(batch, dataset["forward_velocity"].values, dataset["tail_rotation_rate"].values)
+    said = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
     return dataset.isel(time=np.isin(moments, time)).assign(averages).assign_attrs(warnings="\n".join(said))
 
 

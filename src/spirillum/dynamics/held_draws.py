@@ -99,8 +99,8 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
 
 def drawn_numbers(
     held: HeldModel, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
-) -> Samples:
-    """Numbers of robots drawn from ranges, (count, len(PARAMETERS)).
+) -> tuple[Samples, Samples]:
+    """Numbers of robots drawn from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,).
 
     Args:
         held: the robot.
@@ -118,7 +118,7 @@ def drawn_numbers(
     if any(name in ranges for name in FACTORS):
         friction = held.prediction.effective_friction * factors["friction"]
         numbers[:, _FIRST_RESPONSE:] = responses(held.prediction, held.prediction.batch, friction, factors["viscosity"])
-    return numbers
+    return numbers, factors["viscosity"]
 
 
 def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Samples:

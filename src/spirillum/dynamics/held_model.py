@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
+from spirillum.dynamics.held_equations import rates, steady_state
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
 from spirillum.robot.batch import Electrics, RobotBatch
@@ -22,9 +23,10 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.swimming.steady import calibrated_balance
 
-__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "held_model", "responses"]
+__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "check_steady", "held_model", "responses"]
 
 
 class Parameter(NamedTuple):
@@ -140,6 +142,26 @@ def held_model(
         raise InputError(f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a motor to switch")
     response = responses(steady, steady.batch, np.array([steady.effective_friction]))[0]
     return HeldModel(steady, (*_of_motor(motor), *response.tolist()))
+
+
+def check_steady(held: HeldModel, duty: float, flow: float) -> list[str]:
+    """Refuse a held robot that moves far outside Stokes flow where a duty and a flow have become steady.
+
+    Args:
+        held: the equations of the robot.
+        duty: 0 to 1.
+        flow: imposed mean flow, m/s.
+
+    Returns:
+        A warning for each Reynolds number that is too large for an accurate answer.
+
+    Raises:
+        InputError: if one is above 10, and the robot's option `model.beyond_stokes` is off.
+    """
+    numbers, batch = held.parameters, held.prediction.batch
+    speed, tail, _ = rates(numbers, steady_state(numbers, duty, flow), duty, flow)[1:4]
+    limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, tail))
+    return list(check_stokes_flow(batch, [*limits, flow_limit(batch, flow)]).values())
 
 
 def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:

@@ -18,6 +18,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
 from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 
 __all__ = ["HeldPlants"]
 
@@ -80,6 +81,10 @@ class HeldPlants:
         """States in the order of `held_model.STATES`."""
         self.numbers: Samples = np.tile(np.array(self.held.values), (count, 1))
         """Numbers of each robot in the order of `held_model.PARAMETERS`."""
+        self.warnings: tuple[str, ...] = self.held.prediction.warnings
+        """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
+        self._inertia: tuple[str, ...] = ()
+        self._viscosity: Samples = np.ones(count)
         self._duty: Samples = np.full(count, self.held.duty)
         self._flow: Samples = np.full(count, self.held.flow or 0.0)
         self.redraw()
@@ -104,13 +109,13 @@ class HeldPlants:
         chosen = np.arange(self.count) if which is None else np.flatnonzero(self._chosen("which", which))
         if not len(chosen) or not (self._ranges or self._pool is not None):
             return
-        numbers = drawn_numbers(self.held, len(chosen), rng, self._ranges)
+        numbers, viscosity = drawn_numbers(self.held, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
             own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
             rows[:, own] = numbers[:, own]
             numbers = rows
-        self.numbers[chosen] = numbers
+        self.numbers[chosen], self._viscosity[chosen] = numbers, viscosity
 
     def reset(self, which: np.ndarray | None = None) -> None:
         """Back to rest at place 0, with the drive on at the robot's own duty.
@@ -144,7 +149,7 @@ class HeldPlants:
             flow: mean flow that is imposed, m/s, where the placement has one.
 
         Raises:
-            InputError: for wrong input; nothing has then moved.
+            InputError: for wrong input, or a motion far outside Stokes flow; nothing has then moved.
         """
         number = _time(dt)
         if remote is not None:
@@ -155,24 +160,49 @@ class HeldPlants:
             raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
         asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
-        self._duty, self._flow = asked, carried
-        kernel.advance(self.numbers, self.states, number, self._duty, self._flow, 1.0)
+        states = self.states.copy()
+        kernel.advance(self.numbers, states, number, asked, carried, 1.0)
+        self._check_stokes(self._rates(states, carried), carried)
+        self.states, self._duty, self._flow = states, asked, carried
         self.time += number
 
     def observe(self) -> dict[str, Samples]:
         """True values by name: the states, rates and speed."""
         found = {name: self.states[:, place].copy() for place, name in enumerate(STATES)}
-        torque = self.numbers[:, kernel.TORQUE] * self.states[:, kernel.CURRENT]
-        for name, per_torque, per_flow in (
-            ("forward_velocity", kernel.SPEED, kernel.SPEED_FLOW),
-            ("body_rotation_rate", kernel.BODY, kernel.BODY_FLOW),
-            ("tail_rotation_rate", kernel.TAIL, kernel.TAIL_FLOW),
-        ):
-            found[name] = self.numbers[:, per_torque] * torque + self.numbers[:, per_flow] * self._flow
+        found |= self._rates(self.states, self._flow)
         found["battery_voltage"] = self.numbers[:, kernel.VOLTAGE] - self.numbers[:, kernel.INTERNAL] * np.abs(
             self.states[:, kernel.CURRENT]
         )
         return found
+
+    def _rates(self, states: Samples, flow: Samples) -> dict[str, Samples]:
+        """Speed and rates in some states, by name."""
+        torque = self.numbers[:, kernel.TORQUE] * states[:, kernel.CURRENT]
+        return {
+            name: self.numbers[:, per_torque] * torque + self.numbers[:, per_flow] * flow
+            for name, per_torque, per_flow in (
+                ("forward_velocity", kernel.SPEED, kernel.SPEED_FLOW),
+                ("body_rotation_rate", kernel.BODY, kernel.BODY_FLOW),
+                ("tail_rotation_rate", kernel.TAIL, kernel.TAIL_FLOW),
+            )
+        }
+
+    def _check_stokes(self, rates: Mapping[str, Samples], flow: Samples) -> None:
+        """Add what the robots break of Stokes flow to the warnings, once for each limit.
+
+        Raises:
+            InputError: if one of them moves far outside Stokes flow.
+        """
+        batch, thinner = self.held.prediction.batch, 1.0 / self._viscosity
+        limits = reynolds_limits(
+            batch,
+            body_reynolds(batch, rates["forward_velocity"] * thinner),
+            tail_reynolds(batch, rates["tail_rotation_rate"] * thinner),
+        )
+        limits.append(flow_limit(batch, float(np.abs(flow * thinner).max())))
+        new = {flag: said for flag, said in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
+        self._inertia += tuple(new)
+        self.warnings += tuple(new.values())
 
     def _chosen(self, name: str, given: Any) -> np.ndarray:
         """A truth value for each robot.

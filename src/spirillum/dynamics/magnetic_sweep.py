@@ -25,11 +25,21 @@ from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.steady import swim
+from spirillum.swimming.reynolds import (
+    body_reynolds,
+    reynolds_limits,
+    reynolds_warnings,
+    stokes_flow_problem,
+    tail_reynolds,
+    without_reynolds_bound,
+)
+from spirillum.swimming.steady import Swimming, swim
 from spirillum.units import KINDS, parse_option, show
 from spirillum.version import versions
 
@@ -101,15 +111,21 @@ def magnetic_sweep(
         still change), and the same of the held robot in closed form; `step_out_rate` of the held robot as a scalar.
 
     Raises:
-        InputError: for another drive, wrong rates, or a model without all entries.
+        InputError: for another drive, wrong rates, a model without all entries, or a rate at which the robot moves far
+            outside Stokes flow.
     """
     check_full(find_swimmer_model(model))
-    held = predict(robot, model=model, resolution=resolution, calibrated=False)
+    own = with_resolution(load(robot), resolution, model)
+    # The rates of the sweep decide whether there is an answer, not the robot's own.
+    held = replace(predict(without_reynolds_bound(own), model=model, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
     if not 4 <= turns <= 1e4:
         raise InputError(f"turns = {turns}; allowed: 4 to 10000")
     asked = _rates(rates, held)
+    batch = replace(held.batch, options=own.model)
+    closed = swim(held.batch.with_values({"magnetic.rotation_rate": asked}), held.model, calibrated=False)
+    inertia = _check_stokes(batch, asked, closed.forward_velocity, closed.tail_rotation_rate)
     links = two_links(
         held.robot,
         held.batch,
@@ -130,7 +146,24 @@ def magnetic_sweep(
         attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
         found.append(mean)
         settled.append(still)
-    return _dataset(held, asked, found, np.array(settled, dtype=float), turns)
+        inertia |= _check_stokes(batch, np.array([rate]), np.array([mean.velocity]), np.array([mean.rate]))
+    said = [*_without_walls(held), *held.robot.warnings, *inertia.values()]
+    return _dataset(held, closed, asked, found, np.array(settled, dtype=float), turns, said)
+
+
+def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, str]:
+    """Warnings where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate.
+
+    Raises:
+        InputError: naming the least rate at which it does so far.
+    """
+    found: dict[str, str] = {}
+    for rate, one, turned in zip(rates.tolist(), speed, turning, strict=True):
+        limits = reynolds_limits(batch, body_reynolds(batch, one), tail_reynolds(batch, turned))
+        if problem := stokes_flow_problem(batch, limits):
+            raise InputError(f"at a field of {show(rate, 'Hz')} (--rate) {problem}")
+        found |= {flag: f"at a field of {show(rate, 'Hz')} {said}" for flag, said in reynolds_warnings(limits).items()}
+    return found
 
 
 def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
@@ -236,12 +269,18 @@ def _without_walls(held: Prediction) -> list[str]:
     ]
 
 
-def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: Samples, turns: float) -> xr.Dataset:
+def _dataset(
+    held: Prediction,
+    closed: Swimming,
+    rates: Samples,
+    found: Sequence[_Mean],
+    settled: Samples,
+    turns: float,
+    warnings: Sequence[str],
+) -> xr.Dataset:
     import xarray as xr
 
     table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
-    batch = held.batch.with_values({"magnetic.rotation_rate": rates})
-    closed = swim(batch, held.model, calibrated=False)
     free = {
         "forward_velocity": (table["velocity"], "mean velocity along the axis of the field"),
         "tail_rotation_rate": (table["rate"], "mean rate at which the moment turns about it"),
@@ -276,7 +315,7 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: 
             "known_error": held.known_error,
             "integrator": INTEGRATOR,
             "references": " ".join(held.references),
-            "warnings": "\n".join([*_without_walls(held), *held.robot.warnings, *_unsettled(rates, settled, turns)]),
+            "warnings": "\n".join([*warnings, *_unsettled(rates, settled, turns)]),
             "versions": versions(),
         },
     )

@@ -45,6 +45,7 @@ from spirillum.swimming.freedom import check_full
 from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
+from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["Moment", "Plant", "PlantState", "uninterrupted"]
@@ -167,7 +168,8 @@ class Plant:
         )
         """The steady state of the robot held where it starts, by the same model."""
         self.warnings: tuple[str, ...] = (*self.steady.warnings, *([chosen.caution] if chosen.caution else []))
-        """What to be careful about, a sentence each."""
+        """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
+        self._inertia: tuple[str, ...] = ()
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
         self._table = table_for(RobotBatch.of(own, placed), workers=1, progress=progress) if walled else None
         self._reach = reach_of(own)
@@ -266,13 +268,15 @@ class Plant:
             The moment at the end of the step; `ended` says why if it came early.
 
         Raises:
-            InputError: for wrong input, or a run that has ended; nothing has then moved.
+            InputError: for wrong input, a run that has ended, or a motion far outside Stokes flow; nothing has then
+                moved.
         """
         _check_number("dt", dt, 0.0, _LONGEST, "s")
         if self._now.time + dt == self._now.time:
             raise InputError(f"dt = {dt:g} s is none at t = {self._now.time:g} s; allowed: above its rounding error")
         if self._now.ended:
             raise InputError(f"the run has ended: {self._now.ended}; allowed: reset")
+        before = (self._now, self._links)
         command = self._commanded(remote=remote, duty=duty)
         asked_field = None if field is None else Field.of(field)
         if asked_field is not None and self._now.field is None:
@@ -283,6 +287,11 @@ class Plant:
             self.impose_field(asked_field)
         asked = 0.0 if self._now.spent else command
         run, checkpoint = self._moved(float(dt), asked)
+        try:
+            self._check_stokes(run)
+        except InputError:
+            self._now, self._links = before
+            raise
         spent = self._now.spent or any(event.what == BATTERY_EMPTY for event in run.events)
         ended = ""
         if run.time[-1] < (self._now.time + dt) * (1.0 - 1e-9):
@@ -347,6 +356,20 @@ class Plant:
         if field != old:
             self._links = field.on(self._links)
             self._now = replace(self._now, field=field, checkpoint=self._begun_anew())
+
+    def _check_stokes(self, run: Trajectory) -> None:
+        """Add what a step breaks of Stokes flow to the warnings, once for each limit.
+
+        Raises:
+            InputError: if the robot moves far outside Stokes flow.
+        """
+        seen, batch = run.observed, self.steady.batch
+        rates = seen[:, rigid_links.ROTATION] + seen[:, rigid_links.JOINT]
+        limits = motion_limits(batch, seen[:, : rigid_links.ROTATION], rates)
+        limits.append(flow_limit(batch, abs(self._now.flow or 0.0)))
+        new = {flag: said for flag, said in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
+        self._inertia += tuple(new)
+        self.warnings += tuple(new.values())
 
     def _begun_anew(self) -> Checkpoint | None:
         """Beginning of the next step of the integrator: here, for the last one was taken under other conditions."""

@@ -16,10 +16,10 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
-from spirillum.swimming.cautions import BEYOND_STOKES
 from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice, check_calibrated, choose_model, posterior_alone
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
+from spirillum.swimming.reynolds import without_reynolds_bound
 
 __all__ = ["predict"]
 
@@ -67,7 +67,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         roughness: of free motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4 of
             the body's radius.
         in_tube: of free motion in the tube: `azimuth` of the start and `friction_coefficient`, see `InTube`.
-        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong.
+        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong, as
+            with the robot's option `model.beyond_stokes`.
         progress: told what is being computed, how much is done, and of how much.
 
     Raises:
@@ -75,6 +76,8 @@ def predict(  # noqa: PLR0913 - the options of the command
             turn.
     """
     check_calibrated(calibration, calibrated=calibrated)
+    if beyond_stokes:
+        robot = without_reynolds_bound(load(robot))
     known = None
     if posterior is not None and motion == "free" and model in ("tube", AUTO):
         known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
@@ -91,7 +94,7 @@ def predict(  # noqa: PLR0913 - the options of the command
                     f"{name} = {str(value)[:40]} is of free motion in the tube; allowed: with model 'tube' and motion "
                     "'free'"
                 )
-        answer = prediction.predict(
+        return prediction.predict(
             robot,
             model=model,
             tail_rate=tail_rate,
@@ -106,9 +109,6 @@ def predict(  # noqa: PLR0913 - the options of the command
             motion=motion,
             progress=progress,
         )
-        if not beyond_stokes:
-            _check_stokes(answer)
-        return answer
     whose = posterior_for_of(posterior_for, known, load(robot))
     check_not_resolved(load(robot), resolution)
     if band:
@@ -129,8 +129,6 @@ def predict(  # noqa: PLR0913 - the options of the command
         progress=progress,
     )
     answer = replace(found.prediction, choice=choice)
-    if not beyond_stokes:
-        _check_stokes(answer)
     if known is None:
         return answer
     from spirillum.dynamics.free_draws import intervals_of_free_motion
@@ -147,21 +145,6 @@ def predict(  # noqa: PLR0913 - the options of the command
             *fitted_of(None, known).run_warnings(answer.robot, answer.model, answer.friction),
         ),
     )
-
-
-def _check_stokes(answer: Prediction) -> None:
-    """Refuse an answer far outside Stokes flow.
-
-    Raises:
-        InputError: if a Reynolds number is above 10.
-    """
-    for name, what in (("reynolds_number", "body diameter"), ("tail_reynolds_number", "tail amplitude")):
-        value = float(getattr(answer, name))
-        if value > BEYOND_STOKES:
-            raise InputError(
-                f"Reynolds number ({what}) = {value:.3g}; allowed: at most {BEYOND_STOKES:g}, for these models "
-                "neglect inertia; a more viscous fluid, a slower or a smaller robot, or --beyond-stokes"
-            )
 
 
 def _free_in_tube(

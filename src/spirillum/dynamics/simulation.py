@@ -35,11 +35,11 @@ from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.cautions import in_stokes_flow, speed_limit
 from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
+from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.steady import friction_reading, requirements
 from spirillum.units import KINDS, parse_option
 
@@ -170,7 +170,12 @@ def simulate(  # noqa: PLR0913 - the options of the command
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
         dataset = with_intervals(
-            dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), number, tell
+            dataset,
+            known,
+            central,
+            lambda one, draw: run(without_reynolds_bound(one), same_length, draw=draw),
+            number,
+            tell,
         )
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     more = {"model_reason": choice.reason} if choice.reason else {}
@@ -237,10 +242,10 @@ def _free_run(
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
-    fastest = speed_limit(steady.batch, dataset["velocity"].values)
-    way = [*vertical_drift(dataset), *(limit.caution() for limit in broken([fastest]))]
+    limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
+    way = [*vertical_drift(dataset), *check_stokes_flow(steady.batch, limits).values()]
     dataset.attrs["warnings"] = "\n".join([*way, *said])
-    dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], fastest.value)
+    dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], *limits)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
 

@@ -23,12 +23,11 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
-from spirillum.swimming.cautions import flow_limit, in_stokes_flow, speed_limit
 from spirillum.swimming.prediction import Prediction, free_in_tube
+from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -80,20 +79,20 @@ def run_in_tube(
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     if asked.flow is not None:
-        said += [limit.caution() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])]
+        limits.append(flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max())))
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
-    fastest = speed_limit(steady.batch, dataset["velocity"].values)
+    said += check_stokes_flow(steady.batch, limits).values()
     stuck = held_by_friction(
         links,
         forward=float(dataset["mean_forward_velocity_steady"]),
         turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
         contact_force=float(dataset["contact_force"][-1]),
     )
-    error = in_stokes_flow(table.error["forward_velocity"], fastest.value)
-    said += [limit.caution() for limit in broken([fastest])]
+    error = in_stokes_flow(table.error["forward_velocity"], *limits)
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
         warnings="\n".join(said),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.answer import as_json, envelope, quantity
-from spirillum.dynamics.held_model import PARAMETERS, HeldModel, held_model
+from spirillum.dynamics.held_model import PARAMETERS, HeldModel, check_steady, held_model
 from spirillum.errors import InputError
 from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check_masses, contents_of, printable_solid
 from spirillum.exports.mjcf import FLUID_WARNING
@@ -185,9 +185,11 @@ def _unit_of(held: HeldModel, target: Path) -> Export:
     from spirillum.exports.fmu.build import fmu_bytes
 
     robot = held.robot
+    inertia = check_steady(held, 1.0, held.flow or 0.0)  # the duty is an input of the unit
     _commit(target, {target.name: fmu_bytes(held)})
+    warnings = tuple(dict.fromkeys((*held.prediction.warnings, *inertia)))
     files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
-    return Export(robot, 0.0, files, (), links_of(robot), None, tuple(held.prediction.warnings), held)
+    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, held)
 
 
 def _equations(held: HeldModel) -> dict[str, Any]:

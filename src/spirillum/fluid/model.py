@@ -104,7 +104,7 @@ class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
     known_speed_error: ClassVar[float | None] = None
-    """Relative error of the speed of the paper's robot that `known_error` says in words; None where it says none."""
+    """Relative error of the speed of a reference robot, see `docs/accuracy.md`; None where none is known."""
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
         """This model at another resolution: the relative difference of the forward velocities is the error estimate.

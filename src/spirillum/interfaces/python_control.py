@@ -13,7 +13,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.argument_kinds import as_number
 from spirillum.arrays import Samples
 from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
-from spirillum.dynamics.held_model import STATES, HeldModel, held_model
+from spirillum.dynamics.held_model import STATES, HeldModel, check_steady, held_model
 from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.quantities import unit_of
@@ -41,6 +41,8 @@ class LinearSystem(Shown):
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
     time_constant: float
     """Of the motor's current there, s; path, angles and charge only add up."""
+    warnings: tuple[str, ...] = ()
+    """What to be careful about, a sentence each."""
 
     def to_dict(self) -> dict[str, Any]:
         """The point, and the time constant there, as data; the matrices are those of `system`."""
@@ -50,7 +52,7 @@ class LinearSystem(Shown):
             "time_constant": quantity(self.time_constant, "s"),
             **{name: quantity(value, unit_of(name)) for name, value in point.items()},
         }
-        return envelope("linear-system", content, ())
+        return envelope("linear-system", content, self.warnings)
 
 
 def control_system(
@@ -77,13 +79,14 @@ def control_system(
         placement: where the robot is held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
 
     Raises:
-        InputError: for wrong input, another drive, or where python-control is not installed; in a response, for an
-            input that is no number.
+        InputError: for wrong input, another drive, a motion far outside Stokes flow at full duty, or where
+            python-control is not installed; in a response, for an input that is no number.
     """
     library = required("control", "a system of python-control", "control")
     held = held_model(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
+    check_steady(held, 1.0, held.flow or 0.0)
     return library.nlsys(
         lambda _t, x, u, params: rates(params, float(x[0]), *_inputs_of(u)),
         lambda _t, x, u, params: outputs(params, x, *_inputs_of(u)),
@@ -132,6 +135,7 @@ def linear_system(
     if flow is not None and held.flow is None:
         raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
     at_flow = (held.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
+    inertia = check_steady(held, at_duty, at_flow)
     numbers = held.parameters
     current = steady_state(numbers, at_duty, at_flow)
     a, b, c, d = slopes(numbers, current, at_duty)
@@ -153,6 +157,7 @@ def linear_system(
         inputs=dict(zip(inputs, (at_duty, at_flow), strict=False)),
         outputs=dict(zip(OUTPUTS, steady.tolist(), strict=True)),
         time_constant=-1.0 / float(a[0, 0]),
+        warnings=tuple(dict.fromkeys((*held.prediction.warnings, *inertia))),
     )
 
 

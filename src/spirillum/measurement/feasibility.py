@@ -250,6 +250,7 @@ def _expected(
         return {name: found[name] for name in given}, ()
     from spirillum.swimming.model_choice import AUTO, choose_model
     from spirillum.swimming.prediction import predict
+    from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
         choice = choose_model(AUTO, robot, tables_only=True, other_way=_OTHERWISE)
@@ -259,7 +260,10 @@ def _expected(
     held = ", held at its place" if answer.model.placed else ""
     for name in given:
         found.setdefault(name, (float(getattr(answer, name)), f"predicted by {choice.model}{held}"))
-    return {name: found[name] for name in given}, (choice.caution,) if choice.caution else ()
+    motion = answer.swimming
+    inertia = reynolds_warnings(reynolds_limits(answer.batch, motion.reynolds_number, motion.tail_reynolds_number))
+    caution = (choice.caution,) if choice.caution else ()
+    return {name: found[name] for name in given}, (*caution, *inertia.values())
 
 
 def _pixel(

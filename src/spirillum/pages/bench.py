@@ -21,8 +21,11 @@ from spirillum.pages.job import Job
 from spirillum.pages.plain_names import plain, plain_names
 from spirillum.pages.setup_form import form_list
 from spirillum.robot.options import CALIBRATED
+from spirillum.swimming.model_choice import AUTO, WALLED
 
 __all__ = ["Bench"]
+
+_MODELS = (AUTO, *CALIBRATED, WALLED)
 
 
 class Bench:
@@ -84,7 +87,7 @@ class Bench:
         Raises:
             InputError: if nothing was measured, or for another model or method.
         """
-        for word, value, allowed in (("model", model, CALIBRATED), ("method", method, METHODS)):
+        for word, value, allowed in (("model", model, _MODELS), ("method", method, METHODS)):
             if value not in allowed:
                 raise InputError(f"{word} = {value[:40]!r}; allowed: {', '.join(allowed)}")
         with self._lock:
@@ -127,7 +130,7 @@ class Bench:
                 "check": self.desk.checked(),
                 "job": job,
                 "results": dict(self._results),
-                "models": list(CALIBRATED),
+                "models": list(_MODELS),
                 "methods": list(METHODS),
             }
 

@@ -21,6 +21,7 @@ from spirillum.files import MARK, check_replaceable, output_folder, protected, r
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.results.calibration_file import calibration_text
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
 from spirillum.view.figures.calibration import calibration_figures
 from spirillum.view.figures.style import save
 
@@ -63,7 +64,7 @@ def calibrate(
     robots: RobotSource | Sequence[RobotSource],
     output: str | Path | None = None,
     *,
-    model: str = "sbt",
+    model: str = AUTO,
     free: str | Sequence[str] | None = None,
     method: str = "posterior",
     friction: str = "rotor",
@@ -80,8 +81,10 @@ def calibrate(
         robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
         output: folder for `calibration.toml`, `predictions.csv`, figures and, for a posterior, `posterior.nc`; None:
             nothing is written.
-        model: hydrodynamic model.
-        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
+        model: hydrodynamic model; or `auto`: `tube` where every robot has the table of its tube, or `prepare` makes it,
+            and what is free is of that model; else `sbt`.
+        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted, or
+            with `tube` the gap.
         method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
         friction: reading under which B_eff follows from (18): `rotor` or `paper`.
         assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or

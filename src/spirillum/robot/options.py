@@ -122,6 +122,8 @@ class ModelOptions(Section):
     """Resolved tail and body."""
     tube: TubeOptions = TubeOptions()
     """Resolved tail and body in their tube."""
+    beyond_stokes: Switch = False
+    """Answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong."""
 
 
 class Resolution(Options):

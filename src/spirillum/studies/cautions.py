@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from spirillum.arrays import Flags
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import broken
-from spirillum.studies.work import Part, Task
+from spirillum.studies.work import REASONS, Part, Task
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.cautions import accuracy_limits
+from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
 from spirillum.swimming.steady import requirements
 
 __all__ = ["Caution", "cautions", "summed"]
@@ -40,11 +42,26 @@ def _refusals(task: Task, part: Part) -> list[Caution]:
             sentence = limit.sentence(int(np.argmax(of_this)))
             found.append(Caution(task.model, limit.flag, int(np.count_nonzero(of_this)), sentence, refused=True))
         left &= ~of_this
+    found += _beyond_stokes(task, part, left)
+    left &= ~np.any(part["outside"] == REASONS.index("beyond-stokes"), axis=-1)
     if left.any():
         lacking = np.count_nonzero(part["outside"][int(np.argmax(left))])
         sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} readings of the friction"
         found.append(Caution(task.model, "other", int(np.count_nonzero(left)), sentence, refused=True))
     return found
+
+
+def _beyond_stokes(task: Task, part: Part, left: Flags) -> list[Caution]:
+    """The refusal of robots that move far outside Stokes flow, under the first reading of the friction that has one."""
+    code = REASONS.index("beyond-stokes")
+    refused = left & np.any(part["outside"] == code, axis=-1)
+    if not refused.any():
+        return []
+    rows, reading = np.flatnonzero(refused), int(np.argmax(part["outside"][int(np.argmax(refused))] == code))
+    numbers = [part[name][rows, reading] for name in ("reynolds_number", "tail_reynolds_number")]
+    batch = task.batch.taken(rows)
+    sentence = stokes_flow_problem(batch, reynolds_limits(batch, *numbers))
+    return [Caution(task.model, "beyond-stokes", len(rows), sentence, refused=True)]
 
 
 def cautions(task: Task, part: Part) -> list[Caution]:
@@ -54,6 +71,7 @@ def cautions(task: Task, part: Part) -> list[Caution]:
     found = _refusals(task, part)
     for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
+        holds |= part["outside"][:, 0] == REASONS.index("beyond-stokes")
         count = int(np.count_nonzero(~holds))
         if count:
             found.append(Caution(task.model, limit.flag, count, limit.caution(int(np.argmin(holds)))))

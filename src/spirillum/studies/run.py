@@ -29,6 +29,7 @@ from spirillum.studies.work import OneRobot, Task, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
+from spirillum.swimming.drive_warnings import CONSTANT_TORQUE
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.steady import requirements
 from spirillum.version import own_version
@@ -129,6 +130,8 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
+    if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
+        warnings.append(CONSTANT_TORQUE)
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)

@@ -20,7 +20,7 @@ from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
-from spirillum.swimming.intervals import intervals_of
+from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
 from spirillum.swimming.steady import requirements, swim
 
 __all__ = [
@@ -81,6 +81,7 @@ REASONS = (
     "gap-too-wide",
     "tail-in-wall",
     "gap-too-thin",
+    "beyond-stokes",
     "other",
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
@@ -253,6 +254,7 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
         part["error_estimate"] = np.stack(errors, axis=-1)
     valid = np.stack([result.valid for result in free], axis=-1)
     reason = _reasons(task.batch, task.model)[:, None]
+    reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
     if loaded.posterior is not None and task.model == loaded.posterior.model:
         part |= _intervals(task, loaded, loaded.posterior)
@@ -321,6 +323,7 @@ def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Par
         robot = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction))
         for column, reading in enumerate(readings):
             found = intervals_of(robot, model, posterior, tail_rate=None, friction=reading)
+            found = found if knows_torque(robot, model) else without_torque(found)
             for name in WITH_INTERVALS:
                 part[f"{name}_interval_low"][number, column] = found.low[name]
                 part[f"{name}_interval_high"][number, column] = found.high[name]

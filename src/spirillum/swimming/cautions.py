@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.announced import TABLE_TAKES
@@ -14,55 +13,18 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.reynolds import reynolds_limits
 from spirillum.units import show
 
-__all__ = [
-    "BEYOND_STOKES",
-    "accuracy_limits",
-    "calibration_warnings",
-    "flow_limit",
-    "in_stokes_flow",
-    "no_band_warnings",
-    "speed_limit",
-]
-
-BEYOND_STOKES = 10.0
-"""Reynolds number above which inertia rules: `predict` refuses unless asked, and no answer has an error estimate."""
-_LARGEST_REYNOLDS = 0.1
-_INERTIA = "inertia is neglected (Stokes flow)"
+__all__ = ["accuracy_limits", "calibration_warnings", "no_band_warnings"]
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
     """What has to hold for the answer to be accurate; each broken one is a warning."""
     return [
         *model.cautions(batch),
-        flow_limit(batch, abs(batch.placement.flow or 0.0)),
-        _reynolds_limit("body diameter", result.reynolds_number),
-        _reynolds_limit("tail amplitude", result.tail_reynolds_number, "tail-reynolds-number"),
+        *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number),
     ]
-
-
-def _reynolds_limit(what: str, value: Samples, flag: str = "reynolds-number") -> Limit:
-    return Limit.of(f"Reynolds number ({what})", value, "at most", _LARGEST_REYNOLDS, "1", _INERTIA, flag)
-
-
-def speed_limit(batch: RobotBatch, velocity: Samples) -> Limit:
-    """What has to hold of the largest speed of a run, by its velocities, (n, 3), m/s, for an accurate answer."""
-    speed = float(np.linalg.norm(velocity, axis=-1).max())
-    value = batch.density * speed * batch.body_diameter / batch.viscosity
-    return _reynolds_limit(f"body diameter, at the largest speed of the run, {1e3 * speed:.4g} mm/s", value)
-
-
-def flow_limit(batch: RobotBatch, flow: float) -> Limit:
-    """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
-    value = batch.density * flow * batch.body_diameter / batch.viscosity
-    return _reynolds_limit("imposed flow, body diameter", value, "flow-reynolds-number")
-
-
-def in_stokes_flow(error: float, *reynolds: Samples) -> float:
-    """An error estimate against other solutions of Stokes flow; NaN where inertia rules, which none of them knows."""
-    largest = max(float(np.max(value, initial=0.0, where=np.isfinite(value))) for value in reynolds)
-    return error if largest <= BEYOND_STOKES else float("nan")
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[str]:

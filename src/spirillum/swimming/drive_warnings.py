@@ -10,7 +10,13 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming
 from spirillum.units import show
 
-__all__ = ["drive_warnings"]
+__all__ = ["CONSTANT_TORQUE", "drive_warnings"]
+
+CONSTANT_TORQUE = (
+    "drive.kind = 'torque': constant torque is assumed at every rate, so that speed and rates fall as one over the "
+    "viscosity; those of a motor whose torque falls with its rate fall less"
+)
+"""What a drive of given torque takes for granted."""
 
 
 def drive_warnings(
@@ -39,6 +45,8 @@ def drive_warnings(
             f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already makes up for friction on "
             "the body; with friction reading 'paper' it is counted twice"
         )
+    if rate is None and robot.drive is not None and robot.drive.kind == "torque":
+        found.append(CONSTANT_TORQUE)
     if not motor_driven:
         return found
     if rate is None:

@@ -29,10 +29,22 @@ from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
 from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
+from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import friction_reading
 
-__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over"]
+__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over", "knows_torque", "without_torque"]
 
+OF_TORQUE = (
+    "tail_torque",
+    "drive_torque",
+    "effective_friction",
+    "motor_residual_torque",
+    "shaft_power",
+    "friction_power",
+    "dissipated_power",
+    "hydrodynamic_efficiency",
+)
+"""Quantities that the torque of the model decides."""
 _ELECTRIC = ("torque_constant", "back_emf_constant")
 _WIRE_POINTS = 7
 
@@ -64,7 +76,7 @@ def intervals_of(
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
     size = posterior.count
-    batch, drawn = _drawn(robot, model, posterior, draws, placement or Placement())
+    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, placement or Placement())
     rates = None if tail_rate is None else np.full(size, tail_rate)
     coefficient = draws.get("friction_coefficient") if model.placed else None
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rates, friction=friction)
@@ -113,6 +125,20 @@ def intervals_over(
     return Intervals(low, high, middle)
 
 
+def knows_torque(robot: Robot, model: SwimmerModel) -> bool:
+    """Return whether the discrepancy of a model's torque is known: not where it leaves the walls of a robot's tube out.
+
+    Observations are of speeds and rates. What walls do to the torque moves none of them, for B_eff takes it up.
+    """
+    return model.placed or robot.channel is None
+
+
+def without_torque(found: Intervals) -> Intervals:
+    """Return the intervals without those of torques and of what follows from them."""
+    nan = dict.fromkeys(OF_TORQUE, float("nan"))
+    return Intervals({**found.low, **nan}, {**found.high, **nan}, found.middle)
+
+
 def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
     """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,).
 
@@ -126,7 +152,7 @@ def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile
     """
     draws = posterior.of(robot, np.random.default_rng(1))
     size = posterior.count
-    batch, drawn = _drawn(robot, model, posterior, draws, Placement())
+    batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, Placement())
     coefficient = draws.get("friction_coefficient") if model.placed else None
     rate = np.full(size, robot.hand * (posterior.tail_rate or 1.0))
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rate, friction="none")

@@ -31,8 +31,6 @@ from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import (
     accuracy_limits,
     calibration_warnings,
-    flow_limit,
-    in_stokes_flow,
     no_band_warnings,
 )
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
@@ -43,6 +41,7 @@ from spirillum.swimming.loading import prepared
 from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
+from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option, show
 
@@ -188,6 +187,10 @@ _IN_A_FLOW = (
     "the imposed flow does work on the robot too: efficiencies and cost of transport are of its velocity in the lab, "
     "and do not compare with those of a robot in fluid at rest"
 )
+_NO_TORQUE = (
+    "torques, B_eff and what follows from them have no intervals: model '{}' leaves the walls out, and no observed "
+    "speed or rate tells what these do to the torque; a fit with model 'tube' gives them"
+)
 _NO_WEIGHT = (
     "body.mass or tail.density is unset: nothing tells that its weight keeps the robot on the floor, where it is taken "
     "to lie; allowed: both of them, or its place (--gap, --eccentricity)"
@@ -267,13 +270,15 @@ def predict(  # noqa: PLR0913 - the options of the command
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     whose = posterior_for_of(posterior_for, drawn, ready)
-    intervals = None
+    intervals, torque = None, []
     if drawn is not None:
-        from spirillum.swimming.intervals import intervals_of  # loads compiled loops
+        from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque  # loads compiled loops
 
         intervals = intervals_of(
             ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
         )
+        if not knows_torque(ready, chosen):
+            intervals, torque = without_torque(intervals), [_NO_TORQUE.format(chosen.name)]
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
@@ -281,7 +286,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     check = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = case.swim(batch)
     if not result.valid[0]:
-        raise InputError(case.why_not())
+        raise InputError(case.why_not(result))
     warnings = [
         *ready.warnings,
         *([choice.caution] if choice.caution else []),
@@ -297,7 +302,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     idle = [] if drawn is None or over is None else fitted.outside_warnings(ready, chosen, drawn, friction=acts)
     if idle:
         intervals = None
-    warnings += idle or case.fitted_warnings()
+    warnings += idle or [*case.fitted_warnings(), *torque]
     return Prediction(
         robot=ready,
         model=chosen,
@@ -358,8 +363,7 @@ class _Case:
         found = (
             self.model.stated_speed_error(self.batch) if check is None else float(speed_difference(check, result)[0])
         )
-        flow = flow_limit(self.batch, abs(self.batch.placement.flow or 0.0)).value
-        return in_stokes_flow(found, result.reynolds_number, result.tail_reynolds_number, flow)
+        return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
     def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
         """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
@@ -388,8 +392,11 @@ class _Case:
         """What to be careful about in what was fitted."""
         return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
 
-    def why_not(self) -> str:
+    def why_not(self, result: Swimming) -> str:
         """Why there is no steady motion."""
+        limits = reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number)
+        if problem := stokes_flow_problem(self.batch, limits):
+            return problem
         if self.rate is not None:
             paper = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x"
             return (

@@ -23,6 +23,7 @@ from spirillum.swimming.balance import TorqueBalance, force_free, joined, releas
 from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
 from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of
 from spirillum.swimming.motor import battery_voltage, run_time
+from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 
 __all__ = [
     "Rates",
@@ -108,8 +109,9 @@ def swim(
         motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free` (released; without weight).
 
     Returns:
-        One value for each robot; NaN and `valid = False` where a robot cannot be built or is outside the
-        model's domain.
+        One value for each robot; NaN and `valid = False` where a robot cannot be built, is outside the model's
+        domain, or moves at a Reynolds number above 10 and its option `model.beyond_stokes` is off: the Reynolds
+        numbers themselves are then given.
 
     Raises:
         InputError: for an unknown model or reading, rates that do not match the batch, or robots whose drive
@@ -309,8 +311,8 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
         "propulsive_power": towing,
         "overall_efficiency": towing / electrical,
         "cost_of_transport": np.where(np.isnan(electrical), shaft, electrical) / (_weight(batch) * np.abs(speed)),
-        "reynolds_number": batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity,
-        "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
+        "reynolds_number": body_reynolds(batch, speed),
+        "tail_reynolds_number": tail_reynolds(batch, tail_rate),
         "battery_run_time": lasting,
         **{name: more.get(name, none) for name in _MORE},
     }
@@ -318,7 +320,10 @@ def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str
     moving = valid & np.isfinite(speed) & ~np.isinf(effective)
     if motor is not None and batch.drive == "dc-motor" and batch.joint == "revolute":
         moving = moving & np.isfinite(current)
-    shaped = {name: np.where(moving, value, np.nan) for name, value in values.items()}
+    reynolds = {name: values.pop(name) for name in ("reynolds_number", "tail_reynolds_number")}
+    shaped = {name: np.where(moving, value, np.nan) for name, value in reynolds.items()}  # why a motion is refused
+    moving = moving & is_stokes_flow(batch, reynolds_limits(batch, *shaped.values()))
+    shaped |= {name: np.where(moving, value, np.nan) for name, value in values.items()}
     size = batch.size
     return Swimming(
         **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},

@@ -21,7 +21,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("figures")
     path = synthetic(folder / "o.csv", presets=(WIDE,), wavelengths=(15.0, 25.0), amplitudes=(1.5, 2.5))
     few = Sampling(ensembles=2, walkers=24, warm_up=100, steps=100, doublings=0)
-    return sp.calibrate(path, WIDE, sampling=few)
+    return sp.calibrate(path, WIDE, sampling=few, model="sbt")
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,14 @@ from spirillum.fluid.closed.coefficients import axis_height, coefficient_domain,
 from spirillum.fluid.closed.perrin import body_axial, body_matrix
 from spirillum.fluid.closed.thin_wire import thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.stated import CHECKED, said_of_tail, walls_left_out
+from spirillum.fluid.stated import (
+    CHECKED,
+    SPEED_ERRORS,
+    WITHOUT_INTERACTION,
+    said_of_tail,
+    speed_note,
+    walls_left_out,
+)
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.limits import Limit
@@ -171,9 +178,9 @@ class Rft(SwimmerModel):
     known_error = (
         "against a resolved wire (25, 2.5 mm) the printed coefficients give about +56 % drag, +22 % thrust and "
         "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %, Lighthill's coefficients "
-        "+89, +97 and -12 %; body and tail do not interact, which alone adds some 15 % to the speed"
+        f"+89, +97 and -12 %; body and tail do not interact, which alone adds {WITHOUT_INTERACTION} % to the speed"
     )
-    known_speed_error = 0.15
+    known_speed_error = 0.01 * SPEED_ERRORS["rft"]
     parts = ("body", "tail", "rotor", "robot")
 
     def stated_error(self, options: ModelOptions) -> str:
@@ -183,17 +190,15 @@ class Rft(SwimmerModel):
             return self.known_error
         return (
             f"the '{chosen}' coefficients have not been compared with a resolved wire here; sets differ from each "
-            "other by a factor of up to two in speed; body and tail do not interact, which alone adds some 15 % to it"
+            "other by a factor of up to two in speed; body and tail do not interact, which alone adds "
+            f"{WITHOUT_INTERACTION} % to it"
         )
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`; sets other than the printed one were held against one tail only."""
         if batch.options.rft.coefficients != "printed":
             return self.stated_error(batch.options) + walls_left_out(batch)
-        return (
-            f"{said_of_tail(batch, CHECKED['rft'])}; body and tail do not interact, which alone adds some 15 % to the "
-            f"speed of the paper's robot{walls_left_out(batch)}"
-        )
+        return f"{said_of_tail(batch, CHECKED['rft'])}; {speed_note('rft')}{walls_left_out(batch)}"
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """0 < c_t < c_n, and a wire clear of the floor."""

@@ -28,7 +28,14 @@ from spirillum.fluid.closed.thin_wire import (
     thin_wire_cautions,
 )
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.stated import CHECKED, said_of_tail, walls_left_out
+from spirillum.fluid.stated import (
+    CHECKED,
+    SPEED_ERRORS,
+    WITHOUT_INTERACTION,
+    said_of_tail,
+    speed_note,
+    walls_left_out,
+)
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 
@@ -91,20 +98,17 @@ class Sbt(SwimmerModel):
     references = ("lighthill1976", "biorob2012", "perrin1934")
     known_error = (
         "a long plain helix with uniform forces: end effects decay as one over the number of turns, thick-wire "
-        "effects as eps^2; body and tail do not interact, which alone overestimates the speed by about 15 %; "
+        f"effects as eps^2; body and tail do not interact, which alone adds {WITHOUT_INTERACTION} % to the speed; "
         "the wire's own spin, some 8 % of the axial torque, is an option"
     )
-    known_speed_error = 0.15
+    known_speed_error = 0.01 * SPEED_ERRORS["sbt"]
     parts = ("body", "tail", "rotor", "robot")
     axial_only = True
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`."""
         spin = "" if batch.options.sbt.spin else " (the wire's own spin, some 8 % of the torque, is an option)"
-        return (
-            f"{said_of_tail(batch, CHECKED['sbt'])}{spin}; body and tail do not interact, which alone adds some 15 % "
-            f"to the speed of the paper's robot{walls_left_out(batch)}"
-        )
+        return f"{said_of_tail(batch, CHECKED['sbt'])}{spin}; {speed_note('sbt')}{walls_left_out(batch)}"
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Alpha within the expansion; chi, q and psi positive, so that the block is positive definite."""
