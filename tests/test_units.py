@@ -4,12 +4,14 @@ import math
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.units import KINDS, USUAL, _factor, _registry, among, display_unit, parse_quantity, show, shown_in
 
@@ -357,3 +359,30 @@ def is_a_quantity_or_an_input_error(text: Any, kind: str) -> None:
     assert len(sentence.splitlines()) < 2
     assert len(sentence) < 400
     assert time.process_time() - started < 2  # the first call builds the registry
+
+
+@pytest.mark.parametrize(
+    ("ask", "unit"),
+    [
+        (lambda text: sp.predict("biorob2012-wide", tail_rate=text), "rad/s"),
+        (lambda text: sp.predict("biorob2012-wide", placement={"gap": text}), "m"),
+        (lambda text: sp.predict("biorob2012-wide", placement={"pitch": text}), "rad"),
+        (lambda text: sp.simulate("biorob2012-wide", timing={"duration": text}), "s"),
+        (lambda text: sp.resistance("biorob2012-wide", phase=text), "rad"),
+    ],
+)
+def test_text_without_a_unit_is_refused_with_what_a_float_means(ask: Callable[[Any], object], unit: str) -> None:
+    with pytest.raises(InputError, match=rf' = "0\.2" has no unit; .*; in Python a float is in {unit}$'):
+        ask("0.2")
+
+
+def test_a_float_is_what_the_first_line_of_the_docstring_says() -> None:
+    assert "rates in rad/s" in str(sp.predict.__doc__).splitlines()[0]
+    one, other = (sp.predict("biorob2012-wide", model="rft", tail_rate=rate) for rate in (1.2, "1.2 rad/s"))
+    assert one.forward_velocity == other.forward_velocity
+
+
+def test_fields_of_a_file_take_no_float() -> None:
+    """Where a number without unit is refused, nothing is said of what it would mean."""
+    with pytest.raises(InputError, match=r'has no unit; allowed: a number with its unit, for example "18 mm"$'):
+        sp.load("biorob2012-wide", **{"tail.wavelength": 0.02})

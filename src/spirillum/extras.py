@@ -7,7 +7,12 @@ from types import ModuleType
 
 from spirillum.errors import InputError
 
-__all__ = ["required"]
+__all__ = ["installation_of", "required"]
+
+
+def installation_of(extra: str) -> str:
+    """Return how an extra is installed; the package is on no index, so that it is installed from its own folder."""
+    return f"pip install '.[{extra}]' in the project's folder"
 
 
 def required(name: str, purpose: str, extra: str = "3d") -> ModuleType:
@@ -25,7 +30,7 @@ def required(name: str, purpose: str, extra: str = "3d") -> ModuleType:
         return import_module(name)
     except ModuleNotFoundError as error:
         raise InputError(
-            f"{purpose} needs {error.name or name}, which is not installed; allowed: pip install 'spirillum[{extra}]'"
+            f"{purpose} needs {error.name or name}, which is not installed; allowed: {installation_of(extra)}"
         ) from error
     except ImportError as error:  # a library of the system that it needs is missing
         raise InputError(

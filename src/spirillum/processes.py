@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -55,7 +56,9 @@ def as_they_come(
     try:
         waiting: dict[Future[_Answer], _Task] = {}
         with _no_main():
-            for task in first:
+            with _interrupts_held():  # the pool starts all its processes here
+                waiting[pool.submit(work, first[0])] = first[0]
+            for task in first[1:]:
                 waiting[pool.submit(work, task)] = task
         while waiting:
             done, _ = wait(waiting, return_when=FIRST_COMPLETED)
@@ -101,6 +104,19 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)  # what it was at is lost, and nobody waits for more
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Processes that are started here never see Ctrl-C, which a terminal sends to them too: their parent ends them."""
+    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -27,6 +27,7 @@ __all__ = [
     "Kind",
     "among",
     "display_unit",
+    "float_note",
     "for_people",
     "in_unit",
     "parse_option",
@@ -283,6 +284,10 @@ def _clip(text: str, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
+class _NoUnitError(InputError):
+    """A number without its unit."""
+
+
 def parse_quantity(value: object, kind: Kind) -> float:
     """Read a quantity such as ``"18 mm"`` or a pint quantity into an SI float.
 
@@ -318,7 +323,7 @@ def parse_quantity(value: object, kind: Kind) -> float:
     if not math.isfinite(number):
         raise InputError(f"= {shown} is not finite; allowed: {kind.allowed}")
     if not unit:
-        raise InputError(f'= {shown} has no unit; allowed: a number with its unit, for example "{kind.example}"')
+        raise _NoUnitError(f'= {shown} has no unit; allowed: a number with its unit, for example "{kind.example}"')
     try:
         si = _scaled(number, _factor(unit, kind))
     except InputError as error:
@@ -342,8 +347,19 @@ def parse_option(name: str, value: str | float, kind: Kind) -> float:
             value = f"inf {kind.unit}"
     try:
         return parse_quantity(value, kind)
+    except _NoUnitError as error:
+        raise InputError(f"{name} {error}{float_note(kind.unit)}") from error
     except InputError as error:
         raise InputError(f"{name} {error}") from error
+
+
+def float_note(unit: str) -> str:
+    """Return the end of a refusal of a text without unit: what a float means there.
+
+    Args:
+        unit: SI unit of the quantity.
+    """
+    return f"; in Python a float is in {unit}"
 
 
 def _scaled(number: float, factor: float) -> float:

@@ -83,7 +83,7 @@ MICRO = (
         (["robot"], "does not end in"),
         (["no/such/folder/robot.stl"], "no such folder"),
         (["folder.stl"], "is not a regular file"),
-        (["robot.glb", "--unit", "mm"], "unit = 'mm' for .glb; allowed: mm or m, only for .stl"),
+        (["robot.glb", "--unit", "mm"], "unit = 'mm' for .glb; allowed: mm, um or m, only for .stl"),
         (["robot.stl", "--unit", "inch"], "unit = 'inch' for .stl"),
         (["robot.stl", "--phase", "1"], 'phase = "1" has no unit'),
         (["robot.stl", "--fineness", "0"], "fineness = 0.0; allowed: 0.1 to 20"),

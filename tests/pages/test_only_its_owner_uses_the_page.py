@@ -4,11 +4,15 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
-from contextlib import AsyncExitStack
-from http.client import HTTPConnection
+from collections.abc import Callable
+from contextlib import AsyncExitStack, ExitStack, suppress
+from http.client import HTTPConnection, HTTPException
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +30,7 @@ from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.job import Job
 from spirillum.pages.knobs import Settings
+from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.pages.uploads import TooLargeError, Uploads
 
@@ -47,43 +52,43 @@ def _answer(served: Any, path: str, method: str = "GET", body: bytes | None = No
 
 
 @pytest.fixture
-def cookie(served: Any) -> str:
+def home(served: Any) -> str:
+    """The path of the page, with its key."""
     found = _answer(served, f"/?key={served.key}")
-    assert found.status == 303
-    given = found.headers["Set-Cookie"]
-    assert "HttpOnly" in given
-    assert "SameSite=strict" in given
-    return str(given).partition(";")[0]
+    assert (found.status, found.headers["Location"]) == (303, f"/{served.key}/")
+    assert found.headers["Set-Cookie"] is None  # a browser would send it to every other server of this machine
+    return f"/{served.key}"
 
 
-def test_key_opens_and_nothing_else_does(served: Any, cookie: str) -> None:
-    assert _answer(served, "/", Cookie=cookie).status == 200
-    assert _answer(served, "/").status == 403
-    assert _answer(served, "/?key=wrong").status == 403
-    assert _answer(served, "/main.js").status == 403
-    assert _answer(served, "/main.js", Cookie=cookie[:-2] + "xx").status == 403
+def test_key_opens_and_nothing_else_does(served: Any, home: str) -> None:
+    assert _answer(served, f"{home}/").status == 200
+    assert _answer(served, f"{home}/main.js").status == 200
+    wrong = home[:-2] + "xx"
+    for path in ("/", "/?key=wrong", "/main.js", f"{wrong}/", f"{wrong}/main.js", f"//{home}/main.js", f"/x{home}/"):
+        assert _answer(served, path).status == 403
+    assert _answer(served, f"/main.js?key={served.key}").status == 403
 
 
-def test_every_answer_has_its_headers(served: Any, cookie: str) -> None:
+def test_every_answer_has_its_headers(served: Any, home: str) -> None:
     for path in ("/", "/main.js", "/nothing"):
-        found = _answer(served, path, Cookie=cookie)
+        found = _answer(served, home + path)
         assert {name: found.headers[name] for name in HEADERS} == dict(HEADERS)
     assert "unsafe" not in HEADERS["Content-Security-Policy"]
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1:1", "192.0.2.7:{port}", ""])
-def test_wrong_host_is_refused(served: Any, cookie: str, host: str) -> None:
+def test_wrong_host_is_refused(served: Any, home: str, host: str) -> None:
     port = served.base.rpartition(":")[2]
-    assert _answer(served, "/", Cookie=cookie, Host=host.format(port=port)).status == 403
+    assert _answer(served, home + "/", Host=host.format(port=port)).status == 403
 
 
-def test_another_origin_is_refused(served: Any, cookie: str) -> None:
+def test_another_origin_is_refused(served: Any, home: str) -> None:
     own = served.base
-    assert _answer(served, "/", Cookie=cookie, Origin=own).status == 200
+    assert _answer(served, home + "/", Origin=own).status == 200
     for other in ("http://evil.example", "null", own.replace("127.0.0.1", "localhost"), own + "0"):
-        assert _answer(served, "/", Cookie=cookie, Origin=other).status == 403
-    assert _answer(served, "/replay", "POST", b"x", Cookie=cookie).status == 403  # no origin
-    found = _answer(served, "/replay", "POST", b"no run", Cookie=cookie, Origin=own)
+        assert _answer(served, home + "/", Origin=other).status == 403
+    assert _answer(served, home + "/replay", "POST", b"x").status == 403  # no origin
+    found = _answer(served, home + "/replay", "POST", b"no run", Origin=own)
     assert found.status == 400
     assert b"the file" in found.content
 
@@ -91,25 +96,25 @@ def test_another_origin_is_refused(served: Any, cookie: str) -> None:
 @pytest.mark.parametrize(
     "path", ["/../pyproject.toml", "/%2e%2e/guard.py", "/static/main.js", "/keep/robot.toml?lane=../9"]
 )
-def test_no_path_of_a_client_is_a_file(served: Any, cookie: str, path: str) -> None:
-    assert _answer(served, path, Cookie=cookie).status in (400, 404)
+def test_no_path_of_a_client_is_a_file(served: Any, home: str, path: str) -> None:
+    assert _answer(served, home + path).status in (400, 404)
 
 
-def _socket(served: Any, cookie: str, origin: str | None) -> Any:
-    headers = {"Cookie": cookie} | ({} if origin is None else {"Origin": origin})
-    return connect(served.base.replace("http", "ws") + "/live", additional_headers=headers, max_size=None)
+def _socket(served: Any, home: str, origin: str | None) -> Any:
+    headers = {} if origin is None else {"Origin": origin}
+    return connect(served.base.replace("http", "ws") + home + "/live", additional_headers=headers, max_size=None)
 
 
-def test_socket_wants_key_and_origin(served: Any, cookie: str) -> None:
-    for wrong in ((cookie, "http://evil.example"), (cookie, None), ("a=b", served.base)):
+def test_socket_wants_key_and_origin(served: Any, home: str) -> None:
+    for wrong in ((home, "http://evil.example"), (home, None), ("", served.base), (home[:-1], served.base)):
         with pytest.raises(Exception, match="403"):
             _socket(served, *wrong)
-    with _socket(served, cookie, served.base) as socket:
+    with _socket(served, home, served.base) as socket:
         assert json.loads(socket.recv())["t"] == "past"
 
 
-def test_nonsense_gets_a_sentence(served: Any, cookie: str) -> None:
-    with _socket(served, cookie, served.base) as socket:
+def test_nonsense_gets_a_sentence(served: Any, home: str) -> None:
+    with _socket(served, home, served.base) as socket:
         said = []
         for text in ("nonsense", "[1]", '{"do":"fly"}', '{"do":"set","field":"robot.path","value":"/etc/passwd"}'):
             socket.send(text)
@@ -122,9 +127,9 @@ def test_nonsense_gets_a_sentence(served: Any, cookie: str) -> None:
 
 
 @pytest.mark.parametrize("flood", [["x" * (LARGEST_MESSAGE + 1)], ['{"do":"wake"}'] * 1000], ids=["long", "many"])
-def test_too_much_at_once_is_cut_off(served: Any, cookie: str, flood: list[str]) -> None:
+def test_too_much_at_once_is_cut_off(served: Any, home: str, flood: list[str]) -> None:
     def drown() -> None:
-        with _socket(served, cookie, served.base) as socket:
+        with _socket(served, home, served.base) as socket:
             for text in flood:
                 socket.send(text)
             while True:
@@ -136,9 +141,129 @@ def test_too_much_at_once_is_cut_off(served: Any, cookie: str, flood: list[str])
     assert closed.value.rcvd.code == 1008
 
 
-def test_interrupt_ends_it_cleanly(served: Any) -> None:
-    other = type(served)("--port", "0")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_while_a_film_is_searched(
+    served: Any, trial: Any, tmp_path: Path, number: int, code: int
+) -> None:
+    with (tmp_path / "err").open("w") as err:
+        other = type(served)("--port", "0", stderr=err)
+    film = _answer(other, f"/{other.key}/bench/film?kind=mp4", "POST", trial.path.read_bytes(), Origin=other.base)
+    assert film.status == 200
+    slow = threading.Thread(target=lambda: _dropped(other, "/bench/propose", b'{"film":"trial-1"}'))
+    slow.start()
+    time.sleep(0.3)
+    assert other.ended(number) == code
+    slow.join()
+    assert (tmp_path / "err").read_text() == ""
+
+
+def _dropped(served: Any, path: str, body: bytes) -> None:
+    with suppress(OSError, HTTPException):  # the page ends meanwhile
+        _answer(served, f"/{served.key}{path}", "POST", body, Origin=served.base)
+
+
+def test_malformed_bytes_print_nothing(served: Any, tmp_path: Path) -> None:
+    with (tmp_path / "err").open("w") as err:
+        other = type(served)("--port", "0", stderr=err)
+    address = ("127.0.0.1", int(other.base.rpartition(":")[2]))
+    upgrade = (
+        f"GET /{other.key}/live HTTP/1.1\r\nHost: {other.base[7:]}\r\nOrigin: {other.base}\r\nConnection: Upgrade\r\n"
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    ).encode()
+    mask = bytes(4)
+    frames = {
+        "invalid UTF-8": b"\x81\x82" + mask + b"\xc3\x28",
+        "bytes": b"\x82\x82" + mask + b"\xc3\x28",
+        "no mask": b"\x81\x02ab",
+        "a reserved opcode": b"\x83\x82" + mask + b"ab",
+        "a cut message": b"\x01\x82" + mask + b"\xc3\x28" + b"\x81\x82" + mask + b"ab",
+        "too long": b"\x81\xff" + b"\x7f" * 8 + mask,
+        "a wrong end": b"\x88\x82" + mask + b"\x00\x01",
+    }
+    requests = [upgrade + frame for frame in frames.values()]
+    requests += [b"\xff\xfe\x00 nonsense\r\n\r\n", b"GET /\xc3\x28 HTTP/1.1\r\nHost: \xff\r\n\r\n"]
+    requests.append(upgrade.replace(b"/live", b"/l\xc3\x28ve"))
+    requests.append(upgrade.replace(b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n", b""))
+    for request in requests:
+        with socket.create_connection(address, timeout=5.0) as client:
+            client.sendall(request)
+            client.settimeout(0.3)
+            with suppress(OSError):
+                while client.recv(65536):
+                    pass
+    assert _answer(other, f"/{other.key}/").status == 200
     assert other.ended(signal.SIGINT) == 0
+    assert (tmp_path / "err").read_text() == ""
+
+
+def test_half_open_connections_lock_nobody_out(served: Any, home: str) -> None:
+    address = ("127.0.0.1", int(served.base.rpartition(":")[2]))
+    with ExitStack() as stack:
+        for number in range(300):
+            client = stack.enter_context(socket.create_connection(address, timeout=5.0))
+            with suppress(OSError):  # closed already, for younger ones
+                client.sendall((b"", b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nContent-Length: 9\r\n")[number % 3])
+        assert _answer(served, f"{home}/").status == 200
+        with _socket(served, home, served.base) as live:
+            assert json.loads(live.recv())["t"] == "past"
+
+
+class _Transport(asyncio.Transport):
+    def __init__(self, port: int) -> None:
+        super().__init__({"peername": ("127.0.0.1", port)})
+        self.closed = False
+
+    def abort(self) -> None:
+        self.closed = True
+
+
+def test_connections_without_a_key_are_few_and_short() -> None:
+    async def come() -> list[bool]:
+        strangers = Strangers(most=2, patience=0.02)
+        all_of_them = [_Transport(port) for port in range(4)]
+        strangers.greet(all_of_them[0])
+        strangers.admit(("127.0.0.1", 0))  # it has the key
+        for transport in all_of_them[1:]:
+            strangers.greet(transport)
+        closed = [transport.closed for transport in all_of_them]
+        await asyncio.sleep(0.1)
+        return closed + [transport.closed for transport in all_of_them]
+
+    assert asyncio.run(come()) == [False, True, False, False, False, True, True, True]
+
+
+def _scenes(live: Any, wanted: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+    """The first robot in every scene that is sent, until one is as wanted."""
+    found: list[dict[str, Any]] = []
+    while not (found and wanted(found[-1])):
+        message = json.loads(live.recv(timeout=120))
+        found += [message["lanes"][0]] if message["t"] == "scene" else []
+    return found
+
+
+def test_numbers_are_never_those_of_what_was_set_before(served: Any, home: str) -> None:
+    changes: list[tuple[dict[str, Any], Callable[[dict[str, Any]], bool]]] = [
+        ({"do": "preset", "value": "magnetic-helix"}, lambda lane: lane["robot"] == "magnetic-helix"),
+        ({"do": "preset", "value": "biorob2012-wide"}, lambda lane: lane["robot"] == "biorob2012-wide"),
+        ({"do": "duty", "value": 0.5}, lambda lane: lane["duty"] == 0.5),
+        ({"do": "set", "field": "run.flow", "value": "0.1 mm/s"}, lambda lane: _knob(lane, "run.flow") == 0.1),
+    ]
+    with _socket(served, home, served.base) as live:
+        _scenes(live, lambda lane: bool(lane["numbers"]))
+        for command, is_set in changes:
+            live.send(json.dumps(command))
+            seen = _scenes(live, lambda lane, is_set=is_set: bool(is_set(lane) and lane["numbers"]))  # type: ignore[misc]
+            shown = [lane["numbers"] for lane in seen if is_set(lane)]
+            assert shown[0] is None  # blank first
+            assert all(one is None or one == shown[-1] for one in shown)
+    half = sp.load("biorob2012-wide", **{"drive.duty": 0.5})
+    still, flowing = (sp.predict(half, model="tube", placement=where) for where in (None, {"flow": "0.1 mm/s"}))
+    assert shown[-1]["rows"]["forward_velocity"]["value"] == pytest.approx(flowing.forward_velocity, rel=1e-9)
+    assert abs(flowing.forward_velocity / still.forward_velocity - 1.0) > 0.1
+
+
+def _knob(lane: dict[str, Any], field: str) -> Any:
+    return next(knob["value"] for knob in lane["knobs"] if knob["field"] == field)
 
 
 def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> None:
@@ -178,11 +303,9 @@ def test_only_knobs_can_be_turned() -> None:
         ("robot", {"lane": False}),
     ],
 )
-def test_what_the_bench_cannot_take_gets_a_sentence(
-    served: Any, cookie: str, path: str, message: dict[str, Any]
-) -> None:
+def test_what_the_bench_cannot_take_gets_a_sentence(served: Any, home: str, path: str, message: dict[str, Any]) -> None:
     body = json.dumps(message).encode()
-    found = _answer(served, f"/bench/{path}", "POST", body, Cookie=cookie, Origin=served.base)
+    found = _answer(served, f"{home}/bench/{path}", "POST", body, Origin=served.base)
     assert found.status == 400
     assert b"allowed: " in found.content
 
@@ -195,10 +318,15 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     monkeypatch.setattr(server, "Bench", lambda: bench)
     guard = Guard("127.0.0.1", 1)
     where, _, query = path.partition("?")
-    named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "cookie": f"{guard.cookie}={guard.key}"}
-    named |= {"content-length": "9"}
+    named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "content-length": "9"}
     headers = [(name.encode(), value.encode()) for name, value in named.items()]
-    scope = {"type": "http", "method": "POST", "path": where, "query_string": query.encode(), "headers": headers}
+    scope = {
+        "type": "http",
+        "method": "POST",
+        "path": f"/{guard.key}{where}",
+        "query_string": query.encode(),
+        "headers": headers,
+    }
     comes = iter([{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}])
     sent: list[Any] = []
 
@@ -214,8 +342,8 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     bench.close()
 
 
-def test_what_is_too_large_gets_a_sentence(served: Any, cookie: str) -> None:
-    found = _answer(served, "/bench/state", "POST", bytes(LARGEST_TEXT + 1), Cookie=cookie, Origin=served.base)
+def test_what_is_too_large_gets_a_sentence(served: Any, home: str) -> None:
+    found = _answer(served, f"{home}/bench/state", "POST", bytes(LARGEST_TEXT + 1), Origin=served.base)
     assert (found.status, found.content) == (413, b"1048577 bytes are too much; allowed: 1048576 bytes")
 
 

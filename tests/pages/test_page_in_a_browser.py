@@ -1,8 +1,10 @@
 """The page in a real browser: it draws, it moves, its knobs ask Python, and nothing leaves the machine."""
 
 import json
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import BytesIO
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -113,6 +115,83 @@ def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path:
     assert not wrong
     assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
     context.close()
+
+
+def test_long_replay_leaves_who_has_gone_to_another_view(tab: Any, tmp_path: Path) -> None:
+    sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.4 s"}).to_netcdf(
+        tmp_path / "run.nc", engine="h5netcdf"
+    )
+    waiting: list[Any] = []
+
+    def hold(route: Any) -> None:  # the answer comes when the test lets it
+        waiting.append(route)
+
+    tab.page.route("**/replay", hold)
+    tab.page.click("#tab-replay")
+    tab.value("spirillum.replay && document.querySelector('#replay button.wordy:last-of-type').click()")
+    tab.page.set_input_files("#run-file", tmp_path / "run.nc")
+    tab.until("!document.getElementById('run-status').hidden")
+    assert "Reading run.nc" in tab.page.locator("#run-status").inner_text()
+    while not waiting:
+        tab.page.wait_for_timeout(20)
+    tab.page.click("#tab-swim")
+    waiting[0].continue_()
+    tab.until("spirillum.replay")
+    assert tab.value("spirillum.tab") == "swim"
+    assert not tab.value("document.getElementById('live').hidden")
+    tab.page.click("#tab-replay")
+    tab.until("spirillum.replay.stage.canvas.clientWidth > 0")
+    tab.page.click("#tab-swim")
+    tab.page.unroute("**/replay")
+
+
+def test_numbers_of_the_robot_before_are_not_shown(tab: Any) -> None:
+    tab.value("""() => {
+      const seen = window.seen = [];
+      const holder = document.getElementById("numbers");
+      window.watcher = new MutationObserver(() => {
+        const cell = holder.querySelector("[data-quantity=forward_velocity] .steady");
+        const name = spirillum.scene.lanes[0].robot;
+        if (cell) seen.push([name, cell.textContent, spirillum.scene.lanes[0].numbers !== null]);
+      });
+      watcher.observe(holder, { childList: true, subtree: true, characterData: true });
+    }""")
+    tab.command(do="preset", value="biorob2012-narrow")
+    tab.until(f"spirillum.scene.lanes[0].robot == 'biorob2012-narrow' && {NUMBERS}")
+    tab.command(do="preset", value="biorob2012-wide")
+    tab.until(f"spirillum.scene.lanes[0].robot == 'biorob2012-wide' && {NUMBERS}")
+    seen = tab.value("seen")
+    tab.value("watcher.disconnect()")
+    expected = {
+        name: f"{1e3 * sp.predict(name).forward_velocity:.3f}" for name in ("biorob2012-narrow", "biorob2012-wide")
+    }
+    assert {name for name, _, known in seen if known} == set(expected)
+    assert all(text == (expected[name] if known else "\u2013") for name, text, known in seen)
+
+
+def test_other_servers_of_this_machine_learn_nothing(tab: Any, served: Any) -> None:
+    """Cookies know no ports: what the page leaves in the browser must not reach a server beside it."""
+    heard: list[str] = []
+
+    class Other(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            heard.append(f"{self.requestline}\n{self.headers}")
+            self.send_response(200)
+            self.end_headers()
+
+        def log_message(self, *_: Any) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Other) as other:
+        Thread(target=other.serve_forever, daemon=True).start()
+        there = tab.page.context.new_page()
+        there.goto(served.address)
+        there.goto(f"http://127.0.0.1:{other.server_port}/")
+        there.close()
+        other.shutdown()
+    assert heard
+    assert not tab.page.context.cookies()
+    assert all(served.key not in words and "cookie" not in words.lower() for words in heard)
 
 
 def _pointed(tab: Any, what: str, points: list[tuple[float, float]]) -> str:

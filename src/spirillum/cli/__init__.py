@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
 import signal
 import sys
+import threading
 from _thread import interrupt_main
 from collections.abc import Sequence
 from contextlib import suppress
 from io import TextIOBase, TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
-from threading import Timer
 from types import FrameType
 from typing import Any, TextIO
 
@@ -28,6 +29,9 @@ _INSTEAD = {
 """What is said of options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """What is wrong with a name or place, not with the program."""
+_TERMINATED = 128 + signal.SIGTERM
+"""Exit code after SIGTERM, which schedulers expect, however the command ends then."""
+_KEPT = "interrupted; what was done is kept"
 _AGAIN = 0.02
 """After this time an interrupt that was dropped comes again, s."""
 _OBJECTS = 50_000
@@ -38,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code.
 
     0 done; 1 it ran and found the failure that it was asked to look for; 2 bad input or usage, one sentence on
-    standard error; 130 interrupted.
+    standard error; 130 interrupted (SIGINT); 143 terminated (SIGTERM).
     """
     own = arguments is None  # a process of its own, not a caller's
     try:
@@ -46,12 +50,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _prepare()
         code = _run(arguments)
     except KeyboardInterrupt:  # while errors were being explained
-        code = 130
+        code = _fail(_KEPT, 130)
+    if signal.SIGTERM in _interrupts:
+        code = _TERMINATED
     if own:
         for ending in (signal.SIGINT, signal.SIGTERM):  # all is done but for the interpreter to leave
             signal.signal(ending, signal.SIG_IGN)
         gc.freeze()
+        _leave_threads(code)
     sys.exit(code)
+
+
+def _leave_threads(code: int) -> None:
+    """Leave without the interpreter's own end where a thread is still at work: in compiled code that would abort it."""
+    others = [thread for thread in threading.enumerate() if thread is not threading.current_thread()]
+    if not any(thread.daemon for thread in others):
+        return
+    for thread in others:
+        if not thread.daemon:
+            thread.join()
+    atexit._run_exitfuncs()  # noqa: SLF001 - such as those that remove temporary folders
+    for stream in (sys.stdout, sys.stderr):
+        _flushed(stream)
+    os._exit(code)
 
 
 def _prepare() -> None:
@@ -96,16 +117,20 @@ _interrupts: list[int] = []
 """Signals that have come to end this process."""
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """End by a KeyboardInterrupt, and remember it: a library that is being imported may catch that, and fail later."""
+class _Interrupt(KeyboardInterrupt):
+    """A signal that ends this process. Python itself would replace the exit code after a plain KeyboardInterrupt."""
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    """End by an exception, and remember it: a library that is being imported may catch that, and fail later."""
     _interrupts.append(number)
-    signal.default_int_handler(number, frame)
+    raise _Interrupt
 
 
 def _not_lost(found: sys.UnraisableHookArgs) -> None:
     """An interrupt that came while an object was being removed, where Python drops it, comes again."""
     if isinstance(found.exc_value, KeyboardInterrupt):
-        again = Timer(_AGAIN, interrupt_main)  # at once it would come in here, and be dropped too
+        again = threading.Timer(_AGAIN, interrupt_main)  # at once it would come in here, and be dropped too
         again.daemon = True
         again.start()
     else:
@@ -133,7 +158,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         if code is None:
             raise
         return code
-    return _fail("interrupted", 130) if code == 130 else int(code or 0)
+    return int(code or 0)
 
 
 def _check_names(arguments: Sequence[str]) -> None:
@@ -160,7 +185,8 @@ def _explained(error: BaseException) -> int | None:
     from spirillum.errors import InputError
 
     if isinstance(error, (KeyboardInterrupt, Abort)) or _interrupts:
-        return _fail("interrupted; what was done is kept", 130)
+        kept = str(error) if isinstance(error, Abort) else ""
+        return _fail(f"interrupted; {kept}" if kept else _KEPT, 130)
     if isinstance(error, InputError):
         return _fail(str(error), 2)
     if isinstance(error, MemoryError):

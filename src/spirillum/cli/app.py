@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
 from spirillum.cli.control_commands import control
@@ -62,8 +63,20 @@ __all__ = ["app", "command_line"]
 
 _ROWS = 10
 
+
+class _Commands(TyperGroup):
+    """The tree of commands; an interrupt keeps its sentence, such as what is kept, which the library would drop."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise typer.Abort(str(error)) from error
+
+
 app = typer.Typer(
     name="spirillum",
+    cls=_Commands,
     help="Predict, measure and explain how a robot with a rotating helical tail swims in a fluid-filled channel.",
     no_args_is_help=True,
     rich_markup_mode="markdown",

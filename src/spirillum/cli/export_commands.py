@@ -32,7 +32,7 @@ _OF_RECORDINGS = ("film", "speed")
 
 
 def _complete_units(incomplete: str) -> list[str]:
-    return starting(("m", "mm"), incomplete)
+    return starting(("m", "mm", "um"), incomplete)
 
 
 def export(
@@ -52,7 +52,11 @@ def export(
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     fineness: Annotated[float, typer.Option(help="Triangles along every line, relative to the normal ones.")] = 1.0,
     unit: Annotated[
-        str | None, typer.Option(autocompletion=_complete_units, help="Unit of an STL file: mm, or m.")
+        str | None,
+        typer.Option(
+            autocompletion=_complete_units,
+            help="Unit of an STL file: mm, um or m; else mm, or um where the file is not watertight in mm.",
+        ),
     ] = None,
     sidecar: Annotated[
         bool,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.answer import as_json
+from spirillum.cli.progress_lines import progress_lines
 from spirillum.cli.tables.parts import Answer
 
 __all__ = ["at_work", "patience", "progress_bar", "show", "with_files"]
@@ -84,7 +86,7 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """A progress bar on standard error with the time left; silent for `--json` and where nobody watches.
+    """A progress bar on standard error with the time left, plain lines where it is no terminal; silent for `--json`.
 
     That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will take,
     are lines of their own on standard error in any case.
@@ -101,6 +103,10 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
                 console.print(what, highlight=False)
 
         yield announce
+        return
+    if not console.is_terminal:
+        with progress_lines(partial(console.print, highlight=False, markup=False), lines) as told:
+            yield told
         return
     from rich.progress import (
         BarColumn,
@@ -119,9 +125,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    bar = Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=_PACE
-    )
+    bar = Progress(*columns, console=console, transient=True, speed_estimate_period=_PACE)
     task = bar.add_task("starting", total=None)
     before: list[int | None] = [0, 0]
 

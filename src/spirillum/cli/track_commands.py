@@ -94,7 +94,7 @@ def _end(result: Tracked, source: str) -> None:
     from spirillum.measurement.trials import RATE_NAMES
 
     if result.interrupted:
-        raise typer.Exit(130)
+        raise KeyboardInterrupt
     if result.stopped:
         raise InputError(result.stopped)
     if result.trial is not None:

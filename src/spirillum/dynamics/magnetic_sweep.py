@@ -93,7 +93,7 @@ def magnetic_sweep(
     resolution: Resolution | Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> xr.Dataset:
-    """Speed, phase lag and wobble of a free one-piece swimmer against the rate of the field, in unbounded fluid.
+    """Speed, lag and wobble of a one-piece swimmer against the field's rate; floats are in SI units, rates in rad/s.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.

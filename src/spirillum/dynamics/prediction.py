@@ -43,7 +43,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     beyond_stokes: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
-    """Predict the steady swimming of one robot.
+    """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
 
     With `motion="free"` and the model `tube` the robot is followed in its tube from the placement to its steady motion,
     with weight, film and contact (`spirillum.settle` has the way there). Where it reaches none, `lying.statement` says

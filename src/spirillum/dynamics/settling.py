@@ -175,7 +175,7 @@ def settle(
     until: str | float | None = None,
     progress: Progress | None = None,
 ) -> Settling:
-    """Follow a robot that is laid down in its tube, with its drive on, to where it comes to lie.
+    """Follow a robot from rest in its tube to where it comes to lie; floats are in SI units, rates in rad/s.
 
     The run is that of `spirillum.simulate` with the model `tube`, from the robot's table, which is made first where
     there is none; it is followed until a turn of the tail no longer changes where the robot lies.

@@ -68,7 +68,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     field: Field | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Simulate swimming from rest.
+    """Simulate swimming from rest; floats are in SI units, rates in rad/s.
 
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
     model. With `tube` the walls, film, contact and dry friction are those of the robot's table (`spirillum.prepare`),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from spirillum.exports.glb import glb_bytes
 from spirillum.exports.mjcf import check_inertia, mjcf_text
 from spirillum.exports.parts import mesh_files
 from spirillum.exports.polydata import vtp_bytes
-from spirillum.exports.solid import is_watertight, stl_bytes, united
+from spirillum.exports.solid import UnitedBody, is_watertight_file, stl_bytes, united
 from spirillum.exports.urdf import urdf_text
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.robot import Robot
@@ -29,7 +29,7 @@ KINDS_OF_FILES = {
     ".fmu": "a co-simulation unit (FMI 3.0)",
 }
 """Endings of the files that can be written."""
-STL_UNITS = {"mm": 1e-3, "m": 1.0}
+STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
 """Units of STL files, m."""
 
 
@@ -84,24 +84,47 @@ def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: 
     return found
 
 
-def printable_solid(robot: Robot, pieces: Sequence[RobotMesh], unit: str) -> tuple[Content, dict[str, Any]]:
-    """An STL file of the whole robot, and the numbers of its solid.
+def printable_solid(
+    robot: Robot, pieces: Sequence[RobotMesh], unit: str | None
+) -> tuple[Content, dict[str, Any], list[str]]:
+    """An STL file of the whole robot, the numbers of its solid, and what to be careful about.
 
     Args:
         robot: a checked robot.
         pieces: its surfaces.
-        unit: of the file, a key of `STL_UNITS`.
+        unit: of the file, a key of `STL_UNITS`; None: mm, or um where the file would not be watertight in mm.
     """
-    scale = STL_UNITS[unit]
     body = united(pieces)
+    files = {name: _stl_of(robot, body, name) for name in ([unit] if unit else ["mm", "um"])}
+    chosen = next((name for name, data in files.items() if is_watertight_file(data)), next(iter(files)))
+    watertight = is_watertight_file(files[chosen])
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
     found = {
-        "unit": unit,
+        "unit": chosen,
         "triangles": len(body.faces),
         "bodies": body.bodies,
-        "watertight": is_watertight(body.vertices / scale, body.faces),
+        "watertight": watertight,
         "volume": quantity(body.volume, "m^3"),
         "size": quantity(high - low, "m"),
     }
-    data = stl_bytes(body.vertices / scale, body.faces, f"{robot.name}, unit {unit}")
-    return Content(data, f"{KINDS_OF_FILES['.stl']}, in {unit}"), found
+    return Content(files[chosen], f"{KINDS_OF_FILES['.stl']}, in {chosen}"), found, _cautions(robot, body, found)
+
+
+def _stl_of(robot: Robot, body: UnitedBody, unit: str) -> bytes:
+    return stl_bytes(body.vertices / STL_UNITS[unit], body.faces, f"{robot.name}, unit {unit}")
+
+
+def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[str]:
+    """Why a program may refuse an STL file, a sentence each."""
+    unit = found["unit"]
+    sentences = []
+    if found["bodies"] != 1:
+        sentences.append(f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it")
+    if not found["watertight"]:
+        better = next((name for name in STL_UNITS if is_watertight_file(_stl_of(robot, body, name))), None)
+        remedy = f"use --unit {better}" if better else "repair it before printing"
+        sentences.append(
+            f"the STL file is not watertight in {unit}: programs that read it merge vertices closer than 1e-8 {unit}; "
+            f"{remedy}"
+        )
+    return sentences

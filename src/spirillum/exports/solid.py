@@ -12,11 +12,17 @@ from spirillum.files import MARK
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.surface import Faces, mass_properties
 
-__all__ = ["UnitedBody", "is_watertight", "stl_bytes", "united"]
+__all__ = ["UnitedBody", "is_watertight", "is_watertight_file", "stl_bytes", "united"]
 
 _MERGED = (1e-6, 1e-5, 1e-4)
 """Edges shorter than this fraction of the robot's length are collapsed, since single precision merges their ends. The
 first value that leaves a watertight body is used."""
+
+_READ_AS_ONE = 1e-8
+"""Programs that read STL files merge vertices that are closer than this, in the unit of the file (trimesh does)."""
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+_HEAD = 80
+"""Bytes of a binary STL file before the number of its triangles."""
 
 
 class UnitedBody(NamedTuple):
@@ -68,7 +74,24 @@ def is_watertight(vertices: Samples, faces: Faces) -> bool:
         vertices: (n, 3).
         faces: (m, 3).
     """
-    _, merged = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    return _is_closed(vertices.astype(np.float32), faces)
+
+
+def is_watertight_file(data: bytes) -> bool:
+    """Whether an STL file is watertight as programs read it: in single precision, close vertices taken as one.
+
+    Args:
+        data: of `stl_bytes`.
+    """
+    corners = np.frombuffer(data, _RECORD, offset=_HEAD + 4)["corners"].reshape(-1, 3).astype(float)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    grids = (np.floor(corners / _READ_AS_ONE + shift) for shift in (0.0, 0.5))  # a program rounds one way or the other
+    return all(_is_closed(grid, faces) for grid in grids)
+
+
+def _is_closed(vertices: np.ndarray, faces: Faces) -> bool:
+    """Whether each edge belongs to two triangles that run along it in opposite directions; equal vertices are one."""
+    _, merged = np.unique(vertices, axis=0, return_inverse=True)
     joined = merged.reshape(-1)[faces]
     edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
     keys, back = edges @ [len(vertices), 1], edges @ [1, len(vertices)]
@@ -89,8 +112,8 @@ def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    record = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    record = np.zeros(len(faces), dtype=_RECORD)
     record["normal"] = normal / np.where(length > 0, length, 1.0)
     record["corners"] = corners
-    head = f"{MARK}: {title}".encode("ascii", "replace")[:80].ljust(80)
+    head = f"{MARK}: {title}".encode("ascii", "replace")[:_HEAD].ljust(_HEAD)
     return head + np.uint32(len(faces)).tobytes() + record.tobytes()

@@ -15,7 +15,7 @@ from spirillum.errors import InputError
 from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check_masses, contents_of, printable_solid
 from spirillum.exports.mjcf import FLUID_WARNING
 from spirillum.exports.sidecar import sidecar_of
-from spirillum.exports.solid import is_watertight
+from spirillum.exports.solid import is_watertight, is_watertight_file
 from spirillum.files import output_folder, output_target, protected, whole_files
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
@@ -110,7 +110,7 @@ def export(
 ) -> Export:
     """Write the robot for another program; the ending of the file says for which.
 
-    `.stl` is one closed body in mm for a printer, `.glb` a coloured scene, `.vtp` a surface for ParaView. `.urdf` and
+    `.stl` is one closed body for a printer, `.glb` a coloured scene, `.vtp` a surface for ParaView. `.urdf` and
     `.mjcf` (or `.xml`) are descriptions of two links with mesh files beside them in a folder `<name>-meshes`, and
     with the resistance in `<name>.resistance.json`. `.fmu` is a co-simulation unit of the robot held to its channel's
     axis, compiled for this machine by its C compiler. All files are made before the first takes its place.
@@ -120,7 +120,7 @@ def export(
         path: the file to write.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
-        unit: of an STL file, `mm` (as None) or `m`.
+        unit: of an STL file, `mm`, `um` or `m`; None: mm, or um where the file would not be watertight in mm.
         sidecar: whether to write the resistance beside the file; None: with `.urdf` and `.mjcf` only.
         model: whose resistance, `slender` (as None) or `rft`; of an `.fmu` any model, or `auto` (as None).
         friction: of an `.fmu`, reading of the friction; None: the robot's own.
@@ -146,13 +146,17 @@ def export(
         )
     wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
-        raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")
+        raise InputError(
+            f"unit = {unit!r} for {target.suffix}; allowed: mm, um or m, only for .stl (the others are in m)"
+        )
     if model not in (None, "slender") and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
-    return _shape_of(load(robot), target, angle, fineness, unit or "mm", (model or "slender") if wanted else None)
+    return _shape_of(load(robot), target, angle, fineness, unit, (model or "slender") if wanted else None)
 
 
-def _shape_of(robot: Robot, target: Path, angle: float, fineness: float, unit: str, resistance: str | None) -> Export:
+def _shape_of(
+    robot: Robot, target: Path, angle: float, fineness: float, unit: str | None, resistance: str | None
+) -> Export:
     """A file of the robot's shape, written, with the resistance of a model beside it unless that is None."""
     described = target.suffix in _DESCRIPTIONS
     if described:
@@ -161,9 +165,9 @@ def _shape_of(robot: Robot, target: Path, angle: float, fineness: float, unit: s
     still = described or target.suffix == ".glb"
     pieces = robot_mesh(robot, phase=0.0 if still else angle, fineness=fineness)
     beside = {} if resistance is None else sidecar_of(robot, resistance, angle if described else 0.0)
-    solid = None
+    solid, cautions = None, []
     if target.suffix == ".stl":
-        printable, solid = printable_solid(robot, pieces, unit)
+        printable, solid, cautions = printable_solid(robot, pieces, unit)
         contents = {target.name: printable}
     else:
         contents = contents_of(robot, target, pieces, angle)
@@ -172,9 +176,12 @@ def _shape_of(robot: Robot, target: Path, angle: float, fineness: float, unit: s
         contents[f"{target.stem}.resistance.json"] = Content(as_json(beside).encode(), holds)
     _commit(target, {name: content.data for name, content in contents.items()})
     files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
-    warnings = [*robot.warnings, *beside.get("warnings", [])]
-    if solid is not None and not (solid["watertight"] and solid["bodies"] == 1):
-        warnings.append(f"{target.name} is not one watertight body; a printer may refuse it")
+    cautions += [
+        f"{name} is not watertight in mm, the unit of mesh files: a program that needs closed bodies may refuse it"
+        for name, content in contents.items()
+        if name.endswith("-solid.stl") and not is_watertight_file(content.data)
+    ]
+    warnings = [*robot.warnings, *beside.get("warnings", []), *cautions]
     if target.suffix in (".mjcf", ".xml"):
         warnings.append(FLUID_WARNING)
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))

@@ -237,7 +237,7 @@ def flow(
     phase: str | float = 0.0,
     frame: str = "lab",
 ) -> Flow:
-    """The flow around a robot that swims as the model `slender` or `tube` predicts.
+    """The flow around a robot that swims as `slender` or `tube` predicts; floats are in SI units, rates in rad/s.
 
     Lateral motion and tilt are held: the sideways force and torque that this takes at the given phase are in the flow.
     With `slender` nothing pushes along the axis, and the fluid is unbounded, even where the robot has a channel. With

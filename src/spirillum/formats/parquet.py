@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError
+from spirillum.extras import installation_of
 from spirillum.files import opened
 from spirillum.files.limits import LARGEST_TABLE, LONGEST_CELL, MOST_CELLS, MOST_COLUMNS, MOST_ROWS
 
@@ -30,9 +31,7 @@ def parquet_table(path: Path, what: str, largest: int = LARGEST_TABLE) -> list[t
     try:
         from pyarrow import ArrowException, parquet
     except ImportError as error:
-        raise InputError(
-            f"{path} needs the package pyarrow; allowed: pip install 'spirillum[parquet]', or CSV"
-        ) from error
+        raise InputError(f"{path} needs the package pyarrow; allowed: {installation_of('parquet')}, or CSV") from error
     rows: list[tuple[int, list[str]]] = []
     try:
         with opened(path, f"{what}, or the same in Parquet", largest) as stream:

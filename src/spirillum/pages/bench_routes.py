@@ -15,6 +15,7 @@ from starlette.routing import Route
 
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import LARGEST_TEXT
+from spirillum.pages.background import run_in_background
 from spirillum.pages.bench import Bench
 from spirillum.pages.commands import text_of
 from spirillum.pages.theatre import Theatre
@@ -55,12 +56,12 @@ class _Doors:
 
         async def handle(request: Request) -> Response:
             async with self._uploads.received(request, LARGEST_TEXT) as content:
-                return await self._told(await asyncio.to_thread(act, _message(content)))
+                return await self._told(await run_in_background(act, _message(content)))
 
         return handle
 
     async def _told(self, said: Any) -> Response:
-        return JSONResponse({"said": said, **await asyncio.to_thread(self._bench.state)})
+        return JSONResponse({"said": said, **await run_in_background(self._bench.state)})
 
     def _robot_of_swim(self, message: Mapping[str, Any]) -> None:
         lane = self._theatre.lane_number(message.get("lane"))
@@ -91,7 +92,7 @@ class _Doors:
     async def picture(self, request: Request) -> Response:
         """A frame of a film."""
         name, time = request.query_params.get("film", ""), _number(request.query_params.get("time"))
-        content = await asyncio.to_thread(self._bench.films.picture, name, time)
+        content = await run_in_background(self._bench.films.picture, name, time)
         return Response(content, media_type="image/jpeg")
 
     async def file(self, request: Request) -> Response:
@@ -99,7 +100,7 @@ class _Doors:
         name = request.query_params.get("name", "")
         texts = {"setup.toml": self._bench.desk.setup_text, "robot.toml": self._bench.desk.robot_text}
         if name in texts:
-            text = await asyncio.to_thread(texts[name])
+            text = await run_in_background(texts[name])
             return Response(text, media_type="text/plain", headers=_attached(name))
         path = self._bench.kept(name)
         if path is None:
@@ -134,12 +135,12 @@ async def _received(request: Request, bench: Bench) -> str:
         InputError: if there is no room for it, or it is none.
     """
     kind, size = request.query_params.get("kind", ""), stated_size(request)
-    path: Path = await asyncio.to_thread(bench.films.room_for, kind, size)
+    path: Path = await run_in_background(bench.films.room_for, kind, size)
     try:
         with path.open("wb") as stream:
             async for piece in request.stream():
                 await asyncio.to_thread(stream.write, piece)
-        return await asyncio.to_thread(bench.films.add, path)
+        return await run_in_background(bench.films.add, path)
     except BaseException:
         path.unlink(missing_ok=True)
         raise

@@ -1,9 +1,11 @@
 """Who may talk to the page: the one who has its key, from its own address, not too much and not too often.
 
 The server listens on the loopback unless it is told otherwise, but every web page that a browser shows can send
-requests there. So each request needs the key (in the address that is printed, then in a cookie that only this site is
-sent), a `Host` that is an address and not a name of somebody else's (against DNS rebinding), and, where a browser says
-from which page it comes, this page (`Origin`).
+requests there. So each request needs the key, a `Host` that is an address and not a name of somebody else's (against
+DNS rebinding), and, where a browser says from which page it comes, this page (`Origin`).
+
+The key is the first part of every path. A cookie would not do: cookies ignore ports, and a browser sends them to every
+other server on this machine too.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ import secrets
 import socket
 import time
 from collections.abc import Mapping
-from http.cookies import CookieError, SimpleCookie
 
 __all__ = ["HEADERS", "LARGEST_MESSAGE", "Guard", "MessageRate"]
 
@@ -46,7 +47,6 @@ class Guard:
             port: its port.
         """
         self.key = secrets.token_urlsafe(_KEY_BYTES)
-        self.cookie = f"spirillum-{port}"
         self._port = port
         self._names = {"localhost", host.lower()}
         self._loopback = is_loopback(host)
@@ -75,13 +75,9 @@ class Guard:
         """Whether it is the key, in constant time."""
         return secrets.compare_digest(key.encode(), self.key.encode())
 
-    def knows(self, cookies: str) -> bool:
-        """Whether a `Cookie` header holds the key."""
-        try:
-            found = SimpleCookie(cookies).get(self.cookie)
-        except CookieError:
-            return False
-        return found is not None and self.right_key(found.value)
+    def opens(self, path: str) -> bool:
+        """Whether a path begins with the key."""
+        return self.right_key(path.split("/", 2)[1] if path.startswith("/") else "")
 
 
 def is_loopback(host: str) -> bool:

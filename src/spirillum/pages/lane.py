@@ -86,6 +86,8 @@ class Lane:
     """Why it does not swim, in a sentence."""
     generation: int = 0
     """Counts what was set; what is built for an older one is dropped."""
+    revision: int = 0
+    """Counts what changes the prediction, which duty and imposed flow do while the robot swims on."""
     recording: Recording = field(default_factory=Recording)
     preparing: dict[str, Any] | None = None
     """Progress of a table that is being made."""
@@ -134,7 +136,14 @@ class Lane:
         preset = source.name in preset_names() and load(source.name) == source
         chosen = source.name if preset else source  # a preset can be named on the command line
         self._become(replace(self.settings, source=chosen, overrides=dict(overrides)), "")
-        self.duty = self.robot.drive.duty if self.robot.drive is not None else 1.0
+        self.set_duty()
+
+    def set_duty(self, duty: float | None = None) -> None:
+        """Turn the remote's duty; None: that of the robot's own drive."""
+        if duty is None:
+            duty = self.robot.drive.duty if self.robot.drive is not None else 1.0
+        self.duty = duty
+        self.void_numbers()
 
     def undo(self, *, forward: bool = False) -> None:
         """Go one change back, or forward again."""
@@ -151,7 +160,14 @@ class Lane:
         self.generation += 1
         self.built = self.moment = None
         self.trouble = ""
+        self.preparing = None
         self.recording = Recording()
+        self.void_numbers()
+
+    def void_numbers(self) -> None:
+        """Show no prediction and no flow until those of the present robot, duty and imposed flow are there."""
+        self.revision += 1
+        self.numbers = None
         self.without_flow()
 
     def with_flow(self, tell: Callable[[], None]) -> None:
@@ -203,6 +219,7 @@ class Lane:
         except InputError:
             self.settings = before
             raise
+        self.void_numbers()
         self._remember(before, "run.flow")
         return True
 

@@ -65,13 +65,15 @@ def page(
 
     from spirillum.pages.guard import Guard, is_loopback
     from spirillum.pages.server import application
+    from spirillum.pages.strangers import Strangers, protocol_for
 
     listening = _listening(host, port)
     with listening:
         number = int(listening.getsockname()[1])
         guard = Guard(host, number)
         own, first_run = ("biorob2012-wide", None) if run is None else _replay(run)
-        app = application(own if robot is None else robot, guard, first_run=first_run)
+        strangers = Strangers()
+        app = application(own if robot is None else robot, guard, strangers=strangers, first_run=first_run)
         shown = f"[{host}]" if ":" in host else host
         if host in ("0.0.0.0", "::"):  # noqa: S104 - it was asked for, and is said
             shown = socket.gethostname()
@@ -89,11 +91,11 @@ def page(
                 opening.start()
             config = uvicorn.Config(
                 app,
-                log_level="warning",
+                http=protocol_for(strangers),
+                log_level="critical",  # malformed requests are not for the terminal; the application prints its faults
                 ws="websockets-sansio",
                 ws_max_size=1 << 16,
                 ws_per_message_deflate=False,
-                limit_concurrency=200,
                 timeout_graceful_shutdown=1,
                 server_header=False,
                 access_log=False,

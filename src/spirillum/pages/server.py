@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from typing import Any
@@ -17,11 +18,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
+from spirillum.pages.background import run_in_background
 from spirillum.pages.bench import Bench
 from spirillum.pages.bench_routes import bench_routes
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
+from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
 from spirillum.pages.theatre import Theatre
 from spirillum.pages.uploads import TooLargeError, Uploads
@@ -33,7 +36,6 @@ _MOST_REFUSALS = 20
 _EACH_SECOND, _AT_ONCE = 80.0, 160.0
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 _OWN = (
-    "index.html",
     "page.css",
     "main.js",
     "knobs.js",
@@ -45,25 +47,38 @@ _OWN = (
     *MODULES,
 )
 """The page's files; nothing else is served."""
+_MISSING = "the key is missing: open the address that `spirillum page` has printed"
 
 
 class _Guarded:
     """The guard around the application."""
 
-    def __init__(self, app: ASGIApp, guard: Guard) -> None:
-        self._app, self._guard = app, guard
+    def __init__(self, app: ASGIApp, guard: Guard, strangers: Strangers) -> None:
+        self._app, self._guard, self._strangers = app, guard, strangers
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        key = self._guard.key
         refused = self._refused(scope)
         if not refused:
-            await self._app(scope, receive, _with_headers(send))
+            self._strangers.admit(scope.get("client"))
+            await self._answer({**scope, "root_path": f"/{key}"}, receive, _with_headers(send))
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": refused})
+        elif refused == _MISSING and self._is_printed_address(scope):
+            await RedirectResponse(f"/{key}/", status_code=303, headers=dict(HEADERS))(scope, receive, send)
         else:
             await PlainTextResponse(f"{refused}\n", status_code=403, headers=dict(HEADERS))(scope, receive, send)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; print a fault of the program, since the server's own log holds malformed requests too."""
+        try:
+            await self._app(scope, receive, send)
+        except Exception:
+            traceback.print_exc()
+            raise
 
     def _refused(self, scope: Scope) -> str:
         """Why a request is refused; empty for one that is not."""
@@ -75,13 +90,12 @@ class _Guarded:
             return "another page has no business here"
         if origin is None and (scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")):
             return "a request without its origin"
-        if guard.knows(headers.get("cookie", "")):
-            return ""
-        if scope["type"] == "http" and scope["path"] == "/" and scope["method"] == "GET":
-            key = Request(scope).query_params.get("key", "")
-            if guard.right_key(key):
-                return ""
-        return "the key is missing: open the address that `spirillum page` has printed"
+        return "" if guard.opens(scope["path"]) else _MISSING
+
+    def _is_printed_address(self, scope: Scope) -> bool:
+        """Whether a request is for the address that `page` prints, `/?key=...`."""
+        own = scope["path"] == "/" and scope["method"] == "GET"
+        return own and self._guard.right_key(Request(scope).query_params.get("key", ""))
 
 
 def _with_headers(send: Send) -> Send:
@@ -107,10 +121,9 @@ class _Client:
 class _House:
     """The theatre and those who look."""
 
-    def __init__(self, source: Any, guard: Guard) -> None:
+    def __init__(self, source: Any) -> None:
         self.theatre = Theatre(source, self._publish)
         self.bench = Bench()
-        self._guard = guard
         self._clients: set[_Client] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -137,14 +150,6 @@ class _House:
 
     def _count_those_who_look(self) -> None:
         self.theatre.look(any(client.looks for client in self._clients))
-
-    async def home(self, request: Request) -> Response:
-        """The page; with the key in its address, first the cookie that takes the key's place."""
-        if request.query_params.get("key") is None:
-            return Response(asset("index.html"), media_type="text/html")
-        answer = RedirectResponse("/", status_code=303)
-        answer.set_cookie(self._guard.cookie, self._guard.key, httponly=True, samesite="strict", path="/")
-        return answer
 
     async def connect(self, socket: WebSocket) -> None:
         """One tab, as long as it is open."""
@@ -176,21 +181,24 @@ class _House:
             self._count_those_who_look()
 
 
-def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None = None) -> ASGIApp:
+def application(
+    source: Any, guard: Guard, *, strangers: Strangers | None = None, first_run: dict[str, Any] | None = None
+) -> ASGIApp:
     """The page's application.
 
     Args:
         source: robot to start with.
         guard: who may talk to it.
+        strangers: connections that have not shown the key yet.
         first_run: a run to replay at once, see `spirillum.pages.replay`.
 
     Raises:
         InputError: if the robot cannot be loaded.
     """
-    house, uploads = _House(source, guard), Uploads()
+    house, uploads = _House(source), Uploads()
     routes = [
-        Route("/", house.home),
-        *[Route(f"/{name}", _file(name)) for name in _OWN if name != "index.html"],
+        Route("/", _file("index.html")),
+        *[Route(f"/{name}", _file(name)) for name in _OWN],
         *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
         *bench_routes(house.bench, house.theatre, uploads),
         Route("/flow", _flow(house.theatre)),
@@ -200,7 +208,8 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
         WebSocketRoute("/live", house.connect),
     ]
     handlers = dict.fromkeys((InputError, OSError, ClientDisconnect), _said)
-    return _Guarded(Starlette(routes=routes, lifespan=house.open, exception_handlers=handlers), guard)
+    app = Starlette(routes=routes, lifespan=house.open, exception_handlers=handlers)
+    return _Guarded(app, guard, strangers or Strangers())
 
 
 async def _said(request: Request, error: Exception) -> Response:
@@ -290,7 +299,7 @@ def _kept(name: str, theatre: Theatre) -> Handler:
         return Response(text, media_type=media, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
     async def serve(request: Request) -> Response:
-        return await asyncio.to_thread(made, request.query_params.get("lane", "0"))
+        return await run_in_background(made, request.query_params.get("lane", "0"))
 
     return serve
 
@@ -334,6 +343,6 @@ def _sent(read: Callable[[bytes], Any], largest: int, uploads: Uploads) -> Handl
 
     async def serve(request: Request) -> Response:
         async with uploads.received(request, largest) as content, one:
-            return JSONResponse(await asyncio.to_thread(read, content))
+            return JSONResponse(await run_in_background(read, content))
 
     return serve

@@ -48,15 +48,15 @@ class Theatre:
         self._own = source if isinstance(source, str) and source in preset_names() else robot_tables(source)
         self._publish = publish
         self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
-        self._wanted: dict[int, tuple[int, str, Settings, Robot, Robot]] = {}
+        self._wanted: dict[int, tuple[int, int, str, Settings, Robot, Robot]] = {}
         self._work = threading.Condition()
-        self._built: queue.Queue[tuple[int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
+        self._built: queue.Queue[tuple[int, int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
         self._lanes = [Lane.of(self._own)]
         self._preparing: Preparing | None = None
         self._study: StudyPicture | None = None
         self._playing, self._pace, self._looked_at = True, 1.0, False
         self._ending = threading.Event()
-        self._asked: list[tuple[int, int]] = []
+        self._asked: list[int] = []
         self._behind = 0.0
         self._lock = threading.Lock()
         self.version, self.scene, self.frame = 0, "", ""
@@ -193,7 +193,7 @@ class Theatre:
             except queue.Empty:
                 break
         for index, lane in enumerate(self._lanes):
-            if self._asked[index : index + 1] != [(lane.generation, hash(lane.duty))]:
+            if self._asked[index : index + 1] != [lane.revision]:
                 self._want(index)
         self._tell_scene()
         return changed
@@ -213,8 +213,7 @@ class Theatre:
 
     def _preset(self, lane: Lane, command: Mapping[str, Any]) -> None:
         lane.preset(text_of(command, "value"), self._own)
-        drive = lane.robot.drive
-        lane.duty = drive.duty if drive is not None else 1.0
+        lane.set_duty()
 
     def _tail(self, lane: Lane, command: Mapping[str, Any]) -> None:
         if self._study is None:
@@ -235,8 +234,7 @@ class Theatre:
         lane.remote = bool(command.get("value"))
 
     def _duty(self, lane: Lane, command: Mapping[str, Any]) -> None:
-        lane.duty = number_of(command, 0.0, 1.0)
-        lane.without_flow()  # it was that of another speed
+        lane.set_duty(number_of(command, 0.0, 1.0))
 
     def _flow(self, lane: Lane, command: Mapping[str, Any]) -> None:
         if command.get("value"):
@@ -286,11 +284,11 @@ class Theatre:
 
     def _want(self, index: int) -> None:
         lane = self._lanes[index]
-        asked = (lane.generation, hash(lane.duty))
-        self._asked[index:] = [asked]
+        self._asked[index:] = [lane.revision]
         with self._work:
             known = "" if lane.built is None else lane.built.model
-            self._wanted[index] = (lane.generation, known, lane.settings, lane.robot, lane.predicted())
+            asked = lane.generation, lane.revision
+            self._wanted[index] = (*asked, known, lane.settings, lane.robot, lane.predicted())
             self._work.notify()
 
     def _build(self) -> None:
@@ -301,16 +299,16 @@ class Theatre:
                 if self._ending.is_set():
                     return
                 index = next(iter(self._wanted))
-                generation, model, settings, robot, predicted = self._wanted.pop(index)
+                *asked, model, settings, robot, predicted = self._wanted.pop(index)
             try:
                 if not model:
                     built = build(settings, robot)
                     model = built.model
-                    self._built.put((index, generation, built, None, ""))
+                    self._built.put((index, *asked, built, None, ""))
                     self._wake_up()
-                self._built.put((index, generation, None, self._numbers(predicted, settings, model), ""))
+                self._built.put((index, *asked, None, self._numbers(predicted, settings, model), ""))
             except InputError as error:
-                self._built.put((index, generation, None, None, str(error)))
+                self._built.put((index, *asked, None, None, str(error)))
             self._wake_up()
 
     def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:
@@ -324,7 +322,7 @@ class Theatre:
         changed = False
         while True:
             try:
-                index, generation, built, numbers, trouble = self._built.get_nowait()
+                index, generation, revision, built, numbers, trouble = self._built.get_nowait()
             except queue.Empty:
                 break
             if index >= len(self._lanes) or self._lanes[index].generation != generation:
@@ -333,9 +331,9 @@ class Theatre:
             with self._lock:
                 if built is not None:
                     lane.take(built)
-                if numbers is not None:
+                if numbers is not None and revision == lane.revision:
                     lane.numbers = numbers
-                if trouble:
+                if trouble and revision == lane.revision:
                     lane.trouble, lane.numbers = trouble, None
             changed = True
         if self._preparing is not None:
@@ -345,19 +343,18 @@ class Theatre:
         return changed
 
     def _look_at_table(self, preparing: Preparing) -> bool:
-        said = preparing.progress()
-        lane = next((lane for lane in self._lanes if lane.robot is preparing.robot), None)
-        if lane is None:
-            return False
-        changed = lane.preparing != said
-        lane.preparing = said
-        if not preparing.running:
-            self._preparing = None
-            if said.get("done"):
-                lane.preparing = None
+        """Tell the progress of a table at the robots that it is for; whether it has changed."""
+        said, running = preparing.progress(), preparing.running
+        before = [lane.preparing for lane in self._lanes]
+        for index, lane in enumerate(self._lanes):
+            own = lane.robot == preparing.robot
+            lane.preparing = said if own else None
+            if own and said.get("done") and not running:
                 lane.start_anew()
-                self._want(self._lanes.index(lane))
-        return changed
+                self._want(index)
+        if not running:
+            self._preparing = None
+        return before != [lane.preparing for lane in self._lanes]
 
     # what is told
 

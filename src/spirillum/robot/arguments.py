@@ -12,6 +12,7 @@ from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.scalars import is_number, is_whole
+from spirillum.units import float_note
 
 __all__ = ["Options", "in_range", "one_of", "refusal", "whole", "within"]
 
@@ -69,8 +70,14 @@ class Options(Section):
         given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
         checked = problems_in(cls, given, cls.argument if cls.prefixed else "")
         if isinstance(checked, list):
-            raise refused_table(checked)
+            raise refused_table([_with_note(problem, units) for problem in checked])
         return checked
+
+
+def _with_note(problem: str, units: Mapping[str, str]) -> str:
+    """A problem; where a text has no unit, with what a float means in its field."""
+    field = problem.partition(" ")[0].rpartition(".")[2]
+    return f"{problem}{float_note(units[field])}" if " has no unit; " in problem and field in units else problem
 
 
 def _with_unit(value: Any, unit: str | None) -> Any:

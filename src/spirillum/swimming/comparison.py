@@ -164,7 +164,7 @@ def compare_models(
     placement: Placement | Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> ModelComparison:
-    """Predict the steady swimming of one robot with several models.
+    """Predict the steady swimming of one robot with several models; floats are in SI units, rates in rad/s.
 
     A model whose domain the robot leaves is listed with its reason; the others answer.
 

@@ -217,7 +217,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
-    """Predict the steady swimming of one robot.
+    """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
 
     Where the answer depends on the robot's place in its channel and `placement` leaves its gap or its pitch open, the
     answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and, where the robot has a table

@@ -13,6 +13,8 @@ from spirillum.cli import main
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.files import write_dataset
 
+HINT = "pip install '.[3d]' in the project's folder"
+
 
 @pytest.fixture
 def sentence(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
@@ -117,13 +119,11 @@ def test_missing_package_is_named_with_its_remedy(
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "av", None)
         said = sentence("film", "run.nc", "-o", "run.mp4")
-        assert said == "spirillum: a film needs av, which is not installed; allowed: pip install 'spirillum[3d]'\n"
+        assert said == f"spirillum: a film needs av, which is not installed; allowed: {HINT}\n"
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "pyvista", None)
         said = sentence("show", "biorob2012-wide")
-    assert (
-        said == "spirillum: a 3D picture needs pyvista, which is not installed; allowed: pip install 'spirillum[3d]'\n"
-    )
+    assert said == f"spirillum: a 3D picture needs pyvista, which is not installed; allowed: {HINT}\n"
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "TILTED", "announcement"]
+__all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "TILTED", "announcement", "kept_after"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
@@ -31,3 +31,13 @@ def announcement(places: int, workers: int, kept: int) -> str:
         f"{ANNOUNCED}: it is made now, once, from {places} places{before}, in {minutes} with "
         f"{'1 process' if workers == 1 else f'{workers} processes'}"
     )
+
+
+def kept_after(places: int, kept: int) -> str:
+    """What is kept of a preparation that was interrupted, and how it resumes.
+
+    Args:
+        places: number of places from which the tables are made.
+        kept: number of them that are solved for and stored.
+    """
+    return f"{kept} of {places} places are kept, and the same command resumes from there"

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.announced import announcement
+from spirillum.fluid.tube.announced import announcement, kept_after
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
@@ -64,15 +64,32 @@ def built_tables(
 
     Raises:
         InputError: for a robot without a table, such as one whose tail is wider than its body.
+        KeyboardInterrupt: if it was interrupted; says how many places are kept.
     """
-    start = time.perf_counter()
     every = [Places(geometry, radius) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
     wanted = [place for some in nodes for place in some]
     if progress is not None:
-        shared = solved_as_one(wanted)
-        kept = sum(all_kept([wanted[number] for number in numbers]) for numbers in shared)
-        progress(announcement(len(shared), workers, kept), 0, len(shared))
+        count, kept = _solved_before(wanted)
+        progress(announcement(count, workers, kept), 0, count)
+    try:
+        return _solved_tables(every, nodes, workers, progress)
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
+
+
+def _solved_before(places: Sequence[Solution]) -> tuple[int, int]:
+    """Number of places that are solved for on their own, and how many of them are kept."""
+    shared = solved_as_one(places)
+    return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
+
+
+def _solved_tables(
+    every: Sequence[Places], nodes: Sequence[list[Solution]], workers: int, progress: Progress | None
+) -> list[TubeTable]:
+    """The tables of robots whose nodes are given."""
+    start = time.perf_counter()
+    wanted = [place for some in nodes for place in some]
     found = iter(solutions(wanted, "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
     held = [(_held_out(places), _held_out(places, yawed=False)) for places in every]

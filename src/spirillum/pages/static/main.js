@@ -26,7 +26,7 @@ state.study = new Study($("study"), (command) => send({ ...command, lane: state.
 // The wire
 
 function connect() {
-  const socket = new WebSocket(`ws://${location.host}/live`);
+  const socket = new WebSocket(new URL("live", location.href.replace(/^http/, "ws")));
   state.socket = socket;
   socket.addEventListener("message", (event) => hear(JSON.parse(event.data)));
   socket.addEventListener("open", () => { $("lost").hidden = true; look(); });
@@ -93,6 +93,9 @@ class Lane {
     this.name.title = lane.description;
     if (lane.generation !== this.generation || !this.shape) {
       this.generation = lane.generation;
+      this.frame = null; // it was of what was set before
+      this.dirty = false;
+      this.sectionWords.textContent = "";
       const shape = JSON.stringify(lane.shape);
       if (shape !== this.shapeText) this.stage.setShape(lane.shape);
       this.shapeText = shape;
@@ -144,7 +147,7 @@ class Lane {
     this.flow = flow;
     this.toggles.flow.setAttribute("aria-pressed", String(Boolean(flow)));
     if (flow?.done && !this.plane) {
-      const answer = await fetch(`/flow?lane=${this.index}`);
+      const answer = await fetch(`flow?lane=${this.index}`);
       if (!answer.ok || !this.flow) return;
       this.plane = await answer.json();
       this.stage.setFlow(this.plane);
@@ -268,8 +271,8 @@ function select(tab) {
 function open(tab) {
   if (tab === "compare" && state.lanes.length < 2) send({ do: "compare", value: true });
   if (tab === "swim" && state.lanes.length > 1) send({ do: "compare", value: false });
-  if (tab === "replay" && !state.replay) askForRun();
-  if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen, begin);
+  if (tab === "replay" && !state.replay && !state.loading) askForRun();
+  if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen, (run) => begin(run, state.tab === "measure"));
   if (tab !== "compare" || state.lanes.length > 1) select(tab);
 }
 
@@ -329,39 +332,58 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setT
 function askForRun() {
   const input = element("input", { type: "file", accept: ".nc", id: "run-file", onchange: () => input.files[0] && replay(input.files[0]) });
   const error = element("p", { class: "error", role: "alert", id: "run-error" });
+  const status = element("div", { class: "table-note", role: "status", id: "run-status", hidden: true });
   const drop = element("div", { class: "drop" },
     element("h2", { text: "Replay a run" }),
     element("p", {}, "Drop the file of a run here, as ", element("code", { text: "spirillum simulate \u2026 -o run.nc" }), " writes it, or choose it."),
     element("label", { class: "plain", for: "run-file" }, "Choose a run"), input,
-    element("button", { class: "plain", text: "Replay what was just seen", onclick: () => replayNow() }), error);
+    element("button", { class: "plain", text: "Replay what was just seen", onclick: () => replayNow() }), status, error);
   $("replay").replaceChildren(drop);
 }
 
-async function replay(file) {
-  const answer = await fetch("/replay", { method: "POST", body: file });
-  const error = $("run-error");
-  if (!answer.ok) {
-    if (error) error.textContent = await answer.text();
-    return;
+function replay(file) {
+  return load(`Reading ${file.name}`, () => fetch("replay", { method: "POST", body: file }));
+}
+
+function replayNow() {
+  return load("Collecting the run", () => fetch(`keep/run.json?lane=${state.chosen}`));
+}
+
+// A long run takes a while: what is being done is said meanwhile, and who has gone to another view stays there.
+async function load(words, ask) {
+  const turn = state.loading = {};
+  if (state.replay) leaveReplay();
+  const status = $("run-status"), error = $("run-error");
+  error.textContent = "";
+  status.hidden = false;
+  status.replaceChildren(element("p", { text: `${words} \u2026` }), element("progress"));
+  let run = null, problem = "";
+  try {
+    const answer = await ask();
+    if (answer.ok) run = await answer.json();
+    else problem = await answer.text();
+  } catch {
+    problem = "The run did not arrive; is the program still running?";
   }
-  begin(await answer.json());
+  if (turn !== state.loading) return; // another run was asked for meanwhile
+  state.loading = null;
+  status.hidden = true;
+  error.textContent = problem;
+  if (run) begin(run, state.tab === "replay");
 }
 
-async function replayNow() {
-  const answer = await fetch(`/keep/run.json?lane=${state.chosen}`);
-  if (answer.ok) begin(await answer.json());
-  else $("run-error").textContent = await answer.text();
-}
-
-function begin(run) {
+function begin(run, show = true) {
   state.replay?.end();
-  state.replay = showReplay($("replay"), { ...run, quantities: run.quantities ?? state.scene.quantities }, () => {
-    state.replay.end();
-    state.replay = null;
-    askForRun();
-  });
+  state.replay = showReplay($("replay"), { ...run, quantities: run.quantities ?? state.scene.quantities }, leaveReplay);
   state.replay.setTheme(theme());
-  select("replay");
+  if (show) select("replay");
+  else state.replay.play(false);
+}
+
+function leaveReplay() {
+  state.replay.end();
+  state.replay = null;
+  askForRun();
 }
 
 // Runs are replayed; films, setups and robots are measured.
@@ -388,7 +410,7 @@ for (const name of ["dragover", "drop"]) {
 
 async function keep() {
   const dialog = $("keeping"), lane = state.chosen;
-  const answer = await fetch(`/keep/words.json?lane=${lane}`);
+  const answer = await fetch(`keep/words.json?lane=${lane}`);
   const said = answer.ok ? await answer.json() : { commands: "", python: "" };
   const block = (title, text) => {
     const copy = element("button", { class: "quiet wordy", text: "Copy", onclick: async () => {
@@ -397,7 +419,7 @@ async function keep() {
     } });
     return element("section", {}, element("h3", {}, title, copy), element("pre", { tabindex: "0" }, element("code", { text })));
   };
-  const file = (name, words) => element("a", { class: "plain", href: `/keep/${name}?lane=${lane}`, download: name, text: words });
+  const file = (name, words) => element("a", { class: "plain", href: `keep/${name}?lane=${lane}`, download: name, text: words });
   dialog.replaceChildren(
     element("h2", { text: "Keep" }),
     element("p", { class: "soft", text: "Everything that is seen, to take away: the same numbers on the command line and in Python, and the run as one file that replays in any browser with no server." }),
@@ -421,7 +443,7 @@ new ResizeObserver(() => state.lanes.forEach((lane) => { lane.dirty = true; })).
 window.spirillum = state; // for the console, and for tests
 connect();
 requestAnimationFrame(tick);
-fetch("/first-run").then((answer) => answer.json()).then((run) => {
-  const wait = () => (state.scene ? run && begin(run) : setTimeout(wait, 50));
+fetch("first-run").then((answer) => answer.json()).then((run) => {
+  const wait = () => (state.scene ? run && begin(run, state.tab === "swim") : setTimeout(wait, 50));
   wait();
 });

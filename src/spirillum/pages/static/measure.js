@@ -24,7 +24,7 @@ export class Measure {
   // One after the other, so that no older answer comes last; a message is made when its turn comes.
   post(what, message = () => ({})) {
     const send = async () => {
-      const answer = await fetch(`/bench/${what}`, { method: "POST", body: JSON.stringify(message()) });
+      const answer = await fetch(`bench/${what}`, { method: "POST", body: JSON.stringify(message()) });
       if (!answer.ok) throw new Error(await answer.text());
       return answer.json();
     };
@@ -66,7 +66,7 @@ export class Measure {
       await this.attempt("films", async () => {
         if (kind === "toml") return this.ask("text", { text: await file.text() });
         this.tell("films", `Taking ${file.name} \u2026`);
-        const answer = await fetch(`/bench/film?kind=${encodeURIComponent(kind)}`, { method: "POST", body: file });
+        const answer = await fetch(`bench/film?kind=${encodeURIComponent(kind)}`, { method: "POST", body: file });
         if (!answer.ok) throw new Error(await answer.text());
         const state = await answer.json();
         this.names[state.said] = file.name;
@@ -103,7 +103,7 @@ export class Measure {
 
   frame() {
     const image = new Image();
-    const wanted = `/bench/picture?film=${encodeURIComponent(this.film)}&time=${this.time.toFixed(4)}`;
+    const wanted = `bench/picture?film=${encodeURIComponent(this.film)}&time=${this.time.toFixed(4)}`;
     image.onload = () => { if (this.wanted === wanted) this.pointer.show(image); };
     this.wanted = wanted;
     image.src = wanted;
@@ -212,7 +212,7 @@ export class Measure {
         element("section", { class: "card knobs", "aria-label": "Setup" }, element("h2", { text: "Setup" }),
           element("div", { class: "knob wide" }, element("label", { for: "measured-robot", text: "Robot" }), this.robot), this.form, this.lines.form,
           element("details", {}, element("summary", { text: "The setup file" }), this.file,
-            element("p", { class: "files" }, element("a", { class: "plain calm", href: "/bench/file?name=setup.toml", download: "setup.toml", text: "setup.toml" }), element("a", { class: "plain calm", href: "/bench/file?name=robot.toml", download: "robot.toml", text: "robot.toml" })))),
+            element("p", { class: "files" }, element("a", { class: "plain calm", href: "bench/file?name=setup.toml", download: "setup.toml", text: "setup.toml" }), element("a", { class: "plain calm", href: "bench/file?name=robot.toml", download: "robot.toml", text: "robot.toml" })))),
         element("section", { class: "card foot", "aria-label": "Measure" }, this.go, this.lines.work, this.work)),
     );
   }
@@ -372,7 +372,7 @@ export class Measure {
     if (found) [model.value, method.value] = [found.model, found.method];
     const go = element("button", { class: "plain calm", id: "calibrate-go", text: "Calibrate", disabled: !measure.files.includes("observations.csv"), onclick: () => this.attempt("calibration", () => this.ask("calibrate", { model: model.value, method: method.value })) });
     const shown = found ? [element("h3", { text: `Model ${found.model}, ${found.method}` }), table(found.rows), ...(found.statement ? [element("p", { class: "under told", text: `${capital(found.statement)}.` })] : []), ...warnings(found.warnings),
-      ...found.figures.filter((name) => /observed-/.test(name)).map((name) => element("img", { class: "drawn", src: `/bench/file?name=${encodeURIComponent(name)}`, alt: "Observed against predicted" })),
+      ...found.figures.filter((name) => /observed-/.test(name)).map((name) => element("img", { class: "drawn", src: `bench/file?name=${encodeURIComponent(name)}`, alt: "Observed against predicted" })),
       element("p", { class: "files" }, ...found.files.map(kept))] : [];
     return element("section", { class: "said", id: "calibration" }, element("h3", { text: "Calibrate the model with it" }),
       element("div", { class: "step-row" }, model, method, go), this.lines.calibration, ...shown);
@@ -384,14 +384,14 @@ export class Measure {
     this.attempt("work", async () => {
       const run = await this.act("beside", { trial });
       this.video.pause();
-      this.replay({ ...run, film: { ...run.film, url: `/bench/file?name=${encodeURIComponent(run.film.name)}` } });
+      this.replay({ ...run, film: { ...run.film, url: `bench/file?name=${encodeURIComponent(run.film.name)}` } });
     });
   }
 
   play(film) {
     this.playing = film;
     this.pointing = "";
-    this.video.src = `/bench/file?name=${encodeURIComponent(film)}`;
+    this.video.src = `bench/file?name=${encodeURIComponent(film)}`;
     this.video.loop = true;
     this.video.muted = true;
     this.video.play().catch(() => null);
@@ -404,7 +404,7 @@ function minus(text) {
 }
 
 function kept(name) {
-  return element("a", { class: "plain calm", href: `/bench/file?name=${encodeURIComponent(name)}&take=1`, download: name, text: name });
+  return element("a", { class: "plain calm", href: `bench/file?name=${encodeURIComponent(name)}&take=1`, download: name, text: name });
 }
 
 function warnings(list) {

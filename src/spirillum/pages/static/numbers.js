@@ -15,7 +15,10 @@ export class Numbers {
     if (told === this.built) return;
     this.built = told;
     const numbers = lane.numbers;
-    this.holder.classList.toggle("stale", !lane.swims_by); // those of the robot before
+    if (!numbers && !lane.trouble && this.table) {
+      this.blank();
+      return;
+    }
     this.quantities = quantities;
     this.cells = {};
     const body = element("tbody");
@@ -32,18 +35,31 @@ export class Numbers {
         element("td", { class: "range", text: ranged ? span(row.low * quantity.factor, row.high * quantity.factor) : "" }),
       ));
     }
-    const table = element("table", {},
+    const table = numbers && element("table", {},
       element("thead", {}, element("tr", {},
         element("th", { scope: "col", text: "" }),
         element("th", { scope: "col", text: "now", title: "at this moment of the run" }),
         element("th", { scope: "col", text: "held", title: "steady swimming of a robot that is held at its place, as predict gives it" }),
         element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
       )), body);
+    this.table = table;
+    this.tag = element("span", { class: "tag", text: numbers ? `model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" });
     this.holder.replaceChildren(
-      element("h2", {}, "Numbers", element("span", { class: "tag", text: numbers ? `model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" })),
+      element("h2", {}, "Numbers", this.tag),
       ...(lane.trouble ? [element("p", { class: "trouble", role: "alert", text: sentence(lane.trouble) })] : []),
       ...(numbers ? [table, words(numbers, lane)] : lane.trouble ? [] : [element("p", { class: "soft", text: "Computing. The first time on a machine some loops are compiled, which takes about twenty seconds." })]),
     );
+  }
+
+  // The rows stay where they are, without what was computed for another robot or setting.
+  blank() {
+    this.tag.textContent = "computing \u2026";
+    this.tag.title = "";
+    for (const cell of this.table.querySelectorAll("td")) {
+      cell.textContent = cell.className === "steady" ? "\u2013" : "";
+      delete cell.dataset.value;
+    }
+    this.holder.querySelector(".said")?.remove();
   }
 
   now(values) {

@@ -18,7 +18,7 @@ export class Study {
   async load(file) {
     this.error.textContent = "";
     this.body.replaceChildren(element("p", { class: "under told", text: file ? "Reading \u2026" : "Computing \u2026" }));
-    const answer = await fetch("/study", { method: "POST", body: file ?? "" });
+    const answer = await fetch("study", { method: "POST", body: file ?? "" });
     if (!answer.ok) {
       this.error.textContent = await answer.text();
       this.body.replaceChildren();

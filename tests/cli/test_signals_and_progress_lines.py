@@ -1,0 +1,114 @@
+"""Commands that are ended by a scheduler or at the terminal, and what a log file says of long work."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from spirillum.cli import renderer
+from spirillum.cli.progress_lines import ProgressLines
+from spirillum.fluid.tube.announced import kept_after
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
+
+WIDE = "biorob2012-wide"
+NEW = ["prepare", WIDE, "--set", "tail.wavelength=21mm", "--workers"]
+LONG = {
+    "a run": ["simulate", WIDE, "-o", "run.nc", "--duration", "5000s"],
+    "a table by two processes": [*NEW, "2"],
+    "a table by this process": [*NEW, "1"],
+}
+
+
+def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tuple[int, str]:
+    """Exit code and standard error of a command that gets a signal while it is at work."""
+    environment = os.environ | {"SPIRILLUM_CACHE": str(folder / "cache")}
+    script = (
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # background jobs ignore it
+        "from spirillum.cli import main\nmain()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script, *command],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stderr is not None
+    said = process.stderr.readline() if command[0] == "prepare" else ""
+    time.sleep(4.0)
+    (os.killpg if group else os.kill)(process.pid, number)
+    _, rest = process.communicate(timeout=60)
+    end = time.monotonic() + 20.0
+    while (left := subprocess.run(["pgrep", "-s", str(process.pid)], check=False, capture_output=True).stdout) and (
+        time.monotonic() < end
+    ):
+        time.sleep(0.1)
+    assert not left
+    return process.returncode, said + rest
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(("name", "group"), [("a run", False), ("a table by two processes", True)])
+def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: bool, number: int, code: int) -> None:
+    ended, said = _ended(LONG[name], tmp_path, number, group=group)
+    *before, last = said.splitlines()
+    assert ended == code
+    assert last.startswith("spirillum: interrupted; ")
+    if name == "a run":
+        assert not before
+    else:
+        assert all(line.startswith(("no table of this tube yet", "table of the tube: ")) for line in before)
+        places = re.search(r"from (\d+) places", before[0])
+        assert places is not None
+        assert re.search(rf"\d+ of {places[1]} places are kept, and the same command resumes from there$", last)
+
+
+@pytest.mark.slow
+def test_signal_ends_work_of_one_process_too(tmp_path: Path) -> None:
+    ended, said = _ended(LONG["a table by this process"], tmp_path, signal.SIGTERM, group=False)
+    assert (ended, "places are kept" in said) == (143, True)
+
+
+def test_what_is_kept_is_counted() -> None:
+    assert kept_after(60, 12) == "12 of 60 places are kept, and the same command resumes from there"
+
+
+class _Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_lines_come_at_a_rate_that_can_be_read() -> None:
+    """A place every 20 s of which 40 of 100 were kept from before: the rest takes 20 s each."""
+    clock, lines = _Clock(), list[str]()
+    progress = ProgressLines(lines.append, ("no table",), clock)
+    progress("no table of this tube yet", 0, 100)
+    progress("table", 40, 100)
+    for done in range(41, 101):
+        for _ in range(20):
+            clock.now += 1.0
+            progress.look()
+        progress("table", done, 100)
+    assert lines[0] == "no table of this tube yet"
+    assert lines[1] == "table: 40 of 100, 15 s elapsed"
+    assert "table: 41 of 100, 30 s elapsed, about 30 min left" in lines
+    assert 25 < len(lines) < 60  # a line every 15 s, later every twentieth of the time
+    assert clock.now == 1200.0
+
+
+def test_short_work_prints_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with renderer.progress_bar(quiet=False) as progress:
+        progress("looking", 1, 2)
+    assert capsys.readouterr().err == ""
