@@ -28,13 +28,14 @@ LEFT_HANDED = 'extends = "biorob2012-wide"\nname = "left-handed"\n[tail]\nhanded
 def main() -> int:
     """Trace the videos that were named."""
     given = options()
+    changes = json.loads(given.changes)
     if not given.tracer.exists():
         raise SystemExit(f"{given.tracer} is missing; benchmarks/README.md says how to install Blender's module")
     given.output.mkdir(parents=True, exist_ok=True)
     for name in given.videos or [f"{kind}:1" for kind in KINDS]:
         kind, seeds = seeds_of(name)
         for seed in seeds:
-            make(sample_scene(kind, seed, json.loads(given.changes)), given)
+            make(sample_scene(kind, seed, changes), given)
     return 0
 
 
@@ -67,7 +68,7 @@ def make(scene: Scene, given: argparse.Namespace) -> None:
     job = write_job(scene, folder, given.samples)
     subprocess.run([given.tracer, TRACER, job], check=True, stdout=sys.stderr)  # noqa: S603
     robot_file = "biorob2012-wide"
-    if scene.hand_of_tail == "left":
+    if scene.handedness == "left":
         robot_file = "left-handed.toml"
         (given.output / robot_file).write_text(LEFT_HANDED)
     (given.output / f"{name}.setup.toml").write_text(setup_text(scene, robot_file))

@@ -142,7 +142,7 @@ def truth_of(scene: Scene, name: str) -> dict[str, Any]:
         "cover": scene.cover,
         "paper": scene.paper,
         "direction": scene.direction,
-        "handedness": scene.hand_of_tail,
+        "handedness": scene.handedness,
         "roll_deg": scene.roll,
         "heading_deg": motion.heading,
         "lateral_wobble_mm": motion.wobble,

@@ -23,7 +23,7 @@ Mesh = dict[str, Any]
 
 def robot_of(scene: Scene) -> Any:
     """The robot of a scene: the paper's in its wide tube, with a tail of the scene's hand."""
-    return sp.load("biorob2012-wide", **{"tail.handedness": scene.hand_of_tail})
+    return sp.load("biorob2012-wide", **{"tail.handedness": scene.handedness})
 
 
 def meshes_of(scene: Scene, robot: Any) -> list[Mesh]:

@@ -11,40 +11,40 @@ from path_traced.geometry import meshes_of, poses_of, robot_of
 from path_traced.papers import Paper, papers_of
 from path_traced.scenes import Scene
 
-__all__ = ["INNER", "axis_height", "focal_pixels", "frame_times", "papers", "write_job"]
+__all__ = ["axis_height", "papers", "write_job"]
 
-INNER, _OUTER, _TUBE_LENGTH, _TUBE_INDEX = 20.0, 22.0, 350.0, 1.47
+_INNER, _OUTER, _TUBE_LENGTH, _TUBE_INDEX = 20.0, 22.0, 350.0, 1.47
 _BESIDE_BODY, _BESIDE_TAIL, _BEYOND = 6.0, 3.0, 5.0
 """Reach of the windows beside body and tail, and beyond nose and tail, mm: what lies in the robot's shadow."""
 _STEPS = (-0.5, 0.0, 0.5)
 _CEILING = 1500.0
 """Of the lamps above the lens, mm."""
-_HAND = ((0.0, 0.0, 0.0, 42.0, 40.0, 13.0, 0.0), *((-24.0 + 16.0 * k, -58.0 + 6.0 * abs(k - 1.5), 0.0, 7.5, 32.0, 7.5,
-         0.06 * (k - 1.5)) for k in range(4)), (46.0, -18.0, 0.0, 9.0, 28.0, 9.0, 0.7), (0.0, 90.0, 8.0, 30.0, 90.0,
-         24.0, 0.0))  # fmt: skip
-"""Bones: centre and semi-axes, mm, turn about the vertical, rad."""
+_FINGERS = [((-24.0 + 16.0 * k, -58.0 + 6.0 * abs(k - 1.5), 0.0), (7.5, 32.0, 7.5), 0.06 * (k - 1.5)) for k in range(4)]
+_PALM, _THUMB = ((0.0, 0.0, 0.0), (42.0, 40.0, 13.0), 0.0), ((46.0, -18.0, 0.0), (9.0, 28.0, 9.0), 0.7)
+_ARM = (0.0, 90.0, 8.0), (30.0, 90.0, 24.0), 0.0
+"""Bones of a hand: centre and semi-axes, mm, turn about the vertical, rad."""
 
 
-def apparent_depth(scene: Scene, height: float) -> float:
+def _apparent_depth(scene: Scene, height: float) -> float:
     """Distance from the lens at which a point at a height seems to lie, seen straight down, mm."""
     return scene.eye - scene.oil + (scene.oil - height) / scene.oil_index
 
 
-def focal_pixels(scene: Scene) -> float:
+def _focal_pixels(scene: Scene) -> float:
     """Focal length that shows the scene's field of view at the floor."""
-    return scene.size[0] * apparent_depth(scene, 0.0) / scene.field_of_view
+    return scene.size[0] * _apparent_depth(scene, 0.0) / scene.field_of_view
 
 
 def axis_height(scene: Scene, robot: Any) -> float:
     """Height of the body's axis above the floor: the tube lies on it, or on the paper, and the body low in the tube."""
-    return _tube_axis(scene) - (INNER - 0.5e3 * robot.body.diameter - scene.gap)
+    return _tube_axis(scene) - (_INNER - 0.5e3 * robot.body.diameter - scene.gap)
 
 
 def _tube_axis(scene: Scene) -> float:
     return _OUTER + (0.0 if scene.paper == "ruler" else scene.paper_height)
 
 
-def frame_times(scene: Scene) -> np.ndarray:
+def _frame_times(scene: Scene) -> np.ndarray:
     """Times of the frames, s, the middle of their exposures."""
     return np.arange(scene.count) / scene.fps
 
@@ -82,16 +82,16 @@ def write_job(scene: Scene, folder: Path, samples: int) -> Path:
         "shutter": scene.exposure * scene.fps,
         "camera": {
             "eye": scene.eye,
-            "focal_pixels": focal_pixels(scene),
+            "focal_pixels": _focal_pixels(scene),
             "tilt": np.radians(scene.tilt).tolist(),
             "roll": float(np.radians(scene.roll)),
             "aperture": scene.aperture,
-            "focus": apparent_depth(scene, height),
+            "focus": _apparent_depth(scene, height),
         },
         "oil": {"height": scene.oil, "index": scene.oil_index},
         "tube": {
             "axis": _tube_axis(scene),
-            "inner": INNER,
+            "inner": _INNER,
             "outer": _OUTER,
             "length": _TUBE_LENGTH,
             "index": _TUBE_INDEX,
@@ -99,9 +99,7 @@ def write_job(scene: Scene, folder: Path, samples: int) -> Path:
         "papers": sheets,
         "ambient": (0.33, 0.335, 0.325),
         "lamps": _lamps(scene),
-        "hand": {"colour": (0.62, 0.36, 0.26), "bones": [(bone[:3], bone[3:6], bone[6]) for bone in _HAND]}
-        if scene.hand
-        else None,
+        "hand": {"colour": (0.62, 0.36, 0.26), "bones": [_PALM, _THUMB, _ARM, *_FINGERS]} if scene.hand else None,
         "meshes": [{"part": mesh["part"], "material": mesh["material"]} for mesh in meshes],
         "frames": _frames(scene, height, robot),
     }
@@ -120,7 +118,7 @@ def _lamps(scene: Scene) -> list[dict[str, Any]]:
     ]
     if scene.kind == "dark-room":
         found = found[:1]
-    scale = (2.0 * (scene.eye - scene.oil) + _CEILING - (scene.eye - scene.oil)) / focal_pixels(scene)
+    scale = (2.0 * (scene.eye - scene.oil) + _CEILING) / _focal_pixels(scene)  # mm in the mirrored ceiling a pixel
     for number in range(scene.lamps):
         side = 1.0 if number % 2 else -1.0
         u, v = side * rng.uniform(150.0, 250.0), rng.uniform(-120.0, 120.0)
@@ -143,7 +141,7 @@ def _frames(scene: Scene, height: float, robot: Any) -> list[dict[str, Any]]:
 
     A robot that stands still has one frame, and an empty tube has no window: noise is added later.
     """
-    times = frame_times(scene)
+    times = _frame_times(scene)
     moments = (times[:, None] + scene.exposure * np.array(_STEPS)).reshape(-1)
     poses = poses_of(scene, moments, height)
     found = []
@@ -186,9 +184,9 @@ def _window(
     along, across = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
     corners = np.array([[x, y] for x in along_body for y in (-beside, beside)])
     points = np.array(pose["position"][:2]) + corners[:, :1] * along + corners[:, 1:] * across
-    focal, (width, tall) = focal_pixels(scene), scene.size
+    focal, (width, tall) = _focal_pixels(scene), scene.size
     tilt_x, tilt_y = np.radians(scene.tilt)
-    x, y = focal * points.T / apparent_depth(scene, height)
+    x, y = focal * points.T / _apparent_depth(scene, height)
     # The tilted, rolled camera, to first order.
     x, y = x + focal * np.tan(tilt_y), y - focal * np.tan(tilt_x)
     roll = np.radians(scene.roll)

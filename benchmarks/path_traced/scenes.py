@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Scene:
     """Light is refracted by tube and cover on its way from the lamps, too; needs several times the samples."""
     moving: bool = True
     direction: str = "right"
-    hand_of_tail: str = "right"
+    handedness: str = "right"
     motion: Motion = field(default_factory=Motion)
     fps: float = 15.0
     duration: float = 3.0
@@ -98,13 +99,12 @@ class Scene:
         return 1.0 if self.direction == "right" else -1.0
 
 
-_FAST: dict[str, Any] = {}
 _SLOW: dict[str, Any] = {"slow": True, "fps": 4.0, "duration": 20.0}
 _YAW: dict[str, Any] = {"heading": 2.0, "wobble": 0.35, "heading_wobble": 0.5}
 
 KINDS: dict[str, dict[str, Any]] = {
     "glass-grid": {"paper": "grid", "crf": 18, **_YAW},
-    "glass-liner": {"cover": "liner", "direction": "left", "hand_of_tail": "left"},
+    "glass-liner": {"cover": "liner", "direction": "left", "handedness": "left"},
     "painted-grid": {"cover": "painted", "paper": "grid", "crf": 18},
     "glass": {},
     "reflections": {"lamps": 2, "crf": None, "bit_rate": 260, "noise": 2.5, "brightness": 0.35},
@@ -138,13 +138,13 @@ def sample_scene(kind: str, seed: int, changes: Mapping[str, Any] | None = None)
     Args:
         kind: one of `KINDS`.
         seed: of all random numbers.
-        changes: fields of `Scene` that are given instead.
+        changes: fields of `Scene` that are given instead, and of `motion` those of `Motion`.
     """
     own = dict(KINDS[kind])
-    rng = np.random.default_rng([seed, sorted(KINDS).index(kind)])
+    rng = np.random.default_rng([seed, crc32(kind.encode())])
     slow = own.pop("slow", False)
     yaw = {name: own.pop(name, 0.0) for name in ("heading", "wobble", "heading_wobble")}
-    left = own.get("hand_of_tail") == "left"
+    left = own.get("handedness") == "left"
     motion = _sample_motion(rng, slow=slow, moving=own.get("moving", True) and own.get("cover") != "none", left=left)
     scene = Scene(
         kind,
@@ -160,7 +160,10 @@ def sample_scene(kind: str, seed: int, changes: Mapping[str, Any] | None = None)
         contents=_sample_contents(rng),
         **own,
     )
-    return replace(scene, eye=scene.eye + 0.8 * rng.normal(), **(changes or {}))
+    given = dict(changes or {})
+    if "motion" in given:
+        given["motion"] = replace(scene.motion, **given["motion"])
+    return replace(scene, eye=scene.eye + 0.8 * rng.normal(), **given)
 
 
 def _sample_motion(rng: np.random.Generator, *, slow: bool, moving: bool, left: bool) -> Motion:
@@ -170,13 +173,12 @@ def _sample_motion(rng: np.random.Generator, *, slow: bool, moving: bool, left: 
     else:
         speed, body, tail = rng.uniform([0.8, 0.06, 0.8], [2.3, 0.19, 1.9])
     angles = rng.uniform(0.0, 360.0, 2)
-    start = rng.uniform(15.0, 35.0)
-    if not moving:
-        speed = body = tail = 0.0
+    start = float(rng.uniform(20.0, 40.0))
     side = -1.0 if left else 1.0
-    return Motion(
-        speed, -side * body, side * tail, start=start, body_angle=float(angles[0]), tail_phase=float(angles[1])
-    )
+    motion = Motion(start=start, body_angle=float(angles[0]), tail_phase=float(angles[1]))
+    if not moving:
+        return motion
+    return replace(motion, speed=float(speed), body_rate=-side * float(body), tail_rate=side * float(tail))
 
 
 def _sample_contents(rng: np.random.Generator) -> dict[str, Any]:
