@@ -14,7 +14,7 @@ from path_traced.scenes import Scene
 __all__ = ["axis_height", "papers", "write_job"]
 
 _INNER, _OUTER, _TUBE_LENGTH, _TUBE_INDEX = 20.0, 22.0, 350.0, 1.47
-_BESIDE_BODY, _BESIDE_TAIL, _BEYOND = 6.0, 3.0, 5.0
+_BESIDE_BODY, _BESIDE_TAIL, _BEYOND = 10.0, 3.0, 8.0
 """Reach of the windows beside body and tail, and beyond nose and tail, mm: what lies in the robot's shadow."""
 _STEPS = (-0.5, 0.0, 0.5)
 _CEILING = 1500.0

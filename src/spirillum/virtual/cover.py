@@ -85,11 +85,11 @@ class Cover:
             depth: height of what each sample has met, (rows, columns, k).
             samples: colours, (rows, columns, k, 3).
         """
-        hit = depth > _EMPTY
-        count = np.maximum(hit.sum(axis=-1), 1)
-        across = np.where(hit[..., None], samples[..., :2], 0.0).sum(axis=2) / count[..., None] - _ENCODED
+        hit = np.asarray(depth > _EMPTY)[..., None]
+        count = np.asarray(hit.sum(axis=2))
+        across = np.where(hit, samples[..., :2], 0.0).sum(axis=2) / np.maximum(count, 1) - _ENCODED
         depth[:] = _EMPTY
-        return Glass(hit.mean(axis=-1), np.where(hit.any(axis=-1)[..., None], across, 0.0))
+        return Glass(hit.mean(axis=(2, 3)), np.where(count > 0, across, 0.0))
 
     def refract(self, picture: Samples, glass: Glass, left: int, top: int, height: float) -> None:
         """Replace what lies behind the cover by what is seen through it.

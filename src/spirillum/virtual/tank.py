@@ -166,11 +166,11 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
     """
     ratio = np.ones_like(still.light)
     for apart, width, colour in ((1.0, *_FINE_LINES), (5.0, *_STRONG_LINES)):
-        bare = 1.0
+        bare = np.ones(still.light.shape[:2])
         for axis in (0, 1):  # lines across x, then across y
             places = still.floor[..., axis].astype(float)
             pixel = np.abs(np.gradient(places, axis=1 - axis))
-            bare = bare * (1.0 - _line_share(places, pixel, apart * spacing, width * spacing))
+            bare *= 1.0 - _line_share(places, pixel, apart * spacing, width * spacing)
         ratio *= bare[..., None]
         ratio += (1.0 - bare[..., None]) * (linear(np.array(colour)) / paper)
     shine = still.shine[..., None]
