@@ -17,8 +17,6 @@ from path_traced.development import develop, setup_text, truth_of
 from path_traced.job import write_job
 from path_traced.scenes import KINDS, Scene, sample_scene
 
-from spirillum.files import whole_file
-
 HERE = Path(__file__).resolve().parent
 TRACER = HERE / "path_traced" / "tracer.py"
 PYTHON = HERE.parent / ".venv-bpy" / "bin" / "python"
@@ -81,8 +79,9 @@ def make(scene: Scene, given: argparse.Namespace) -> None:
 def note_truth(path: Path, name: str, truth: dict[str, object]) -> None:
     """Add a video to the joint truth."""
     known = json.loads(path.read_text()) if path.exists() else {}
-    with whole_file(path) as part:
-        part.write_text(json.dumps(known | {name: truth}, indent=1) + "\n")
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(known | {name: truth}, indent=1) + "\n")
+    part.replace(path)
 
 
 if __name__ == "__main__":
