@@ -208,10 +208,11 @@ def test_references_into_the_code_lead_somewhere(page: Path) -> None:
 def test_every_dependency_has_its_reason() -> None:
     import tomllib
 
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    project, groups = settings["project"], settings["dependency-groups"]
     wanted = [
         *project["dependencies"],
-        *(name for extra in project["optional-dependencies"].values() for name in extra),
+        *(name for extra in (project["optional-dependencies"] | groups).values() for name in extra),
     ]
     reasons = (DOCS / "dependencies.md").read_text("utf-8")
     names = {match[0] for text in wanted if (match := re.match(r"[\w-]+", text))}

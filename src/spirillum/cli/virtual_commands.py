@@ -127,9 +127,9 @@ _Trouble = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME,...",
-        help="Of a real bench: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, noise, "
-        "lamp, compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them, or "
-        "repeated.",
+        help="Of a real bench: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
+        "mirrored-lamps, grid-paper, glass-cover, noise, lamp, compression, missing-frames, tilted, glare, "
+        "standing-glare, bubbles, hand; with commas between them, or repeated.",
         rich_help_panel=_DISTURBED,
     ),
 ]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.raster import Lamps, Shadow, blend, draw
+from spirillum.kernels.raster import Lamps, Shading, Shadow, blend, draw
 from spirillum.robot.robot import Robot
+from spirillum.virtual.cover import Cover
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import Solid, solids_of
 from spirillum.virtual.tank import Tank, backdrop, spots, tint
@@ -37,7 +38,9 @@ _FEW = 13
 class Painter:
     """Draws the robot before its tank. One painter serves one video: it keeps its buffers between frames."""
 
-    def __init__(self, robot: Robot, tank: Tank, lens: Lens, edges: Samples | None = None) -> None:
+    def __init__(
+        self, robot: Robot, tank: Tank, lens: Lens, edges: Samples | None = None, *, covered: bool = False
+    ) -> None:
         """Prepare.
 
         Args:
@@ -45,11 +48,14 @@ class Painter:
             tank: the still parts.
             lens: the camera.
             edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
+            covered: whether the body before its seal is a cover of glass.
         """
         self.robot, self.tank, self.lens = robot, tank, lens
-        self.body, self.rotor = solids_of(robot, edges=edges)
+        self.body, self.rotor = solids_of(robot, edges=edges, covered=covered)
         self.still = backdrop(tank, lens)
-        self._lamps = _lamps(tank.view, -1.0 if lens.leftwards else 1.0)
+        side = -1.0 if lens.leftwards else 1.0
+        self._lamps = _lamps(tank.view, side)
+        self._cover = Cover(robot, lens.index, self.still, self._lamps, side) if covered else None
         self._tint = tint(lens.surface - tank.tube_height)
         self._spots = np.swapaxes(spots(_SIDE), 1, 2)
         self._depth = np.empty(0, dtype=np.float32)
@@ -64,27 +70,46 @@ class Painter:
             exposure: its length, s.
         """
         middle = trajectory.at(time)
-        parts = self._parts(trajectory, middle, time, exposure)
+        solids = [(self.body, "body"), (self.rotor, "rotor")]
+        if self._cover is not None:
+            solids.append((self._cover.solid, "body"))
+        parts = self._parts(solids, trajectory, middle, time, exposure)
         picture = self.still.light.copy()
         left, top, right, bottom = self._window([pixels for _, _, moments in parts for pixels in moments])
         if left >= right or top >= bottom:
             return picture
         depth, samples = self._buffers(bottom - top, right - left)
-        for solid, turn, moments in parts:
-            shading = solid.shading(turn, self._lamps)
+
+        def sample(part: tuple[Solid, Samples, list[Samples]], shading: Shading) -> None:
+            solid, _, moments = part
             for number, pixels in enumerate(moments):
                 which = np.arange(number, _SAMPLES, len(moments))  # each time has a share of every pixel's samples
                 places = np.ascontiguousarray(self._spots[:, :, which])
                 draw(pixels, solid.faces, shading, places, which, left, top, depth, samples)
+
+        glass = None
+        if self._cover is not None:
+            sample(parts.pop(), self._cover.encoded(middle.body))
+            glass = self._cover.decoded(depth, samples)
+            self._cover.refract(picture, glass, left, top, float(middle.position[2]))
+        for part in parts:
+            sample(part, part[0].shading(part[1], self._lamps))
         blend(depth, samples, left, top, self.still, self._shadow(middle), self._tint, picture)
+        if self._cover is not None and glass is not None:
+            self._cover.shine(picture, glass, left, top)
         return picture
 
     def _parts(
-        self, trajectory: TrialTrajectory, middle: Pose, time: float, exposure: float
+        self,
+        solids: list[tuple[Solid, str]],
+        trajectory: TrialTrajectory,
+        middle: Pose,
+        time: float,
+        exposure: float,
     ) -> list[tuple[Solid, Samples, list[Samples]]]:
-        """Body and rotor, each with its rotation and the pixels of its vertices at times over the exposure."""
+        """Solids, each with its rotation and the pixels of its vertices at times over the exposure."""
         found = []
-        for solid, name in ((self.body, "body"), (self.rotor, "rotor")):
+        for solid, name in solids:
 
             def seen(share: float, every: int = 1, solid: Solid = solid, name: str = name) -> Samples:
                 pose = trajectory.at(time + share * exposure) if share else middle

@@ -11,9 +11,10 @@ from spirillum.kernels.raster import Lamps, Materials, Shading, shade
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, corner_normals
+from spirillum.virtual.contents import covered_body
 from spirillum.virtual.troubles import repainted
 
-__all__ = ["MATERIALS", "Solid", "linear", "solids_of"]
+__all__ = ["MATERIALS", "Solid", "joined", "linear", "solids_of"]
 
 _LONGEST = 5e-3
 """Longest edge of a triangle, m."""
@@ -26,10 +27,11 @@ MATERIALS: dict[str, tuple[float, float, float, float]] = {
     "stub": (0.28, 0.60, 0.65, 18.0),
     "arm": (0.28, 0.60, 0.65, 18.0),
     "tail": (0.28, 0.60, 0.65, 18.0),
+    "contents": (0.34, 0.60, 0.10, 20.0),
 }
 """Ambient, diffuse and specular reflectance, and exponent of the specular one, by piece; assumed."""
 _KINDS = tuple(MATERIALS)
-_METALS = frozenset(_KINDS) - {"body"}
+_METALS = frozenset(_KINDS) - {"body", "contents"}
 
 
 def linear(colours: Samples) -> Samples:
@@ -68,13 +70,16 @@ class Solid:
         return shading
 
 
-def solids_of(robot: Robot, fineness: float = 1.0, edges: Samples | None = None) -> tuple[Solid, Solid]:
+def solids_of(
+    robot: Robot, fineness: float = 1.0, edges: Samples | None = None, *, covered: bool = False
+) -> tuple[Solid, Solid]:
     """Body and rotor of a robot, the rotor with its tail at phase 0.
 
     Args:
         robot: a checked robot.
         fineness: of `spirillum.robot.mesh.robot_mesh`.
         edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
+        covered: whether a glass cover, which is not one of them, stands before the seal.
     """
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
     if edges is not None:
@@ -82,12 +87,16 @@ def solids_of(robot: Robot, fineness: float = 1.0, edges: Samples | None = None)
             replace(piece, vertices=repainted(robot, piece.vertices, edges)) if piece.name == "body" else piece
             for piece in pieces
         )
-    return _joined([piece for piece in pieces if piece.part == "body"]), _joined(
-        [piece for piece in pieces if piece.part == "rotor"]
-    )
+    body, rotor = ([piece for piece in pieces if piece.part == part] for part in ("body", "rotor"))
+    return joined(covered_body(robot, body[0]) if covered else body), joined(rotor)
 
 
-def _joined(pieces: list[RobotMesh]) -> Solid:
+def joined(pieces: list[RobotMesh]) -> Solid:
+    """One solid of pieces that move together.
+
+    Args:
+        pieces: of a robot's mesh.
+    """
     vertices, faces, colours, gloss, normals, kind, count = [], [], [], [], [], [], 0
     for piece in pieces:
         points, triangles, origin = _shortened(np.asarray(piece.vertices), np.asarray(piece.faces))

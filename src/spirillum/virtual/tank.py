@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -33,6 +34,9 @@ Glass refracts nearly as oil does: lines of sight go straight through it.
 """
 _MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)
 """Wavenumbers of the floor's fine structure, 1/m; assumed."""
+_SHEET = (0.90, 0.90, 0.88)
+_FINE_LINES, _STRONG_LINES = (0.11, (0.47, 0.60, 0.84)), (0.16, (0.17, 0.18, 0.23))
+"""Grid paper: sRGB of the sheet; width of a line over the spacing, and sRGB of its ink; assumed."""
 _FINE = 6
 """Samples of a pixel along u and along v."""
 
@@ -55,6 +59,8 @@ class Tank:
     """|y| at which the lines of both strips begin; in the usual picture they are 8 mm long."""
     shrunk: float = 1.0
     """Width of the picture over that of the usual one: ruler and floor are as much finer."""
+    grid: bool = False
+    """Whether grid paper covers the floor, instead of the ruler's strips."""
 
     @property
     def outside(self) -> float:
@@ -62,20 +68,21 @@ class Tank:
         return 0.0 if self.tube is None else self.tube + _GLASS
 
 
-def tank_of(robot: Robot, view: str, shrunk: float = 1.0) -> Tank:
+def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False) -> Tank:
     """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
 
     Args:
         robot: a checked robot.
         view: `top` or `side`.
         shrunk: width of the picture over that of the usual one.
+        grid: whether grid paper covers the floor, with lines as far apart as those of the ruler.
     """
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
     spacing = min(one for one in _SPACINGS if one >= _SPACING * shrunk * (1.0 - 1e-9))
     ruler = _reach(robot) + _RULER_DISTANCE * shrunk
-    return Tank(view, tube, tube_height(robot, view), length, spacing, ruler, shrunk)
+    return Tank(view, tube, tube_height(robot, view), length, spacing, ruler, shrunk, grid)
 
 
 def tube_height(robot: Robot, view: str) -> float:
@@ -130,10 +137,13 @@ def backdrop(tank: Tank, lens: Lens) -> Backdrop:
     light, over, shine, floor = (np.empty((height, width, *more), dtype=np.float32) for more in ((3,), (), (), (2,)))
     still = Backdrop(light, over, shine, floor)
     ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)
+    if tank.grid:
+        ground = _SHEET
     colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))  # ground, paper, ink
     end, paper = tank.ruler + _LINE_LENGTH * tank.shrunk, _PAPER * tank.shrunk
     line_width = min(_LINE_WIDTH, 0.25 * tank.spacing)
-    ruler = Ruler(tank.ruler - paper, tank.ruler, end, end + paper, tank.spacing, line_width)
+    start = math.inf if tank.grid else tank.ruler - paper
+    ruler = Ruler(start, tank.ruler, end, end + paper, tank.spacing, line_width)
     half_length = -1.0 if tank.tube is None else 0.5 * tank.tube_length
     tube = Tube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
     azimuth, phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2)).T
@@ -141,4 +151,44 @@ def backdrop(tank: Tank, lens: Lens) -> Backdrop:
     amplitude = np.full(len(_MOTTLE), 0.012)
     waves = Waves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
     still_picture(lens.camera, lens.turn, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), still)
+    if tank.grid:
+        _print_grid(still, tank.spacing, colours[0])
     return still
+
+
+def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
+    """Print the lines of grid paper on the floor, each fifth a strong one.
+
+    Args:
+        still: its light is changed.
+        spacing: from one line to the next, m.
+        paper: linear colour of the floor, (3,).
+    """
+    ratio = np.ones_like(still.light)
+    for apart, width, colour in ((1.0, *_FINE_LINES), (5.0, *_STRONG_LINES)):
+        bare = np.ones(still.light.shape[:2])
+        for axis in (0, 1):  # lines across x, then across y
+            places = still.floor[..., axis].astype(float)
+            pixel = np.abs(np.gradient(places, axis=1 - axis))
+            bare *= 1.0 - _line_share(places, pixel, apart * spacing, width * spacing)
+        ratio *= bare[..., None]
+        ratio += (1.0 - bare[..., None]) * (linear(np.array(colour)) / paper)
+    shine = still.shine[..., None]
+    still.light[:] = (still.light - shine) * ratio + shine
+
+
+def _line_share(places: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
+    """Share of pixels that parallel lines cover, whose middles lie at multiples of the spacing.
+
+    Args:
+        places: of the pixels' middles across the lines, m.
+        pixel: their sizes, m.
+        spacing: from one line to the next, m.
+        width: of a line, m.
+    """
+    low, high = (
+        width * np.floor(edge / spacing + 0.5)
+        + np.clip(edge - spacing * np.floor(edge / spacing + 0.5) + 0.5 * width, 0.0, width)
+        for edge in (places - 0.5 * pixel, places + 0.5 * pixel)
+    )
+    return np.asarray((high - low) / pixel)

@@ -29,7 +29,7 @@ from spirillum.virtual.lens import Lens
 from spirillum.virtual.motion import motion_of, motion_of_run
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.tank import tank_of
+from spirillum.virtual.tank import Tank, tank_of
 from spirillum.virtual.troubles import Troubles, View, counted_frames, stripe_edges, with_troubles
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
@@ -164,7 +164,8 @@ def render(
         _check_not_of_run(motion, trial)
         robot = robot_of(dataset) if robot is None else load(robot)
         shown = motion_of_run(robot, dataset, trial, camera)
-    tank, lens = tank_of(robot, camera.view, camera.shrunk), lens_of(camera, tilt_of(degradation, seed))
+    tank = tank_of(robot, camera.view, camera.shrunk, grid=troubles.grid_paper)
+    lens = lens_of(camera, tilt_of(degradation, seed))
     check_size(robot, tank, lens)
     trajectory = framed(shown.trajectory, robot, lens, trial.start)
     count = math.floor(trajectory.duration * camera.fps * (1.0 + 1e-12)) + 1
@@ -200,10 +201,8 @@ def render(
     }
     if robot_file != robot.name:
         texts["robot"] = robot_text(robot)
-    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
-    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
-    view = View(troubles, seed, camera.size)
-    frames = Frames(Painter(robot, tank, lens, edges), disturbances, trajectory, camera.exposure, view)
+    painter = _painter_of(robot, tank, lens, troubles, seed)
+    frames = Frames(painter, disturbances, trajectory, camera.exposure, View(troubles, seed, camera.size))
     tell = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
@@ -219,10 +218,17 @@ def render(
     return written
 
 
+def _painter_of(robot: Robot, tank: Tank, lens: Lens, troubles: Troubles, seed: int) -> Painter:
+    """What draws the robot, with uneven stripes and a cover of glass where the troubles have them."""
+    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
+    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
+    return Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
+
+
 def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[str]:
     """A sentence on a seed of a film of which nothing is drawn at random; none without a seed."""
     plain = Degradation(crf=degradation.crf)
-    if not seed or degradation != plain or troubles != Troubles():
+    if not seed or degradation != plain or troubles.uses_seed:
         return []
     return [
         f"seed = {seed} changes nothing: nothing of this film is drawn at random, and films of other seeds are its "

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
@@ -19,7 +19,7 @@ from spirillum.virtual.degradation import Degradation
 
 __all__ = ["NAMES", "Shake", "Troubles", "View", "counted_frames", "repainted", "stripe_edges", "with_troubles"]
 
-_LOST, _SHAKE, _PAINT, _CABLES = range(30, 34)
+_LOST, _SHAKE, _PAINT, _CABLES, _MIRRORED = range(30, 35)
 _WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2
 """Waves of a hand's sway, and their frequencies, Hz; assumed."""
 _JITTER = 1.0 / 3.0
@@ -47,7 +47,22 @@ class Troubles(Options):
     """Standard deviation of what a lens out of focus makes of a point, pixels."""
     cables: Annotated[int, BeforeValidator(whole(0, 8))] = 0
     """Number of dark cables that hang across the view, between camera and oil."""
+    mirrored_lamps: Annotated[int, BeforeValidator(whole(0, 8))] = 0
+    """Number of lamps that the oil's surface mirrors into the picture."""
+    grid_paper: Annotated[bool, Field(strict=True)] = False
+    """Whether grid paper lies under the tube, instead of a ruler beside it."""
+    glass_cover: Annotated[bool, Field(strict=True)] = False
+    """Whether the body before its seal is a cover of glass with a battery and a board inside, as the paper's."""
 
+    @property
+    def uses_seed(self) -> bool:
+        """Whether anything of these troubles is drawn at random."""
+        usual = Troubles()
+        return any(getattr(self, name) != getattr(usual, name) for name in _RANDOM)
+
+
+_RANDOM = ("lost_frames", "handheld", "uneven_stripes", "cables", "mirrored_lamps")
+"""Troubles that are drawn at random; the others are alike for all seeds."""
 
 _USUAL: dict[str, dict[str, Any]] = {
     "lost-frames": {"lost_frames": 0.03},
@@ -57,8 +72,11 @@ _USUAL: dict[str, dict[str, Any]] = {
     "uneven-stripes": {"uneven_stripes": 0.2},
     "blurred": {"blurred": 1.0},
     "cables": {"cables": 2},
+    "mirrored-lamps": {"mirrored_lamps": 2},
+    "grid-paper": {"grid_paper": True},
+    "glass-cover": {"glass_cover": True},
 }
-"""The usual size of each trouble: 7 frames of 240; 2 s; 3 pixels; 4 degrees; a fifth; one pixel; two."""
+"""The usual size of each trouble: 7 frames of 240; 2 s; 3 pixels; 4 degrees; a fifth; one pixel; two; two."""
 _DISTURBANCES: dict[str, dict[str, Any]] = {
     "noise": {"noise": 8.0},
     "lamp": {"lamp_drift": 0.2},
@@ -206,7 +224,7 @@ _CABLE_LIGHT = 0.02
 
 
 class View:
-    """What lies between the robot and a picture of it: cables, and a camera that is held, or out of focus."""
+    """What lies between the robot and a picture of it: mirrored lamps, cables, a camera held or out of focus."""
 
     def __init__(self, troubles: Troubles, seed: int, size: tuple[int, int]) -> None:
         """Prepare.
@@ -218,6 +236,7 @@ class View:
         """
         self._shake, self._blurred = Shake(troubles, seed), troubles.blurred
         self._cables = _cables(troubles.cables, seed, size) if troubles.cables else None
+        self._lamps = _mirrored_lamps(troubles.mirrored_lamps, seed, size) if troubles.mirrored_lamps else None
 
     def seen(self, light: np.ndarray, time: float) -> np.ndarray:
         """A picture as the camera sees it at a time.
@@ -226,6 +245,8 @@ class View:
             light: linear light, (rows, columns, 3).
             time: s.
         """
+        if self._lamps is not None:
+            light = light + self._lamps
         if self._cables is not None:
             light = (light * (1.0 - self._cables) + _CABLE_LIGHT * self._cables).astype(light.dtype)
         light = self._shake.moved(light, time)
@@ -233,6 +254,28 @@ class View:
             cv2 = required("cv2", "a lens out of focus", "video")
             light = cv2.GaussianBlur(light, (0, 0), self._blurred)
         return light
+
+
+_LAMP_LIGHT = 0.22
+"""Linear light of a lamp in the oil's surface, where white paper has 0.8; a surface of oil mirrors 3 %; assumed."""
+_LAMP_SIZES = ((0.12, 0.20), (0.30, 0.22))
+"""Least sides of a lamp over the picture's width and height, and what is added at most; assumed."""
+
+
+def _mirrored_lamps(count: int, seed: int, size: tuple[int, int]) -> np.ndarray:
+    """Light that rectangular lamps add to each pixel, which the still surface mirrors, (rows, columns, 1)."""
+    columns, rows = size
+    rng = np.random.default_rng([seed, _MIRRORED])
+    v, u = np.mgrid[0:rows, 0:columns]
+    light = np.zeros((rows, columns))
+    for _ in range(count):
+        middle = rng.uniform(0.1, 0.9, 2) * size
+        half = 0.5 * (np.array(_LAMP_SIZES[0]) + rng.uniform(0.0, 0.5, 2) * np.array(_LAMP_SIZES[1])) * size
+        turn = rng.uniform(-0.12, 0.12)
+        along = np.abs((u - middle[0]) * np.cos(turn) + (v - middle[1]) * np.sin(turn)) - half[0]
+        down = np.abs((v - middle[1]) * np.cos(turn) - (u - middle[0]) * np.sin(turn)) - half[1]
+        light += _LAMP_LIGHT * np.clip(0.5 - 0.5 * np.maximum(along, down), 0.0, 1.0)  # edges of two pixels
+    return light[..., None].astype(np.float32)
 
 
 def _cables(count: int, seed: int, size: tuple[int, int]) -> Samples:
