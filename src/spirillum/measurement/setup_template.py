@@ -63,6 +63,7 @@ _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("axis_height", '"13 mm"', "of the robot's axis"),
         ("axis_height_uncertainty", '"1 mm"', ""),
         ("direction", '"right"', 'where in the picture the nose points: "right", "left", "up" or "down"'),
+        ("# appearance", '"glass"', 'of the cover: "opaque", "glass" or "unknown"'),
         ("# stripes", '["red", "yellow"]', "colours in their order, if not those of the robot file"),
     ),
     "# region": (
