@@ -21,6 +21,7 @@ from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import LENGTHS, checked_scale
+from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
 from spirillum.vision.track.sway import Swayed, swayed_by
 from spirillum.vision.track.track import Track
@@ -113,6 +114,7 @@ def track_of(
         *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
+        *stands_flag(motion, pixel),
     )
     return Track(
         time=time,

@@ -24,6 +24,7 @@ __all__ = [
     "SCOUTING",
     "SEARCH",
     "SIZE",
+    "STANDING",
     "STEADINESS",
     "STRIPES",
     "SWAY",
@@ -43,6 +44,7 @@ __all__ = [
     "ScoutingConstants",
     "SearchConstants",
     "SizeConstants",
+    "StandingConstants",
     "SteadinessConstants",
     "StripeConstants",
     "SwayConstants",
@@ -253,6 +255,20 @@ class ScoutingConstants:
     """Step at a wall over the usual one."""
     off_axis: float = 0.35
     """Largest distance of the robot from the middle between two walls, twice, over the body's diameter."""
+
+
+@dataclass(frozen=True)
+class StandingConstants:
+    """A robot that stands still, or hardly moves (`standing`)."""
+
+    ahead: float = 0.5
+    """Width of the surroundings before its nose and behind its tail that are searched, over the body's length."""
+    beside: float = 1.0
+    """Half width of these surroundings, over the body's diameter."""
+    moved: float = 0.1
+    """Largest displacement along the channel of a robot that stands, pixels."""
+    turned: float = radians(1.0)
+    """Largest rotation of its body and of its tail, rad."""
 
 
 @dataclass(frozen=True)
@@ -748,6 +764,7 @@ FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
 SCOUTING = ScoutingConstants()
+STANDING = StandingConstants()
 STEADINESS = SteadinessConstants()
 COLOURS = ColourConstants()
 STRIPES = StripeConstants()

@@ -13,11 +13,12 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.optics import BodyPose, opposite
 from spirillum.vision.flag import Flag
-from spirillum.vision.setup import Setup
+from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
+from spirillum.vision.track.standing import standing_bodies
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
@@ -92,6 +93,9 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
             return found
     except InputError as error:
         found = error
+    standing = _standing(name, setup, stated, frames, still)
+    if standing is not None:
+        return standing
     half = not isinstance(found, InputError) and found.robot  # its tail does not fit: another size has to fit wholly
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
@@ -107,6 +111,20 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
         return found
     return found._replace(start=replace(found.start, flags=()))
+
+
+def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified | None:
+    """The robot in the static background, with its stripes and its whole tail; None where there is none."""
+    if not stripes_of(setup, stated.robot):
+        return None  # a tail alone may be chance: all frames show the same background
+    nothing = np.zeros_like(still)
+    for body in standing_bodies(stated, still):
+        with suppress(InputError):
+            found = identified_at(name, setup, body, frames, nothing, 1.0)
+            if found.robot and found.whole and found.stripes.fits:
+                found.start.body.look_within(stated.bounds)
+                return found
+    return None
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
