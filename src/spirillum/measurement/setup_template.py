@@ -195,7 +195,8 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)
     start, known = learnt.known.start, learnt.known
-    scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing)
+    tail_size = known.tail_size(learnt.sight.optics)
+    scale, size_flags, _ = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing, tail_size)
     few = [frame.small(learnt.sight.reduction) for frame in frames]
     moved = camera_flags(few, start, ruled=setup.markers.spacing is not None)
     seen = {

@@ -34,8 +34,8 @@ __all__ = ["track_of"]
 
 _DOUBTFUL_STRIPES = Flag(
     "stripes-do-not-fit",
-    "the stripes seem uneven on a body that is not as large as it should be: the wrong scale may be the reason; the "
-    "body's rotation is not given: correct spacing, heights or robot file first",
+    "the stripes seem uneven on a body that is not as large as it should be, which may be the reason; the body's "
+    "rotation is not given: look at the annotated video for its outline",
     ("body_rotation_rate",),
 )
 
@@ -43,6 +43,13 @@ _DOUBTFUL_SCALE = Flag(
     "scale-does-not-fit",
     "neither the body's size nor the widths of its stripes are as they should be at this scale: another outline may be "
     "taken for the body's, and no length is given; correct spacing, heights or robot file first",
+    LENGTHS,
+)
+
+_DOUBTFUL_OUTLINE = Flag(
+    "outline-does-not-fit",
+    "neither the size of the outline nor the widths of its stripes are those of the body: another edge may be taken "
+    "for the body's, and no length is given: look at the annotated video, and draw a [region] around the robot",
     LENGTHS,
 )
 
@@ -93,11 +100,12 @@ def track_of(
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     roll_flags = (*roll_flags, *_under_glare(known, body_angle))
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
+    tail_size = known.tail_size(sight.optics)
+    scale, size_flags, roll_error = checked_scale(sight.scale, body, known.size, setup.markers.spacing, tail_size)
     if even.flags and any(flag.spoils for flag in size_flags):
         roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
     elif size_flags and any(flag.spoils for flag in even.flags):
-        roll_flags = (*roll_flags, _DOUBTFUL_SCALE)
+        roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
@@ -135,7 +143,7 @@ def track_of(
         time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
         drift=math.hypot(swayed.drift, glare),
         elongation=elongation * optics.focal / sight.optics.focal,
-        body_angle_drift=math.hypot(even.drift, STRIPES.under_glare if known.stripes.under_glare else 0.0),
+        body_angle_drift=math.hypot(even.drift, roll_error, STRIPES.under_glare if known.stripes.under_glare else 0.0),
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

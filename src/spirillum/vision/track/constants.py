@@ -195,6 +195,14 @@ class SizeConstants:
     """Standard errors from which on size and scale are said to differ."""
     largest_difference: float = 0.1
     """Relative difference beyond which no length is given."""
+    unconfirmed: float = 0.05
+    """The same where the tail says nothing of the scale: another edge than the body's may be followed."""
+    tail_agrees: float = 0.35
+    """Difference of the tail's apparent size from the ruler's or the body's up to which it agrees with it, over the
+    difference of these two."""
+    roll_error: float = 1.7
+    """Error of the body's angle over the relative error of its outline, rad: the tangent of 60 degrees, where the
+    outermost stripes are read."""
     edge_width: float = 0.6
     """Standard deviation of the Gaussian within which edges agree, pixels."""
     tolerance: tuple[float, float, float, float] = (0.0125, 0.5, 0.5, 0.006)
@@ -261,6 +269,8 @@ class ScoutingConstants:
 class StandingConstants:
     """A robot that stands still, or hardly moves (`standing`)."""
 
+    stride: int = 4
+    """Every how many frames one is looked at before all of them are."""
     ahead: float = 0.5
     """Width of the surroundings before its nose and behind its tail that are searched, over the body's length."""
     beside: float = 1.0
@@ -478,6 +488,12 @@ class TailConstants:
     """Largest score of another phase over the best one."""
     seen_share: float = 0.5
     """Share of the frames on which a tail of another shape has to be readable, so that it is said to be seen."""
+    stretch_frames: int = 4
+    """Fewest frames from which the apparent wavelength is taken."""
+    stretch_error: float = 0.006
+    """Largest standard error of the apparent wavelength over that of the file that tells of the scale.
+
+    On path-traced videos of painted and glass covers it was 0.0005 to 0.003."""
     offset: float = 0.3
     """Prior standard deviation of the tail's sideways offset, over the wire's apparent diameter."""
     tilt: float = 0.02

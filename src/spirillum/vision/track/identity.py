@@ -11,11 +11,11 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.vision.camera.optics import BodyPose, opposite
+from spirillum.vision.camera.optics import BodyPose, Optics, opposite
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE
+from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE, STANDING
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.standing import standing_bodies
@@ -47,6 +47,14 @@ class Identified(NamedTuple):
         """Whether the tail is where it should be, and as the file says: at a wrong scale chance shows a body alone."""
         wire = self.wire
         return wire.readable > IDENTITY.sure_share and not any(flag.spoils for flag in wire.flags)
+
+    def tail_size(self, stated: Optics) -> float:
+        """Apparent wavelength of the tail over that of the robot file at the stated scale; NaN where it is not sure.
+
+        Args:
+            stated: the camera at the stated scale.
+        """
+        return self.wire.stretch * self.start.body.optics.focal / stated.focal
 
     @property
     def flags(self) -> tuple[Flag, ...]:
@@ -120,8 +128,11 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
     nothing = np.zeros_like(still)
     for body in standing_bodies(stated, still):
         with suppress(InputError):
-            found = identified_at(name, setup, body, frames, nothing, 1.0)
-            if found.robot and found.whole and found.stripes.fits:
+            for some in (frames[:: STANDING.stride], frames):  # what is no robot is found out sooner by few
+                found = identified_at(name, setup, body, some, nothing, 1.0)
+                if not (found.robot and found.whole and found.stripes.fits):
+                    break
+            else:
                 found.start.body.look_within(stated.bounds)
                 return found
     return None

@@ -12,6 +12,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import sampled
 from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
@@ -26,6 +27,8 @@ _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
 """Candidate wavelengths, over that of the robot file."""
+_NEAR = np.linspace(0.84, 1.16, 17)
+"""Wavelengths over that of the robot file among which the apparent one is interpolated."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Candidate amplitudes where the tail does not fit, over that of the robot file."""
 
@@ -86,6 +89,7 @@ class TailWave:
         self.contrast: Samples | None = None
         self.usual = 0.0
         self.readable = 0.0
+        self.stretch = np.nan
         self._flags: list[Flag] = []
         self._hand: list[tuple[float, float]] = []
         coarse = np.linspace(first, tail.length, _COARSE)
@@ -123,8 +127,30 @@ class TailWave:
         readable = fits[:, 2] > TAIL.least_share
         self.readable = float(np.mean(readable))
         self._check_shape(strips, fits[readable], self.readable)
+        if self.readable > TAIL.seen_share and not self._flags:
+            self.stretch = self._apparent_stretch([strips[k] for k in np.flatnonzero(readable)])
         if self.readable < 0.2 and not self._flags:
             self._flags = [self._unseen()]
+
+    def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
+        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames.
+
+        NaN where its standard error is above `TAIL.stretch_error`.
+        """
+        assert self.contrast is not None  # noqa: S101 - learnt
+        found = []
+        for image, strip in strips[:: max(1, len(strips) // 12)]:
+            ridge = self._ridge(image, strip, self.contrast)
+            scores = [self._scores(ridge, strip, self._shaped(_SeenShape(factor, 1.0))).max() for factor in _NEAR]
+            best = int(np.argmax(scores))
+            if 0 < best < len(_NEAR) - 1:
+                before, top, after = scores[best - 1 : best + 2]
+                share = 0.5 * (before - after) / (before - 2.0 * top + after)
+                found.append(float(_NEAR[best] + share * (_NEAR[1] - _NEAR[0])))
+        if len(found) < TAIL.stretch_frames:
+            return np.nan
+        error = float(mad_scale(np.array(found) - np.median(found))) / np.sqrt(len(found))
+        return float(np.median(found)) if error < TAIL.stretch_error else np.nan
 
     def settled(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> list[tuple[Samples, float]]:
         """Refit the contrast from a first one; fit and rival (see `_fit`) on each frame."""
