@@ -221,7 +221,8 @@ class Following:
     def _forget(self, count: int) -> None:
         """Forget the first frames."""
         record = self.follower.record
-        for column in (record.time, record.index, record.placed, record.roll, record.edges, record.tail):
+        columns = (record.time, record.index, record.placed, record.roll, record.edges, record.tail, record.change)
+        for column in columns:
             del column[:count]
 
     def trial(self, name: str) -> Trial:

@@ -13,13 +13,14 @@ from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
-from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
+from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.elsewhere import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.picture_change import picture_steps
 from spirillum.vision.track.size import LENGTHS, checked_scale
 from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
@@ -92,7 +93,8 @@ def track_of(
         along = along_its_way(time, *along[:2])
     position = along.position
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
-    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
+    picture = picture_steps(np.array(record.change))
+    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics), picture)
     time = restored.time
     stripes = known.stripes
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], stripes.period, readable=stripes.readable)
@@ -112,13 +114,16 @@ def track_of(
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
-    glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
+    span = max(float(np.ptp(time)), 1e-9)
+    glare = learnt.glare.drift * pixel / span
+    hops = hops_in(motion, pixel, picture)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
         gap_flags = ()  # by times that are wrong
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     cuts = (
-        *cuts_in(motion, pixel),
+        *cuts_in(motion, pixel, picture),
+        *hops.flags,
         *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
@@ -141,9 +146,11 @@ def track_of(
         video=video.name,
         words=video.words,
         time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
-        drift=math.hypot(swayed.drift, glare),
+        drift=math.hypot(swayed.drift, glare, hops.distance / span),
         elongation=elongation * optics.focal / sight.optics.focal,
-        body_angle_drift=math.hypot(even.drift, roll_error, STRIPES.under_glare if known.stripes.under_glare else 0.0),
+        body_angle_drift=math.hypot(
+            even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
+        ),
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

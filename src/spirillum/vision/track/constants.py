@@ -21,6 +21,7 @@ __all__ = [
     "GLARE",
     "IDENTITY",
     "OUTLINE",
+    "PICTURE_CHANGE",
     "SCOUTING",
     "SEARCH",
     "SIZE",
@@ -41,6 +42,7 @@ __all__ = [
     "GlareConstants",
     "IdentityConstants",
     "OutlineConstants",
+    "PictureChangeConstants",
     "ScoutingConstants",
     "SearchConstants",
     "SizeConstants",
@@ -581,6 +583,30 @@ class CutConstants:
     """Turns of the tail in which it has to advance by that."""
     body_turns: float = 0.25
     """Turns of the body in which it has to."""
+    misread: float = 0.5
+    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
+
+
+@dataclass(frozen=True)
+class PictureChangeConstants:
+    """Change of the picture from frame to frame (`picture_change`)."""
+
+    width: float = 320.0
+    """Longer side to which the pictures are reduced, pixels."""
+    blur: float = 1.0
+    """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
+    fewest: int = 20
+    """Fewest frames that tell the usual change."""
+    around: int = 15
+    """Steps of the running median."""
+    least: float = 1.1
+    """Least change by two steps over that by one; with less, noise hides the motion."""
+    scatter: float = 0.4
+    """Largest scatter of the change over the rise by two steps."""
+    share: float = 0.5
+    """Share of the rise by two steps from which on a frame is missing."""
+    rest: float = 0.6
+    """Change over the usual one below which a frame repeats the one before."""
 
 
 @dataclass(frozen=True)
@@ -789,6 +815,7 @@ SINGLE_LINE = SingleLineConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
+PICTURE_CHANGE = PictureChangeConstants()
 ELSEWHERE = ElsewhereConstants()
 LOST_FRAMES = LostFramesConstants()
 MULTIPLES = MultiplesConstants()
