@@ -72,15 +72,16 @@ def test_an_outline_that_hops_is_no_cut_and_widens_the_interval_by_its_hop():
     hops = hops_in(motion, PIXEL, even)
     assert hops.distance == pytest.approx(3.0 * PIXEL, rel=0.1)
     assert hops.angle == pytest.approx(0.3, rel=0.1)
+    assert hops.phase == 0.0
     assert [flag.name for flag in hops.flags] == ["outline-hops"]
     assert "(frame 150)" in hops.flags[0].sentence
-    assert hops_in(moving(), PIXEL, even) == (0.0, 0.0, ())
+    assert hops_in(moving(), PIXEL, even) == (0.0, 0.0, 0.0, ())
 
 
 def test_a_cut_that_the_picture_shows_is_told():
     motion = moving(lost=40)
     assert [flag.name for flag in cuts_in(motion, PIXEL, steps_with([149]))] == ["video-is-cut"]
-    assert hops_in(motion, PIXEL, steps_with([149])) == (0.0, 0.0, ())
+    assert hops_in(motion, PIXEL, steps_with([149])) == (0.0, 0.0, 0.0, ())
 
 
 @pytest.mark.parametrize(("shown", "names"), [([149], ["lost-frames"]), ([], [])])

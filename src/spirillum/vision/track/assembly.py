@@ -151,6 +151,7 @@ def track_of(
         body_angle_drift=math.hypot(
             even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
         ),
+        tail_phase_drift=hops.phase,
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

@@ -56,6 +56,8 @@ class Hops(NamedTuple):
     """Standard error of the displacement from the first frame to the last, m."""
     angle: float
     """Standard error of the body's angle from end to end, rad."""
+    phase: float
+    """Standard error of the tail's phase from end to end, rad."""
     flags: tuple[Flag, ...]
 
 
@@ -68,28 +70,27 @@ def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | Non
         picture: what the pictures say of each step; None: nothing.
     """
     if picture is None:
-        return Hops(0.0, 0.0, ())
+        return Hops(0.0, 0.0, 0.0, ())
     hops = [
         None if jump is None or _in_the_picture(jump, motion.time, picture) else jump
         for jump in _jumps(motion, length_per_pixel)
     ]
-    place, body, tail = hops
     first = min((hop for hop in hops if hop is not None), default=None)
     if first is None:
-        return Hops(0.0, 0.0, ())
-    names = ("place", "body's angle", "tail's phase")
-    what = " and ".join(name for name, hop in zip(names, hops, strict=True) if hop is not None)
+        return Hops(0.0, 0.0, 0.0, ())
+    names = [name for name, hop in zip(("place", "body angle", "tail phase"), hops, strict=True) if hop is not None]
+    what = " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
     frame = int(np.searchsorted(motion.time, first.moment))
-    miscounted = tail is not None and abs(tail.size) > CUTS.misread
+    miscounted = (tail := hops[2]) is not None and abs(tail.size) > CUTS.misread
     sentence = (
-        f"the {what} of the robot jump at {first.moment:.2f} s (frame {frame}), where the picture goes on evenly: the "
+        f"the robot's {what} {'jump' if names[1:] else 'jumps'} at {first.moment:.2f} s (frame {frame}), where the picture goes on evenly: the "
         "outline hops from one edge to another; "
         + ("the tail's rotation is not given, and " if miscounted else "")
         + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
         "without it (start and end of the setup)"
     )
     flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else ())
-    return Hops(abs(place.size) if place else 0.0, abs(body.size) if body else 0.0, (flag,))
+    return Hops(*(abs(hop.size) if hop else 0.0 for hop in hops), (flag,))
 
 
 class Clock(NamedTuple):
