@@ -12,7 +12,7 @@ from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
+from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.elsewhere import something_else, something_else_flag
@@ -102,7 +102,7 @@ def track_of(
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     roll_flags = (*roll_flags, *_under_glare(known, body_angle))
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    tail_size = known.tail_size(sight.optics)
+    tail_size = _tail_size(known, sight.optics, roll[:, 0], tail[:, 0], np.isfinite(pose[:, 0]))
     scale, size_flags, roll_error = checked_scale(sight.scale, body, known.size, setup.markers.spacing, tail_size)
     if even.flags and any(flag.spoils for flag in size_flags):
         roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
@@ -169,6 +169,23 @@ def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
     )
     sentence = f"a reflection hides much of the stripes: {then}; move the lamp, soften its light or turn a polariser"
     return (Flag("stripes-under-glare", sentence, () if enough else ("body_rotation_rate",)),)
+
+
+def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, placed_on: np.ndarray) -> float:
+    """Apparent size of the tail at the stated scale; NaN where the body's marks are often not where its outline says.
+
+    Args:
+        known: the robot.
+        stated: the camera at the stated scale.
+        roll: angle of the body, rad, (n,); NaN where unreadable.
+        tail: phase of the tail, rad, (n,).
+        placed_on: mask of the frames on which the body was placed, (n,).
+    """
+    marks = (roll, tail) if known.stripes.stripes else (tail,)
+    read = [np.isfinite(angle[placed_on]).mean() for angle in marks if placed_on.any()]
+    if min(read, default=0.0) < IDENTITY.sure_share:
+        return math.nan
+    return known.tail_size(stated)
 
 
 def _readings(

@@ -83,8 +83,8 @@ def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | Non
     frame = int(np.searchsorted(motion.time, first.moment))
     miscounted = (tail := hops[2]) is not None and abs(tail.size) > CUTS.misread
     sentence = (
-        f"the robot's {what} {'jump' if names[1:] else 'jumps'} at {first.moment:.2f} s (frame {frame}), where the picture goes on evenly: the "
-        "outline hops from one edge to another; "
+        f"the robot's {what} {'jump' if names[1:] else 'jumps'} at {first.moment:.2f} s (frame {frame}), where the "
+        "picture goes on evenly: the outline hops from one edge to another; "
         + ("the tail's rotation is not given, and " if miscounted else "")
         + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
         "without it (start and end of the setup)"
