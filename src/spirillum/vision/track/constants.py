@@ -490,6 +490,8 @@ class TailConstants:
     """Largest score of another phase over the best one."""
     seen_share: float = 0.5
     """Share of the frames on which a tail of another shape has to be readable, so that it is said to be seen."""
+    halves_agree: float = 0.13
+    """Largest difference of the wavelength of either half of a tail from that of the whole, over it."""
     stretch_frames: int = 4
     """Fewest frames from which the apparent wavelength is taken."""
     stretch_error: float = 0.006
@@ -797,6 +799,24 @@ class GlareConstants:
     """Fewest edge points of which this is true."""
     drift: float = 0.08
     """Standard error of the way from the first frame to the last, pixels."""
+    beside: tuple[float, float] = (0.6, 0.85)
+    """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
+    lines: int = 5
+    """Lines along the way between these distances."""
+    veil_width: float = 0.3
+    """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
+    veil_step: float = 30.0
+    """Least step of the brightness at the edge of a mirrored lamp, of 255.
+
+    On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
+    sharp: float = 0.4
+    """Least share of the step within four pixels on either side of it."""
+    slant: int = 8
+    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
+    in_view: float = 0.5
+    """Least share of the way that has to be in the picture."""
+    veil_drift: float = 0.5
+    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
 
 
 SEARCH = SearchConstants()

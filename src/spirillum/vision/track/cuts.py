@@ -64,12 +64,14 @@ class Hops(NamedTuple):
 def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
     """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since.
 
+    Of a video that is cut nothing is given, and nothing is looked for in it.
+
     Args:
         motion: the robot's motion.
         length_per_pixel: length per pixel, m.
         picture: what the pictures say of each step; None: nothing.
     """
-    if picture is None:
+    if picture is None or cuts_in(motion, length_per_pixel, picture):
         return Hops(0.0, 0.0, 0.0, ())
     hops = [
         None if jump is None or _in_the_picture(jump, motion.time, picture) else jump

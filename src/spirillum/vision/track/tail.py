@@ -328,7 +328,7 @@ class TailWave:
             return
         few = strips[:: max(1, len(strips) // 12)]
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in few]
-        scores = self._scores_by_wavelength(ridges, 1.0)
+        scores = self.scores_by_wavelength(ridges, 1.0)
         if scores is None:
             return
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
@@ -364,7 +364,7 @@ class TailWave:
             ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
             ridges = [(ridge / (np.sqrt(np.mean(np.nan_to_num(ridge) ** 2)) + 0.5), strip) for ridge, strip in ridges]
             for amplitude in _AMPLITUDES:
-                by_wavelength = self._scores_by_wavelength(ridges, amplitude)
+                by_wavelength = self.scores_by_wavelength(ridges, amplitude)
                 if by_wavelength is not None:
                     shape = _SeenShape(_FACTORS[int(np.argmax(by_wavelength))], amplitude)
                     found.append((by_wavelength.max(), shape, weights))
@@ -374,7 +374,29 @@ class TailWave:
         other = copy(self)
         other.wave, other.contrast = self._shaped(shape), np.array(weights) / np.linalg.norm(weights)
         read = [fit[2] > TAIL.least_share and rival < TAIL.largest_rival for fit, rival in other.settled(strips)]
-        return shape if np.mean(read) > TAIL.seen_share else None
+        return shape if np.mean(read) > TAIL.seen_share and other.halves_agree(strips) else None
+
+    def halves_agree(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> bool:
+        """Whether the front and the rear half of the tail show the same wavelength, each by itself.
+
+        A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both halves.
+        """
+        assert self.contrast is not None  # noqa: S101 - asked of a wave that was read
+        ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in strips]
+        middle = self.xi.size // 2
+        found = []
+        for rows in (slice(None, middle), slice(middle, None)):
+            half = copy(self)
+            half.xi = np.ascontiguousarray(self.xi[rows])
+            parts = [
+                (np.ascontiguousarray(ridge[rows]), _Strip(*(np.ascontiguousarray(part[rows]) for part in strip)))
+                for ridge, strip in ridges
+            ]
+            scores = half.scores_by_wavelength(parts, 1.0)
+            if scores is None:
+                return False
+            found.append(float(_FACTORS[int(np.argmax(scores))]))
+        return max(abs(factor - 1.0) for factor in found) < TAIL.halves_agree
 
     def _shaped(self, shape: _SeenShape) -> Samples:
         """The wave of a tail of another shape."""
@@ -390,7 +412,7 @@ class TailWave:
                 seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
         return f" ({'; '.join(seen)})" if seen else ""
 
-    def _scores_by_wavelength(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
+    def scores_by_wavelength(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
         """Scores of waves of `_FACTORS` times the wavelength; None where too little of the tail is in view."""
         found = []
         for ridge, strip in ridges:
