@@ -64,3 +64,17 @@ def test_lengths_are_withheld_the_sooner_the_less_is_known(body, size, tail, wit
 
 def test_sizes_within_their_errors_are_not_doubted(body):
     assert checked_scale(SCALE, body, 1.005, 0.002, tail=np.nan).flags == ()
+
+
+def test_a_file_is_not_blamed_where_outline_or_light_are_in_doubt(flat_pictures, tmp_path):
+    """A tail of another wavelength is said to be one, but to be unseen where something else may be the reason."""
+    drawn = load("biorob2012-wide", **{"tail.wavelength": "32 mm"})
+    flat = flat_pictures.Flat(robot=drawn, frames=12, noise=2.0, fine=4, tail_rate=5.0, fps=6.0)
+    (tmp_path / "setup.toml").write_text(flat.setup_text())
+    setup, robot = load_setup(tmp_path / "setup.toml")
+    wave = TailWave(robot, setup, optics_of(setup, flat.size, flat.focal))
+    wave.learn([(picture, BodyPose(float(flat.truth(at)["x"]), 0.0, 0.0)) for at, picture in flat.pictures()])
+    (sure,) = wave.flags_beside(doubtful=False)
+    assert sure.name == "tail-does-not-fit"
+    assert "tail.wavelength looks like 3" in sure.sentence
+    assert [flag.name for flag in wave.flags_beside(doubtful=True)] == ["tail-unreadable"]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import radians, sqrt
 
 __all__ = [
+    "APPEARANCE",
     "COLOURS",
     "CONTOUR",
     "CUTS",
@@ -33,6 +34,7 @@ __all__ = [
     "UNWRAPPING",
     "VISIBILITY",
     "WIDTHS",
+    "AppearanceConstants",
     "ColourConstants",
     "ContourConstants",
     "CutConstants",
@@ -309,6 +311,36 @@ class SteadinessConstants:
     """Shift of the picture alone from which on the camera has moved, pixels.
 
     At rest within 1 on rendered films, also under a drifting lamp."""
+
+
+@dataclass(frozen=True)
+class AppearanceConstants:
+    """Whether the body's cover is opaque or glass (`appearance`)."""
+
+    places: int = 60
+    """Places along the axis between the seal and the nose."""
+    lines: int = 61
+    """Lines along the axis, from one side to the other."""
+    reach: float = 1.45
+    """Outermost line, over the body's radius."""
+    core: float = 0.35
+    """Outermost line of the middle of the cover, over the body's radius."""
+    beyond: float = 1.25
+    """Innermost line of the background, over the body's radius."""
+    rim: float = 0.22
+    """Distance from the outline within which a rim is looked for, over the body's radius."""
+    fewest: int = 3
+    """Fewest pictures with all of the cover in view."""
+    least: float = 20.0
+    """Least difference of brightness that tells anything, of 255."""
+    uneven: float = 0.5
+    """Change of the brightness along the axis over that from the middle to the background from which on contents show.
+
+    On path-traced videos it was 0.1 and less on paint and a liner, more than 1 where a battery lies inside."""
+    bright_rim: float = 0.12
+    """Brightness of the rim beyond that of middle and background, over their difference, of glass before a liner.
+
+    It was 0.15 and more on path-traced videos of glass, below 0.02 on paint."""
 
 
 @dataclass(frozen=True)
@@ -819,6 +851,7 @@ class GlareConstants:
     """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
 
 
+APPEARANCE = AppearanceConstants()
 SEARCH = SearchConstants()
 CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()

@@ -121,7 +121,7 @@ class TailWave:
                 best, chosen = clear, contrast
         self.contrast = chosen
         if chosen is None:
-            self._flags = [self._unseen()]
+            self._flags = [self.unseen()]
             return
         fits = np.array([answer for answer, _ in self.settled(strips)])
         readable = fits[:, 2] > TAIL.least_share
@@ -130,7 +130,7 @@ class TailWave:
         if self.readable > TAIL.seen_share and not self._flags:
             self.stretch = self._apparent_stretch([strips[k] for k in np.flatnonzero(readable)])
         if self.readable < 0.2 and not self._flags:
-            self._flags = [self._unseen()]
+            self._flags = [self.unseen()]
 
     def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
         """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames.
@@ -201,6 +201,17 @@ class TailWave:
             flags.append(Flag("handedness", sentence, _TAIL))
         return tuple(flags)
 
+    def flags_beside(self, *, doubtful: bool) -> tuple[Flag, ...]:
+        """Warnings, where the place of the body or the light may be the reason why the tail does not fit its file.
+
+        Args:
+            doubtful: whether it may be: then the file is not blamed.
+        """
+        if not doubtful:
+            return self.flags
+        other = [flag for flag in self.flags if flag.name != "tail-does-not-fit"]
+        return (*other, self.unseen()) if any(flag.spoils for flag in set(self.flags) - set(other)) else tuple(other)
+
     def handedness(self) -> int:
         """Handedness by perspective: 1 as in the robot file, -1 the opposite one, 0 undecided."""
         if len(self._hand) < 20:
@@ -215,7 +226,8 @@ class TailWave:
             return 0
         return 1 if misfit > -1.0 else -1
 
-    def _unseen(self) -> Flag:
+    def unseen(self) -> Flag:
+        """Say that the tail is not seen well enough."""
         sentence = (
             "the tail is not seen well enough, so that its rotation is not given: compress the film less, film the "
             "tail larger, or before a floor and in a light from which its wire stands out"
@@ -341,7 +353,7 @@ class TailWave:
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             elif spoils:
-                self._flags.append(self._unseen())
+                self._flags.append(self.unseen())
             return
         tail = self.robot.tail
         if len(fits):
