@@ -72,3 +72,25 @@ def test_nothing_is_told_of_what_moves_along_or_lies_aside(
     flat_pictures: ModuleType, body: BodyFinder, at: Any, moves: float, look: dict[str, Any]
 ) -> None:
     assert told(flat_pictures, body, at, moves, **look) == (0.0, ())
+
+
+@pytest.mark.parametrize(("brighter", "named"), [(60.0, True), (10.0, False)])
+def test_a_lamp_mirrored_in_the_surface_is_told_by_its_edge(
+    flat_pictures: ModuleType, body: BodyFinder, brighter: float, named: bool
+) -> None:
+    """It adds to robot and floor alike, is nowhere white, and covers the front of the body."""
+    flat = flat_pictures.flat(
+        frames=6, fps=2.0, velocity=2e-3, noise=3.0, fine=3, floor=(110, 120, 115), lines=(40, 30, 60)
+    )
+    x = flat.truth(flat.times)["x"]
+    edge, _ = flat.pixels(np.array([x.mean() + 0.01, 0.0, flat.axis_height]))
+    images = []
+    for _, picture in flat.pictures():
+        shown = picture.astype(float)
+        shown[:, round(edge) :] += brighter
+        images.append(np.clip(shown, 0, 255).astype(np.uint8))
+    found = standing_glare(images, [BodyPose(float(place), 0.0, 0.0) for place in x], body)
+    assert [flag.name for flag in found.flags] == (["standing-glare"] if named else [])
+    if named:
+        column = int(found.flags[0].sentence.partition("about column ")[2].split(" ")[0])
+        assert column == pytest.approx(edge, abs=4)  # a step over four pixels

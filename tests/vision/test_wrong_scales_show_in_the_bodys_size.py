@@ -103,8 +103,8 @@ def test_a_stated_uncertainty_of_depth_explains_a_size(film, tmp_path):
         )
         setup, robot = load_setup(path)
         sight, video = scale_of(film[2], setup)
-        _, found = checked_scale(sight.scale, BodyFinder(robot, sight.optics, bounds_of(setup, video)), 175 / 185)
-        judged.append([flag.name for flag in found])
+        body = BodyFinder(robot, sight.optics, bounds_of(setup, video))
+        judged.append([flag.name for flag in checked_scale(sight.scale, body, 175 / 185, tail=175 / 185).flags])
     assert judged == [["size-does-not-fit"], []]
 
 

@@ -71,8 +71,10 @@ class Following:
         self.windows = {name: Window(window) for name in RATE_NAMES}
         self.readings = Readings(_LOOKED_BACK)
         self.camera = CameraWatch(learnt.known.start, ruled=ruled)
-        start = learnt.known.start
-        self.scale, size_flags = checked_scale(learnt.sight.scale, start.body, learnt.known.size, setup.markers.spacing)
+        known, tail_size = learnt.known, learnt.known.tail_size(learnt.sight.optics)
+        self.scale, size_flags, _ = checked_scale(
+            learnt.sight.scale, known.start.body, known.size, setup.markers.spacing, tail_size
+        )
         self.roll, rolled = (0.0, ()) if ruled else self._roll()
         self.always = (*learnt.sight.flags, *size_flags, *rolled, *_synthetic(video))
         self.moved: tuple[Flag, ...] = ()
@@ -219,7 +221,8 @@ class Following:
     def _forget(self, count: int) -> None:
         """Forget the first frames."""
         record = self.follower.record
-        for column in (record.time, record.index, record.placed, record.roll, record.edges, record.tail):
+        columns = (record.time, record.index, record.placed, record.roll, record.edges, record.tail, record.change)
+        for column in columns:
             del column[:count]
 
     def trial(self, name: str) -> Trial:

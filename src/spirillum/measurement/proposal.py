@@ -43,7 +43,7 @@ class Finding:
     """One thing that a film tells."""
 
     name: str
-    """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `stripes` or `walls`."""
+    """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `appearance`, `stripes` or `walls`."""
     value: Any
     """What it is; None where it was not found."""
     unit: str
@@ -232,6 +232,7 @@ def _findings(
         ((tuple(rear), tuple(nose)),),
     )  # fmt: skip
     yield _travel(found)
+    yield _appearance(found)
     yield _stripes(found)
     yield _walls(found, robot)
 
@@ -277,6 +278,17 @@ def _travel(found: Scouted) -> Finding:
     where = "nose first" if speed > 0 else "tail first, against its nose"
     words = f"it moves {where}, at {abs(speed):.2g} pixels a second"
     return Finding("travel", speed, "pixel/s", "clear" if speed > 0 else "doubtful", words)
+
+
+def _appearance(found: Scouted) -> Finding:
+    appearance = found.appearance
+    if appearance == "unknown":
+        words = "the picture does not tell whether the body's cover is opaque or glass"
+        return Finding("appearance", None, "", "not found", words)
+    why = "of one brightness up to its rim" if appearance == "opaque" else "a bright rim, or contents, show through it"
+    return Finding(
+        "appearance", appearance, "", "doubtful", f"the body's cover looks {appearance}: {why}", "robot.appearance"
+    )
 
 
 def _stripes(found: Scouted) -> Finding:

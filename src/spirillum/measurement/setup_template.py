@@ -63,6 +63,7 @@ _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("axis_height", '"13 mm"', "of the robot's axis"),
         ("axis_height_uncertainty", '"1 mm"', ""),
         ("direction", '"right"', 'where in the picture the nose points: "right", "left", "up" or "down"'),
+        ("# appearance", '"glass"', 'of the cover: "opaque", "glass" or "unknown"'),
         ("# stripes", '["red", "yellow"]', "colours in their order, if not those of the robot file"),
     ),
     "# region": (
@@ -194,7 +195,8 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)
     start, known = learnt.known.start, learnt.known
-    scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing)
+    tail_size = known.tail_size(learnt.sight.optics)
+    scale, size_flags, _ = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing, tail_size)
     few = [frame.small(learnt.sight.reduction) for frame in frames]
     moved = camera_flags(few, start, ruled=setup.markers.spacing is not None)
     seen = {

@@ -299,6 +299,8 @@ def _drifts(track: Track, name: str) -> list[float]:
     drifts = [DRIFT_ANGLE if read else _expected(error, DRIFT_ANGLE) for error in errors.get(name, both)]
     if name != "tail_rotation_rate":
         drifts.append(track.body_angle_drift)
+    if name != "body_rotation_rate":
+        drifts.append(track.tail_phase_drift)
     return [_drift(track, drift) for drift in drifts]
 
 

@@ -43,6 +43,14 @@ FORM: tuple[Entry, ...] = (
         ("right", "left", "up", "down"),
     ),
     Entry(
+        "robot.appearance",
+        "Body's cover",
+        "Picture",
+        "",
+        "Opaque, or glass through which its contents and the background show.",
+        ("unknown", "opaque", "glass"),
+    ),
+    Entry(
         "robot.stripes",
         "Stripes",
         "Picture",

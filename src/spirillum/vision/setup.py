@@ -117,6 +117,8 @@ class RobotSetup(Section):
     """Standard uncertainty of that height: 10 mm of depth can be 7 % of scale."""
     direction: Literal["right", "left", "up", "down"] = "right"
     """Where in the picture the nose points."""
+    appearance: Literal["opaque", "glass", "unknown"] = "unknown"
+    """What the body's cover looks like: `opaque`, or `glass`, through which its contents and the background show."""
     stripes: Stripes | None = None
     """Colours of the stripes in their order, from the first one towards -y, if they are not those of the robot file."""
 

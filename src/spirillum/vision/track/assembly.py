@@ -12,15 +12,17 @@ from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
-from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
+from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
+from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.elsewhere import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.picture_change import picture_steps
 from spirillum.vision.track.size import LENGTHS, checked_scale
+from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
 from spirillum.vision.track.sway import Swayed, swayed_by
 from spirillum.vision.track.track import Track
@@ -33,8 +35,8 @@ __all__ = ["track_of"]
 
 _DOUBTFUL_STRIPES = Flag(
     "stripes-do-not-fit",
-    "the stripes seem uneven on a body that is not as large as it should be: the wrong scale may be the reason; the "
-    "body's rotation is not given: correct spacing, heights or robot file first",
+    "the stripes seem uneven on a body that is not as large as it should be, which may be the reason; the body's "
+    "rotation is not given: look at the annotated video for its outline",
     ("body_rotation_rate",),
 )
 
@@ -42,6 +44,13 @@ _DOUBTFUL_SCALE = Flag(
     "scale-does-not-fit",
     "neither the body's size nor the widths of its stripes are as they should be at this scale: another outline may be "
     "taken for the body's, and no length is given; correct spacing, heights or robot file first",
+    LENGTHS,
+)
+
+_DOUBTFUL_OUTLINE = Flag(
+    "outline-does-not-fit",
+    "neither the size of the outline nor the widths of its stripes are those of the body: another edge may be taken "
+    "for the body's, and no length is given: look at the annotated video, and draw a [region] around the robot",
     LENGTHS,
 )
 
@@ -84,7 +93,8 @@ def track_of(
         along = along_its_way(time, *along[:2])
     position = along.position
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
-    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
+    picture = picture_steps(np.array(record.change))
+    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics), picture)
     time = restored.time
     stripes = known.stripes
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], stripes.period, readable=stripes.readable)
@@ -92,27 +102,32 @@ def track_of(
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     roll_flags = (*roll_flags, *_under_glare(known, body_angle))
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
+    tail_size = _tail_size(known, sight.optics, roll[:, 0], tail[:, 0], np.isfinite(pose[:, 0]))
+    scale, size_flags, roll_error = checked_scale(sight.scale, body, known.size, setup.markers.spacing, tail_size)
     if even.flags and any(flag.spoils for flag in size_flags):
         roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
     elif size_flags and any(flag.spoils for flag in even.flags):
-        roll_flags = (*roll_flags, _DOUBTFUL_SCALE)
+        roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
-    glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
+    span = max(float(np.ptp(time)), 1e-9)
+    glare = learnt.glare.drift * pixel / span
+    hops = hops_in(motion, pixel, picture)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
         gap_flags = ()  # by times that are wrong
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     cuts = (
-        *cuts_in(motion, pixel),
+        *cuts_in(motion, pixel, picture),
+        *hops.flags,
         *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
+        *stands_flag(motion, pixel),
     )
     return Track(
         time=time,
@@ -131,9 +146,12 @@ def track_of(
         video=video.name,
         words=video.words,
         time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
-        drift=math.hypot(swayed.drift, glare),
+        drift=math.hypot(swayed.drift, glare, hops.distance / span),
         elongation=elongation * optics.focal / sight.optics.focal,
-        body_angle_drift=math.hypot(even.drift, STRIPES.under_glare if known.stripes.under_glare else 0.0),
+        body_angle_drift=math.hypot(
+            even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
+        ),
+        tail_phase_drift=hops.phase,
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 
@@ -151,6 +169,23 @@ def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
     )
     sentence = f"a reflection hides much of the stripes: {then}; move the lamp, soften its light or turn a polariser"
     return (Flag("stripes-under-glare", sentence, () if enough else ("body_rotation_rate",)),)
+
+
+def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, placed_on: np.ndarray) -> float:
+    """Apparent size of the tail at the stated scale; NaN where the body's marks are often not where its outline says.
+
+    Args:
+        known: the robot.
+        stated: the camera at the stated scale.
+        roll: angle of the body, rad, (n,); NaN where unreadable.
+        tail: phase of the tail, rad, (n,).
+        placed_on: mask of the frames on which the body was placed, (n,).
+    """
+    marks = (roll, tail) if known.stripes.stripes else (tail,)
+    read = [np.isfinite(angle[placed_on]).mean() for angle in marks if placed_on.any()]
+    if min(read, default=0.0) < IDENTITY.sure_share:
+        return math.nan
+    return known.tail_size(stated)
 
 
 def _readings(

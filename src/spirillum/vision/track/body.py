@@ -78,6 +78,10 @@ class BodyFinder:
             self._shapes[factor] = Shape.of(self.contour, self.optics.reduced(factor), self.bounds, factor)
         return self._shapes[factor]
 
+    def look_within(self, bounds: tuple[int, int, int, int]) -> None:
+        """Change the part of the picture to look at: left, top, right, bottom."""
+        self.bounds, self._shapes = bounds, {}
+
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
         """Learn the edges' templates from frames with approximately known poses, and refine these poses.
 

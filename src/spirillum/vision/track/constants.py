@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import radians, sqrt
 
 __all__ = [
+    "APPEARANCE",
     "COLOURS",
     "CONTOUR",
     "CUTS",
@@ -21,9 +22,11 @@ __all__ = [
     "GLARE",
     "IDENTITY",
     "OUTLINE",
+    "PICTURE_CHANGE",
     "SCOUTING",
     "SEARCH",
     "SIZE",
+    "STANDING",
     "STEADINESS",
     "STRIPES",
     "SWAY",
@@ -31,6 +34,7 @@ __all__ = [
     "UNWRAPPING",
     "VISIBILITY",
     "WIDTHS",
+    "AppearanceConstants",
     "ColourConstants",
     "ContourConstants",
     "CutConstants",
@@ -40,9 +44,11 @@ __all__ = [
     "GlareConstants",
     "IdentityConstants",
     "OutlineConstants",
+    "PictureChangeConstants",
     "ScoutingConstants",
     "SearchConstants",
     "SizeConstants",
+    "StandingConstants",
     "SteadinessConstants",
     "StripeConstants",
     "SwayConstants",
@@ -193,6 +199,14 @@ class SizeConstants:
     """Standard errors from which on size and scale are said to differ."""
     largest_difference: float = 0.1
     """Relative difference beyond which no length is given."""
+    unconfirmed: float = 0.05
+    """The same where the tail says nothing of the scale: another edge than the body's may be followed."""
+    tail_agrees: float = 0.35
+    """Difference of the tail's apparent size from the ruler's or the body's up to which it agrees with it, over the
+    difference of these two."""
+    roll_error: float = 1.7
+    """Error of the body's angle over the relative error of its outline, rad: the tangent of 60 degrees, where the
+    outermost stripes are read."""
     edge_width: float = 0.6
     """Standard deviation of the Gaussian within which edges agree, pixels."""
     tolerance: tuple[float, float, float, float] = (0.0125, 0.5, 0.5, 0.006)
@@ -256,6 +270,22 @@ class ScoutingConstants:
 
 
 @dataclass(frozen=True)
+class StandingConstants:
+    """A robot that stands still, or hardly moves (`standing`)."""
+
+    stride: int = 4
+    """Every how many frames one is looked at before all of them are."""
+    ahead: float = 0.5
+    """Width of the surroundings before its nose and behind its tail that are searched, over the body's length."""
+    beside: float = 1.0
+    """Half width of these surroundings, over the body's diameter."""
+    moved: float = 0.1
+    """Largest displacement along the channel of a robot that stands, pixels."""
+    turned: float = radians(1.0)
+    """Largest rotation of its body and of its tail, rad."""
+
+
+@dataclass(frozen=True)
 class SteadinessConstants:
     """Whether camera and ruler stayed where they were (`steadiness`)."""
 
@@ -281,6 +311,36 @@ class SteadinessConstants:
     """Shift of the picture alone from which on the camera has moved, pixels.
 
     At rest within 1 on rendered films, also under a drifting lamp."""
+
+
+@dataclass(frozen=True)
+class AppearanceConstants:
+    """Whether the body's cover is opaque or glass (`appearance`)."""
+
+    places: int = 60
+    """Places along the axis between the seal and the nose."""
+    lines: int = 61
+    """Lines along the axis, from one side to the other."""
+    reach: float = 1.45
+    """Outermost line, over the body's radius."""
+    core: float = 0.35
+    """Outermost line of the middle of the cover, over the body's radius."""
+    beyond: float = 1.25
+    """Innermost line of the background, over the body's radius."""
+    rim: float = 0.22
+    """Distance from the outline within which a rim is looked for, over the body's radius."""
+    fewest: int = 3
+    """Fewest pictures with all of the cover in view."""
+    least: float = 20.0
+    """Least difference of brightness that tells anything, of 255."""
+    uneven: float = 0.5
+    """Change of the brightness along the axis over that from the middle to the background from which on contents show.
+
+    On path-traced videos it was 0.1 and less on paint and a liner, more than 1 where a battery lies inside."""
+    bright_rim: float = 0.12
+    """Brightness of the rim beyond that of middle and background, over their difference, of glass before a liner.
+
+    It was 0.15 and more on path-traced videos of glass, below 0.02 on paint."""
 
 
 @dataclass(frozen=True)
@@ -462,6 +522,14 @@ class TailConstants:
     """Largest score of another phase over the best one."""
     seen_share: float = 0.5
     """Share of the frames on which a tail of another shape has to be readable, so that it is said to be seen."""
+    halves_agree: float = 0.13
+    """Largest difference of the wavelength of either half of a tail from that of the whole, over it."""
+    stretch_frames: int = 4
+    """Fewest frames from which the apparent wavelength is taken."""
+    stretch_error: float = 0.006
+    """Largest standard error of the apparent wavelength over that of the file that tells of the scale.
+
+    On path-traced videos of painted and glass covers it was 0.0005 to 0.003."""
     offset: float = 0.3
     """Prior standard deviation of the tail's sideways offset, over the wire's apparent diameter."""
     tilt: float = 0.02
@@ -549,6 +617,30 @@ class CutConstants:
     """Turns of the tail in which it has to advance by that."""
     body_turns: float = 0.25
     """Turns of the body in which it has to."""
+    misread: float = 0.5
+    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
+
+
+@dataclass(frozen=True)
+class PictureChangeConstants:
+    """Change of the picture from frame to frame (`picture_change`)."""
+
+    width: float = 320.0
+    """Longer side to which the pictures are reduced, pixels."""
+    blur: float = 1.0
+    """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
+    fewest: int = 20
+    """Fewest frames that tell the usual change."""
+    around: int = 15
+    """Steps of the running median."""
+    least: float = 1.1
+    """Least change by two steps over that by one; with less, noise hides the motion."""
+    scatter: float = 0.4
+    """Largest scatter of the change over the rise by two steps."""
+    share: float = 0.5
+    """Share of the rise by two steps from which on a frame is missing."""
+    rest: float = 0.6
+    """Change over the usual one below which a frame repeats the one before."""
 
 
 @dataclass(frozen=True)
@@ -739,8 +831,27 @@ class GlareConstants:
     """Fewest edge points of which this is true."""
     drift: float = 0.08
     """Standard error of the way from the first frame to the last, pixels."""
+    beside: tuple[float, float] = (0.6, 0.85)
+    """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
+    lines: int = 5
+    """Lines along the way between these distances."""
+    veil_width: float = 0.3
+    """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
+    veil_step: float = 30.0
+    """Least step of the brightness at the edge of a mirrored lamp, of 255.
+
+    On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
+    sharp: float = 0.4
+    """Least share of the step within four pixels on either side of it."""
+    slant: int = 8
+    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
+    in_view: float = 0.5
+    """Least share of the way that has to be in the picture."""
+    veil_drift: float = 0.5
+    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
 
 
+APPEARANCE = AppearanceConstants()
 SEARCH = SearchConstants()
 CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()
@@ -748,6 +859,7 @@ FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
 SCOUTING = ScoutingConstants()
+STANDING = StandingConstants()
 STEADINESS = SteadinessConstants()
 COLOURS = ColourConstants()
 STRIPES = StripeConstants()
@@ -756,6 +868,7 @@ SINGLE_LINE = SingleLineConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
+PICTURE_CHANGE = PictureChangeConstants()
 ELSEWHERE = ElsewhereConstants()
 LOST_FRAMES = LostFramesConstants()
 MULTIPLES = MultiplesConstants()

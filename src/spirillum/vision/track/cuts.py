@@ -19,34 +19,80 @@ from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUTS
 from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.picture_change import PictureSteps
 from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.warnings import EVERYTHING
 
-__all__ = ["Clock", "clock_of", "cuts_in", "one_picture", "stands_still"]
+__all__ = ["Clock", "Hops", "clock_of", "cuts_in", "hops_in", "one_picture", "stands_still"]
 
 
-def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
+def cuts_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
     """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow.
+
+    Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
 
     Args:
         motion: the robot's motion.
         length_per_pixel: length per pixel, m.
+        picture: what the pictures say of each step; None: nothing.
     """
-    time, x, body_angle, tail_phase = motion
-    if time.size < 2:
-        return ()
-    usual = float(np.median(np.diff(time)))
-    jumps = [_jump(time, x, CUTS.place * length_per_pixel, usual)]
-    jumps += [_jump(time, angle, CUTS.angle, usual) for angle in (body_angle, tail_phase)]
-    moments = sorted(moment for moment in jumps if moment is not None)
-    for one, other in pairwise(moments):
-        if other - one < CUTS.gap * usual:
+    jumps = [jump for jump in _jumps(motion, length_per_pixel) if jump is not None]
+    usual = _usual(motion.time)
+    for one, other in pairwise(sorted(jumps)):
+        if other.moment - one.moment < CUTS.gap * usual and _in_the_picture(one, motion.time, picture):
             sentence = (
-                f"robot, body and tail jump at {one:.2f} s while the times of the frames go on evenly: a piece of the "
-                "video is missing there; nothing is given (start and end of the setup choose a part of the video)"
+                f"robot, body and tail jump at {one.moment:.2f} s, and so does the picture, while the times of the "
+                "frames go on evenly: a piece of the video is missing there; nothing is given (start and end of the "
+                "setup choose a part of the video)"
             )
             return (Flag("video-is-cut", sentence, EVERYTHING),)
     return ()
+
+
+class Hops(NamedTuple):
+    """Jumps of what was read on pictures that go on evenly."""
+
+    distance: float
+    """Standard error of the displacement from the first frame to the last, m."""
+    angle: float
+    """Standard error of the body's angle from end to end, rad."""
+    phase: float
+    """Standard error of the tail's phase from end to end, rad."""
+    flags: tuple[Flag, ...]
+
+
+def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
+    """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since.
+
+    Of a video that is cut nothing is given, and nothing is looked for in it.
+
+    Args:
+        motion: the robot's motion.
+        length_per_pixel: length per pixel, m.
+        picture: what the pictures say of each step; None: nothing.
+    """
+    if picture is None or cuts_in(motion, length_per_pixel, picture):
+        return Hops(0.0, 0.0, 0.0, ())
+    hops = [
+        None if jump is None or _in_the_picture(jump, motion.time, picture) else jump
+        for jump in _jumps(motion, length_per_pixel)
+    ]
+    first = min((hop for hop in hops if hop is not None), default=None)
+    if first is None:
+        return Hops(0.0, 0.0, 0.0, ())
+    names = [name for name, hop in zip(("place", "body angle", "tail phase"), hops, strict=True) if hop is not None]
+    what = " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+    frame = int(np.searchsorted(motion.time, first.moment))
+    miscounted = (tail := hops[2]) is not None and abs(tail.size) > CUTS.misread
+    sentence = (
+        f"the robot's {what} {'jump' if names[1:] else 'jumps'} at {first.moment:.2f} s (frame {frame}), where the "
+        "picture goes on evenly: the outline hops from one edge to another; "
+        + ("the tail's rotation is not given, and " if miscounted else "")
+        + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
+        "without it (start and end of the setup)"
+    )
+    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else ())
+    return Hops(*(abs(hop.size) if hop else 0.0 for hop in hops), (flag,))
 
 
 class Clock(NamedTuple):
@@ -176,8 +222,39 @@ def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: fl
     return abs(math.remainder(reached[1] - reached[0], period)) / unit
 
 
-def _jump(time: Samples, values: Samples, least: float, usual: float) -> float | None:
-    """Time of the largest significant jump of a series, s; None if there is none."""
+class _Jump(NamedTuple):
+    """The largest jump of a series."""
+
+    moment: float
+    """Time, s."""
+    size: float
+    """Of the series."""
+
+
+def _jumps(motion: Motion, length_per_pixel: float) -> list[_Jump | None]:
+    """The largest significant jumps of place, body and tail; None where there is none."""
+    time, x, body_angle, tail_phase = motion
+    if time.size < 2:
+        return [None, None, None]
+    usual = _usual(time)
+    angles = (_jump(time, angle, CUTS.angle, usual) for angle in (body_angle, tail_phase))
+    return [_jump(time, x, CUTS.place * length_per_pixel, usual), *angles]
+
+
+def _usual(time: Samples) -> float:
+    """Usual time between two frames, s."""
+    return float(np.median(np.diff(time))) if time.size > 1 else 0.0
+
+
+def _in_the_picture(jump: _Jump, time: Samples, picture: PictureSteps | None) -> bool:
+    """Whether the picture jumps at a jump of a series, or within a step of it; it does where that is unknown."""
+    if picture is None:
+        return True
+    return picture.jump_near(int(np.searchsorted(time, jump.moment)) - 1)
+
+
+def _jump(time: Samples, values: Samples, least: float, usual: float) -> _Jump | None:
+    """The largest significant jump of a series; None if there is none."""
     known = np.isfinite(values)
     t, v = time[known], values[known]
     if t.size < 4 * CUTS.window:
@@ -200,7 +277,9 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> float |
         return None
     spread = float(mad_scale(steps[steps != 0.0]))
     largest = int(np.argmax(np.abs(steps)))
-    return float(splits[largest]) if abs(steps[largest]) > max(least, CUTS.clear * spread) else None
+    if not abs(steps[largest]) > max(least, CUTS.clear * spread):
+        return None
+    return _Jump(float(splits[largest]), float(reached[1][largest] - reached[0][largest]))
 
 
 def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:

@@ -33,6 +33,9 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
         poses: where the robot is on each of them, to a pixel or so.
         body: the robot's body.
     """
+    veil = _veil(images, poses, body)
+    if veil is not None:
+        return veil
     cv2 = required("cv2", "measuring a video", "video")
     bodies = np.array([_covered(body, pose) for pose in poses])
     (left, top, right, bottom), wide = body.bounds, int(np.ptp(bodies[0], axis=0).min())
@@ -55,6 +58,89 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
         "its light until none lies there"
     )
     return Glare(GLARE.drift, (Flag("standing-glare", sentence),))
+
+
+def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare | None:
+    """Look beside the body for a lamp mirrored in the surface: a sharp step of the brightness across the robot's way.
+
+    It need not be white, and adds to the brightness of body and background alike. Lines of a ruler or a grid are
+    narrower than the medians that are compared; walls run along the way.
+    """
+    robot, pixel = body.robot, body.optics.length_per_pixel
+    x = np.array([pose.x for pose in poses])
+    middle = BodyPose(*np.median(np.array(poses), axis=0).tolist())
+    behind = 0.5 * robot.body.length + robot.coupling.length + robot.tail.length
+    first, last = x.min() - middle.x - behind, x.max() - middle.x + 0.5 * robot.body.length
+    wide = max(4, round(GLARE.veil_width * robot.body.diameter / pixel))
+    along = np.arange(first - wide * pixel, last + wide * pixel, pixel)
+    sides = [side * np.linspace(*GLARE.beside, GLARE.lines) * robot.body.diameter for side in (1.0, -1.0)]
+    profiles = [_brightness(images, middle, body, along, across) for across in sides]
+    if any(profile is None or profile.size <= 4 * wide for profile in profiles):
+        return None
+    place, size = _common_step(*(_sharp_steps(profile, wide) for profile in profiles if profile is not None))
+    if size < GLARE.veil_step:
+        return None
+    there, beside = float(along[place]), float(sides[0].mean())
+    u, v = seen(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
+    sentence = (
+        f"a reflection stands still on the robot's way: its edge is about column {u:.0f} and row {v:.0f} of the "
+        f"picture, {size:.0f} of 255 brighter than what is beside it: edges of the body and the wire are hidden or "
+        "shifted there, so that the interval of the speed is wider; move the lamp or soften its light until none lies "
+        "there"
+    )
+    return Glare(GLARE.veil_drift, (Flag("standing-glare", sentence),))
+
+
+def _brightness(
+    images: Sequence[np.ndarray], pose: BodyPose, body: BodyFinder, along: Samples, across: Samples
+) -> Samples | None:
+    """Median brightness at places along the way of a robot, of 255, (n,); None where much of it is out of view.
+
+    Args:
+        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
+        pose: of the robot halfway.
+        body: the robot's body.
+        along: places along its axis from its mid-length, m, (n,).
+        across: places across, m, (k,).
+    """
+    grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    pixels = np.nan_to_num(seen(grid, pose, body.optics), nan=-1.0).round().astype(int)
+    left, top, right, bottom = body.bounds
+    inside = np.all((pixels >= (left, top)) & (pixels < (right, bottom)), axis=1).reshape(along.size, across.size)
+    kept = inside.all(axis=1)
+    if kept.sum() < GLARE.in_view * along.size:
+        return None
+    columns, rows = np.clip(pixels, (left, top), (right - 1, bottom - 1)).T
+    grey = np.median([image[rows, columns].mean(axis=1) for image in images], axis=0).reshape(inside.shape)
+    profile = np.median(grey, axis=1)
+    return np.interp(np.arange(along.size), np.flatnonzero(kept), profile[kept])
+
+
+def _sharp_steps(profile: Samples, wide: int) -> Samples:
+    """Step of a profile at each place, by the medians of both sides; 0 where it is not sharp, (n,)."""
+    gap = 2
+    windows = np.median(np.lib.stride_tricks.sliding_window_view(profile, wide), axis=1)
+    places = np.arange(wide + gap, profile.size - wide - gap)
+    steps = windows[places + gap] - windows[places - gap - wide]
+    near = profile[places + 2 * gap] - profile[places - 2 * gap]
+    out = np.zeros(profile.size)
+    out[places] = np.where(near * steps > GLARE.sharp * steps**2, steps, 0.0)
+    return out
+
+
+def _common_step(one: Samples, other: Samples) -> tuple[int, float]:
+    """Place and size of the largest step on both sides of the body at about the same place: what lies aside has one."""
+    found = [(0, 0.0)]
+    for sign in (1.0, -1.0):
+        rises = [np.maximum(sign * steps, 0.0) for steps in (one, other)]
+        around = [
+            np.lib.stride_tricks.sliding_window_view(np.pad(rise, GLARE.slant), 2 * GLARE.slant + 1).max(axis=1)
+            for rise in rises
+        ]
+        best = int(np.argmax(np.minimum(*around)))
+        near = np.arange(max(0, best - GLARE.slant), min(one.size, best + GLARE.slant + 1))
+        found.append((int(near[np.argmax((rises[0] + rises[1])[near])]), float(np.minimum(*around)[best])))
+    return max(found, key=lambda step: step[1])
 
 
 def _covered(body: BodyFinder, pose: BodyPose) -> Samples:

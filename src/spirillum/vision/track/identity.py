@@ -11,13 +11,14 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.vision.camera.optics import BodyPose, opposite
+from spirillum.vision.camera.optics import BodyPose, Optics, opposite
 from spirillum.vision.flag import Flag
-from spirillum.vision.setup import Setup
+from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE
+from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE, STANDING
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
+from spirillum.vision.track.standing import standing_bodies
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
@@ -46,6 +47,14 @@ class Identified(NamedTuple):
         """Whether the tail is where it should be, and as the file says: at a wrong scale chance shows a body alone."""
         wire = self.wire
         return wire.readable > IDENTITY.sure_share and not any(flag.spoils for flag in wire.flags)
+
+    def tail_size(self, stated: Optics) -> float:
+        """Apparent wavelength of the tail over that of the robot file at the stated scale; NaN where it is not sure.
+
+        Args:
+            stated: the camera at the stated scale.
+        """
+        return self.wire.stretch * self.start.body.optics.focal / stated.focal
 
     @property
     def flags(self) -> tuple[Flag, ...]:
@@ -92,6 +101,9 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
             return found
     except InputError as error:
         found = error
+    standing = _standing(name, setup, stated, frames, still)
+    if standing is not None:
+        return standing
     half = not isinstance(found, InputError) and found.robot  # its tail does not fit: another size has to fit wholly
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
@@ -107,6 +119,23 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
         return found
     return found._replace(start=replace(found.start, flags=()))
+
+
+def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified | None:
+    """The robot in the static background, with its stripes and its whole tail; None where there is none."""
+    if not stripes_of(setup, stated.robot):
+        return None  # a tail alone may be chance: all frames show the same background
+    nothing = np.zeros_like(still)
+    for body in standing_bodies(stated, still):
+        with suppress(InputError):
+            for some in (frames[:: STANDING.stride], frames):  # what is no robot is found out sooner by few
+                found = identified_at(name, setup, body, some, nothing, 1.0)
+                if not (found.robot and found.whole and found.stripes.fits):
+                    break
+            else:
+                found.start.body.look_within(stated.bounds)
+                return found
+    return None
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:

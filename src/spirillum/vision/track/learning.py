@@ -13,6 +13,7 @@ from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import SIZE
 from spirillum.vision.track.glare import Glare, standing_glare
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.search import searched_at
@@ -38,7 +39,9 @@ class Learnt(NamedTuple):
     def flags(self) -> tuple[Flag, ...]:
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
-        return (*known.start.flags, *known.flags, *known.stripes.flags, *known.wire.flags, *self.glare.flags)
+        doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0]
+        wire = known.wire.flags_beside(doubtful=doubtful)
+        return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 
 
 def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None) -> Learnt:

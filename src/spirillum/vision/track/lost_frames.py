@@ -22,6 +22,7 @@ from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
 from spirillum.vision.track.multiples import Multiples, all_alike, multiples_of, near_their_mean
+from spirillum.vision.track.picture_change import PictureSteps
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["Reading", "Restored", "restored_times"]
@@ -70,7 +71,7 @@ class _Jumps(NamedTuple):
     period: float
 
 
-def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
+def restored_times(time: Samples, readings: tuple[Reading, ...], picture: PictureSteps | None = None) -> Restored:
     """Find frames that are missing although the times go on evenly, and correct the times where that is clear.
 
     A loss counts where the jumps prefer it to none by `LOST_FRAMES.clear` in chi-square, and to any other number by
@@ -79,9 +80,13 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     Otherwise nothing is given, as also if too many jumps are clear but not by whole frames, or if further losses of
     one frame could not be seen. Losses by which no series moves clearly stay unseen: slow robots, even rates.
 
+    A jump counts only where the picture jumps too, and a repeated frame only where the picture rests: otherwise the
+    outline has hopped, or was misread.
+
     Args:
         time: time of each frame as the film states it, s, (n,).
         readings: the series: tail, body and position.
+        picture: what the pictures say of each step; None: nothing.
     """
     none = Restored(time, 0.0, ())
     if time.size <= LOST_FRAMES.fewest or np.any(np.diff(time) <= 0):
@@ -92,7 +97,7 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     for wide in LOST_FRAMES.windows:
         for _ in range(LOST_FRAMES.rounds):
             series = _all_jumps(_later(time, lost, frame), readings, frame, wide)
-            more, odd = _losses(series, wide) if series else (np.zeros_like(lost), odd)
+            more, odd = _losses(series, wide, picture) if series else (np.zeros_like(lost), odd)
             lost += more
             if not more.any():
                 break
@@ -101,7 +106,7 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     many = None if uneven else _in_multiples(found.time, readings, frame)
     if many is not None and max(many.lost, many.repeated) > MULTIPLES.largest_share * many.steps:
         return none._replace(flags=(_no_usual_step(many),))
-    repeats = 0 if uneven else _repeated(found.time, readings, frame)
+    repeats = 0 if uneven else _repeated(found.time, readings, frame, picture)
     change = _change_of_motion(time, readings)
     if change and (uneven or repeats):
         return none._replace(
@@ -154,7 +159,7 @@ def _put_back(
     return Restored(corrected, doubt * frame / length, (_corrected(lost, doubtful=doubt > 0),))
 
 
-def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int:
+def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float, picture: PictureSteps | None) -> int:
     """Number of frames that show no motion between frames that do.
 
     Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
@@ -165,6 +170,7 @@ def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int
     misfit = np.asarray(sum(_misfit(one, np.arange(-1, LOST_FRAMES.most + 1)) for one in series))
     fit = misfit < LOST_FRAMES.fits * len(series)
     still = fit[:, 0] & (misfit[:, 1:].min(axis=1) - misfit[:, 0] > LOST_FRAMES.repeats)
+    still = still if picture is None else still & picture.rests
     twice = fit[:, 2] & (misfit[:, 1] - misfit[:, 2] > LOST_FRAMES.apart)
     stands = np.convolve(still, np.ones(2 * LOST_FRAMES.stands + 1), "same") > LOST_FRAMES.stands
     return int(np.sum(still & ~stands & ~np.append(twice[1:], False)))
@@ -206,7 +212,7 @@ def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
     return time + frame * np.concatenate([[0.0], np.cumsum(lost)])
 
 
-def _losses(series: list[_Jumps], wide: int) -> tuple[np.ndarray, np.ndarray]:
+def _losses(series: list[_Jumps], wide: int, picture: PictureSteps | None) -> tuple[np.ndarray, np.ndarray]:
     """Frames lost at each step, (m,), and a mask of jumps that stand out without being whole frames, (m,)."""
     counts = np.arange(LOST_FRAMES.most + 1)
     misfit = np.asarray(sum(_misfit(one, counts) for one in series))
@@ -217,6 +223,8 @@ def _losses(series: list[_Jumps], wide: int) -> tuple[np.ndarray, np.ndarray]:
     others[rows, best] = np.inf
     second = others.min(axis=1) - misfit[rows, best]
     stands_out = gain > LOST_FRAMES.clear
+    if picture is not None:
+        stands_out &= np.convolve(picture.jumps, np.ones(2 * wide - 1), "same") > 0.0
     clear = stands_out & (second > LOST_FRAMES.apart) & (misfit[rows, best] < LOST_FRAMES.fits * len(series))
     lost, odd = np.zeros(best.shape, dtype=np.int64), stands_out & ~clear
     for place in np.argsort(-gain):  # a jump shows at all steps within the window: the clearest is taken

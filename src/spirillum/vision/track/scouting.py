@@ -21,6 +21,7 @@ from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
+from spirillum.vision.track.appearance import Appearance, appearance_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, SCOUTING
 from spirillum.vision.track.identity import Identified, identified_at
@@ -70,6 +71,13 @@ class Scouted(NamedTuple):
         """The provisional camera, at the scale at which the robot was found."""
         assert self.known is not None  # noqa: S101 - asked by those who know
         return self.known.start.body.optics
+
+    @property
+    def appearance(self) -> Appearance:
+        """Whether the cover of the robot looks opaque or like glass."""
+        assert self.known is not None  # noqa: S101
+        start = self.known.start
+        return appearance_of(start.body.robot, self.optics, start.seen)
 
     @property
     def speed(self) -> float:

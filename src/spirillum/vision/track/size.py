@@ -26,7 +26,16 @@ from spirillum.vision.track.contour import contour_of
 from spirillum.vision.track.search import Candidate, close_places
 from spirillum.vision.track.shape import Shape
 
-__all__ = ["LENGTHS", "OutlineFit", "best_other_size", "checked_scale", "clearness", "outline_seen", "resized"]
+__all__ = [
+    "LENGTHS",
+    "CheckedScale",
+    "OutlineFit",
+    "best_other_size",
+    "checked_scale",
+    "clearness",
+    "outline_seen",
+    "resized",
+]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
@@ -175,35 +184,84 @@ def _blurred(steep: Samples) -> Samples:
     return np.asarray(around @ (bell / bell.sum()))
 
 
+class CheckedScale(NamedTuple):
+    """The scale as the apparent sizes of body and tail leave it."""
+
+    scale: Scale
+    """With the apparent size, and a larger uncertainty where the ruler is doubted."""
+    flags: tuple[Flag, ...]
+    """What contradicts it."""
+    roll_error: float
+    """Standard error of the body's angle by an outline that is not the body's, rad."""
+
+
 def checked_scale(
-    scale: Scale, body: BodyFinder, size: float, spacing: float | None = None
-) -> tuple[Scale, tuple[Flag, ...]]:
-    """The scale with its apparent size, a larger uncertainty and a flag where the size contradicts it.
+    scale: Scale, body: BodyFinder, size: float, spacing: float | None = None, tail: float = np.nan
+) -> CheckedScale:
+    """Compare the scale with the apparent sizes of body and tail.
+
+    A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid may
+    be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body, the
+    ruler or the heights are doubted; where it agrees with the ruler, the outline.
 
     Args:
         scale: the scale by the ruler.
         body: the body.
         size: its apparent size over that of the robot file.
         spacing: of the ruler's lines as the setup states it, m; None without a ruler.
+        tail: apparent wavelength of the tail over that of the robot file at this scale; NaN: unknown.
     """
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel
     off = float(abs(np.log(size)))
     if off < SIZE.doubt * np.sqrt(scale.relative_uncertainty**2 + SIZE.build_error**2 + (SIZE.edge_error / half) ** 2):
-        return scale, ()
-    how = f"{100 * abs(size - 1.0):.1f} % {'larger' if size > 1.0 else 'smaller'} than its file says"
-    if off > SIZE.largest_difference:
-        how = f"{size:.3g} times as large as its file says"
+        return CheckedScale(scale, (), 0.0)
+    agrees = SIZE.tail_agrees * off
+    if abs(np.log(tail / size)) < agrees:
+        return _doubtful_ruler(scale, size, off, spacing)
+    return _doubtful_outline(scale, size, off, tail, ruler=bool(abs(np.log(tail)) < agrees))
+
+
+def _doubtful_ruler(scale: Scale, size: float, off: float, spacing: float | None) -> CheckedScale:
+    """What follows where body and tail agree on another scale."""
     would = (
         ""
         if spacing is None
         else f" (about markers.spacing = {1e3 * spacing / size:.3g} mm in place of {1e3 * spacing:.3g} mm would fit)"
     )
     sentence = (
-        f"the body looks {how} at this scale: spacing, heights or index of the setup, or the robot's size, are wrong"
-        f"{would}; "
+        f"body and tail both look {_told(size)} at this scale: spacing, heights or index of the setup, or the size of "
+        f"the robot, are wrong{would}: measure them again; "
     )
     if off > SIZE.largest_difference:
-        return scale, (Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS),)
-    wider = with_source(scale, "size of the body", off)
-    return wider, (Flag("size-does-not-fit", sentence + "the intervals of lengths and speeds are wider for it"),)
+        flag = Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS)
+        return CheckedScale(scale, (flag,), 0.0)
+    flag = Flag("size-does-not-fit", sentence + "the intervals of lengths and speeds are wider for it")
+    return CheckedScale(with_source(scale, "size of the body", off), (flag,), 0.0)
+
+
+def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, ruler: bool) -> CheckedScale:
+    """What follows where nothing but the body's outline contradicts the scale."""
+    if ruler:
+        why = f"the tail is as long as it should be within {100 * abs(tail - 1.0):.1f} %"
+    else:
+        why = "the tail says nothing of it" if np.isnan(tail) else "the tail agrees with neither"
+    sentence = (
+        f"the outline looks {_told(size)}, and {why}: it may follow the rim or the contents of a glass cover, or a "
+        "grid behind it: look at the annotated video, and correct body.length and body.diameter of the robot file only "
+        "where it lies on the body; "
+    )
+    wider = scale if ruler else with_source(scale, "size of the body", off)
+    if off > (SIZE.largest_difference if ruler else SIZE.unconfirmed):
+        given = "no length, no speed and no rate of the body is given"
+        flag = Flag("outline-does-not-fit", sentence + given, (*LENGTHS, "body_rotation_rate"))
+    else:
+        flag = Flag("outline-does-not-fit", sentence + "the interval of the body's rate is wider for it")
+    return CheckedScale(wider, (flag,), SIZE.roll_error * off)
+
+
+def _told(size: float) -> str:
+    """An apparent size over that of the robot file, in words."""
+    if abs(np.log(size)) > SIZE.largest_difference:
+        return f"{size:.3g} times as large as the robot file says"
+    return f"{100 * abs(size - 1.0):.1f} % {'larger' if size > 1.0 else 'smaller'} than the robot file says"

@@ -17,6 +17,7 @@ from spirillum.vision.track.body import Placed
 from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.first_look import close_place, on_the_way
 from spirillum.vision.track.identity import Identified
+from spirillum.vision.track.picture_change import PictureChange
 from spirillum.vision.track.search import candidates
 from spirillum.vision.video.frames import Frame
 
@@ -56,6 +57,8 @@ class Record:
     """How far the edges between stripes lie off an even pattern, rad, (stripes,): see `edge_shifts`."""
     tail: list[tuple[float, float]] = field(default_factory=list)
     """Phase of the tail modulo 2 pi, and its standard error, rad; NaN where unreadable."""
+    change: list[tuple[float, float]] = field(default_factory=list)
+    """Change of the picture against the last one and the one before, of 255; NaN where there is none."""
 
 
 class Follower:
@@ -71,6 +74,7 @@ class Follower:
         """
         self.known, self.still, self.record = known, still, Record()
         self._ahead = ahead
+        self._change = PictureChange(known.start.body.bounds)
         self._last: BodyPose | None = None
         self._shares: deque[float] = deque(maxlen=FOLLOWING.usual_edges)
 
@@ -91,6 +95,7 @@ class Follower:
         record.roll.append(roll)
         record.edges.append(edges)
         record.tail.append(tail)
+        record.change.append(self._change.of(frame.image))
         if found.known:
             self._last = found.pose
             self._shares.append(found.share)

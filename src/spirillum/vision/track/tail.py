@@ -12,6 +12,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import sampled
 from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
@@ -26,6 +27,8 @@ _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
 """Candidate wavelengths, over that of the robot file."""
+_NEAR = np.linspace(0.84, 1.16, 17)
+"""Wavelengths over that of the robot file among which the apparent one is interpolated."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Candidate amplitudes where the tail does not fit, over that of the robot file."""
 
@@ -86,6 +89,7 @@ class TailWave:
         self.contrast: Samples | None = None
         self.usual = 0.0
         self.readable = 0.0
+        self.stretch = np.nan
         self._flags: list[Flag] = []
         self._hand: list[tuple[float, float]] = []
         coarse = np.linspace(first, tail.length, _COARSE)
@@ -117,14 +121,36 @@ class TailWave:
                 best, chosen = clear, contrast
         self.contrast = chosen
         if chosen is None:
-            self._flags = [self._unseen()]
+            self._flags = [self.unseen()]
             return
         fits = np.array([answer for answer, _ in self.settled(strips)])
         readable = fits[:, 2] > TAIL.least_share
         self.readable = float(np.mean(readable))
         self._check_shape(strips, fits[readable], self.readable)
+        if self.readable > TAIL.seen_share and not self._flags:
+            self.stretch = self._apparent_stretch([strips[k] for k in np.flatnonzero(readable)])
         if self.readable < 0.2 and not self._flags:
-            self._flags = [self._unseen()]
+            self._flags = [self.unseen()]
+
+    def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
+        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames.
+
+        NaN where its standard error is above `TAIL.stretch_error`.
+        """
+        assert self.contrast is not None  # noqa: S101 - learnt
+        found = []
+        for image, strip in strips[:: max(1, len(strips) // 12)]:
+            ridge = self._ridge(image, strip, self.contrast)
+            scores = [self._scores(ridge, strip, self._shaped(_SeenShape(factor, 1.0))).max() for factor in _NEAR]
+            best = int(np.argmax(scores))
+            if 0 < best < len(_NEAR) - 1:
+                before, top, after = scores[best - 1 : best + 2]
+                share = 0.5 * (before - after) / (before - 2.0 * top + after)
+                found.append(float(_NEAR[best] + share * (_NEAR[1] - _NEAR[0])))
+        if len(found) < TAIL.stretch_frames:
+            return np.nan
+        error = float(mad_scale(np.array(found) - np.median(found))) / np.sqrt(len(found))
+        return float(np.median(found)) if error < TAIL.stretch_error else np.nan
 
     def settled(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> list[tuple[Samples, float]]:
         """Refit the contrast from a first one; fit and rival (see `_fit`) on each frame."""
@@ -175,6 +201,17 @@ class TailWave:
             flags.append(Flag("handedness", sentence, _TAIL))
         return tuple(flags)
 
+    def flags_beside(self, *, doubtful: bool) -> tuple[Flag, ...]:
+        """Warnings, where the place of the body or the light may be the reason why the tail does not fit its file.
+
+        Args:
+            doubtful: whether it may be: then the file is not blamed.
+        """
+        if not doubtful:
+            return self.flags
+        other = [flag for flag in self.flags if flag.name != "tail-does-not-fit"]
+        return (*other, self.unseen()) if any(flag.spoils for flag in set(self.flags) - set(other)) else tuple(other)
+
     def handedness(self) -> int:
         """Handedness by perspective: 1 as in the robot file, -1 the opposite one, 0 undecided."""
         if len(self._hand) < 20:
@@ -189,7 +226,8 @@ class TailWave:
             return 0
         return 1 if misfit > -1.0 else -1
 
-    def _unseen(self) -> Flag:
+    def unseen(self) -> Flag:
+        """Say that the tail is not seen well enough."""
         sentence = (
             "the tail is not seen well enough, so that its rotation is not given: compress the film less, film the "
             "tail larger, or before a floor and in a light from which its wire stands out"
@@ -302,7 +340,7 @@ class TailWave:
             return
         few = strips[:: max(1, len(strips) // 12)]
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in few]
-        scores = self._scores_by_wavelength(ridges, 1.0)
+        scores = self.scores_by_wavelength(ridges, 1.0)
         if scores is None:
             return
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
@@ -315,7 +353,7 @@ class TailWave:
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             elif spoils:
-                self._flags.append(self._unseen())
+                self._flags.append(self.unseen())
             return
         tail = self.robot.tail
         if len(fits):
@@ -338,7 +376,7 @@ class TailWave:
             ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
             ridges = [(ridge / (np.sqrt(np.mean(np.nan_to_num(ridge) ** 2)) + 0.5), strip) for ridge, strip in ridges]
             for amplitude in _AMPLITUDES:
-                by_wavelength = self._scores_by_wavelength(ridges, amplitude)
+                by_wavelength = self.scores_by_wavelength(ridges, amplitude)
                 if by_wavelength is not None:
                     shape = _SeenShape(_FACTORS[int(np.argmax(by_wavelength))], amplitude)
                     found.append((by_wavelength.max(), shape, weights))
@@ -348,7 +386,29 @@ class TailWave:
         other = copy(self)
         other.wave, other.contrast = self._shaped(shape), np.array(weights) / np.linalg.norm(weights)
         read = [fit[2] > TAIL.least_share and rival < TAIL.largest_rival for fit, rival in other.settled(strips)]
-        return shape if np.mean(read) > TAIL.seen_share else None
+        return shape if np.mean(read) > TAIL.seen_share and other.halves_agree(strips) else None
+
+    def halves_agree(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> bool:
+        """Whether the front and the rear half of the tail show the same wavelength, each by itself.
+
+        A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both halves.
+        """
+        assert self.contrast is not None  # noqa: S101 - asked of a wave that was read
+        ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in strips]
+        middle = self.xi.size // 2
+        found = []
+        for rows in (slice(None, middle), slice(middle, None)):
+            half = copy(self)
+            half.xi = np.ascontiguousarray(self.xi[rows])
+            parts = [
+                (np.ascontiguousarray(ridge[rows]), _Strip(*(np.ascontiguousarray(part[rows]) for part in strip)))
+                for ridge, strip in ridges
+            ]
+            scores = half.scores_by_wavelength(parts, 1.0)
+            if scores is None:
+                return False
+            found.append(float(_FACTORS[int(np.argmax(scores))]))
+        return max(abs(factor - 1.0) for factor in found) < TAIL.halves_agree
 
     def _shaped(self, shape: _SeenShape) -> Samples:
         """The wave of a tail of another shape."""
@@ -364,7 +424,7 @@ class TailWave:
                 seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
         return f" ({'; '.join(seen)})" if seen else ""
 
-    def _scores_by_wavelength(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
+    def scores_by_wavelength(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
         """Scores of waves of `_FACTORS` times the wavelength; None where too little of the tail is in view."""
         found = []
         for ridge, strip in ridges:
