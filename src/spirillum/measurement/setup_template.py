@@ -38,6 +38,7 @@ _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("height", '"210 mm"', "of the lens above the reference plane"),
         ("height_uncertainty", '"2 mm"', ""),
         ("# frames_per_second", "30.0", "for a folder of images, or instead of a video's own time stamps"),
+        ("# pixel_aspect_ratio", "1.0", "width of a stored pixel over its height, if the video states it wrongly"),
     ),
     "# camera.checkerboard": (
         ("# images", '"checkerboard"', "pictures of a checkerboard in air, a folder beside this file"),

@@ -49,7 +49,7 @@ def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) ->
 
     rate = setup.camera.frames_per_second
     try:
-        video = open_video(path, rate)
+        video = open_video(path, rate, setup.camera.pixel_aspect_ratio)
     except InputError:
         if needed:
             raise

@@ -26,9 +26,9 @@ from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import Trial
 from spirillum.results.measurement_report import write_measurement_report
 from spirillum.view.annotate import annotated_film
+from spirillum.vision.camera.camera import opened
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.video.frames import open_video
 
 __all__ = ["measure"]
 
@@ -163,7 +163,7 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
         folder.thumbnails[name] = picture
 
     target = folder.path / f"{name}.{_FILM}"
-    video = open_video(path, asked.setup.camera.frames_per_second)
+    video = opened(path, asked.setup)
     words = {"title": f"{path.name}, annotated"}
     if says_synthetic(video.words):
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
