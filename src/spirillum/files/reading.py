@@ -20,6 +20,7 @@ from spirillum.files.names import checked_path
 __all__ = ["checked_file", "csv_rows", "opened", "parse_toml", "read_bytes", "read_json", "read_text", "read_toml"]
 
 _QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
+_MARKS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 """Where Python ends a line."""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_LEVELS}}}")
@@ -155,7 +156,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     return parse_toml(read_text(path, what), str(path), what)
 
 
-def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
+def csv_rows(text: str, path: Path, what: str, mark: str = ",") -> list[tuple[int, list[str]]]:
     """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
 
     Lines that start with `#` are comments. They are left out, and so are rows of commas alone, as spreadsheets write.
@@ -164,14 +165,15 @@ def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
         text: what stands in the file.
         path: the file, for the sentence of an error.
         what: what it should be.
+        mark: what stands between cells.
 
     Raises:
         InputError: if it is not CSV, or has too many rows or cells.
     """
-    _check_extent(text, path, what)
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
+    _check_extent(text, path, what, mark)
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(f" ,\t{mark}")]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    reader = csv.reader((f"{line}\n" for _, line in lines), strict=True)
+    reader = csv.reader((f"{line}\n" for _, line in lines), delimiter=mark, strict=True)
     found: list[tuple[int, list[str]]] = []
     first = 0
     try:
@@ -183,11 +185,11 @@ def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
     return found
 
 
-def _check_extent(text: str, path: Path, what: str) -> None:
+def _check_extent(text: str, path: Path, what: str, mark: str) -> None:
     """Refuse a text that would make more rows or cells than fit into memory, before it is taken apart."""
-    rows, cells = sum(map(text.count, _LINE_ENDS)), text.count(",")
+    rows, cells = sum(map(text.count, _LINE_ENDS)), text.count(mark)
     if rows > 2 * MOST_ROWS or cells > MOST_CELLS:
         raise InputError(
-            f"{path} has {rows} lines and {cells} commas; allowed: {what} of at most {MOST_ROWS} rows and "
-            f"{MOST_CELLS} cells"
+            f"{path} has {rows} lines and {cells} {_MARKS.get(mark, mark)}; allowed: {what} of at most {MOST_ROWS} "
+            f"rows and {MOST_CELLS} cells"
         )

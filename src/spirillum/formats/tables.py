@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
@@ -13,9 +13,10 @@ from spirillum.files import checked_path, csv_rows, read_text
 from spirillum.files.limits import LARGEST_TABLE, MOST_COLUMNS
 from spirillum.formats.parquet import parquet_table
 
-__all__ = ["Row", "Table", "check_known", "check_present", "number_in", "read_readings", "read_table"]
+__all__ = ["Row", "Table", "check_known", "check_present", "number_in", "read_readings", "read_table", "separator_of"]
 
 _LARGEST_NUMBER = 1e12
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d{1,3})?", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
 
 
@@ -32,6 +33,8 @@ class Row:
     line: int
     header: Sequence[str]
     cells: Sequence[str]
+    decimal_commas: bool = False
+    """Whether `1,5` is a number: where something else stands between cells."""
 
     @property
     def place(self) -> str:
@@ -70,7 +73,7 @@ class Row:
         text = self.text(column)
         if text.lower() in blank:
             return math.nan
-        value = number_in(text)
+        value = number_in(text.replace(",", ".") if self.decimal_commas and _DECIMAL_COMMA.fullmatch(text) else text)
         if not low <= value <= high:
             raise self.error(name, text, allowed)
         return value
@@ -90,6 +93,8 @@ class Table:
     """Cells of each row below the headers, with its line number."""
     comments: Sequence[str] = ()
     """Comment lines, each with its `#`."""
+    mark: str = ","
+    """What stands between cells."""
 
     @property
     def header(self) -> Sequence[str]:
@@ -111,12 +116,37 @@ class Table:
                 raise InputError(
                     f"{self.path}, row {line}: {len(cells)} cells; allowed: {len(self.header)}, one for each column"
                 )
-        return [Row(self.path, line, self.header, cells) for line, cells in self.below]
+        return [Row(self.path, line, self.header, cells, self.mark != ",") for line, cells in self.below]
+
+    def trimmed(self, *, ragged: bool = False) -> Table:
+        """The table without blank cells beyond its named columns, as spreadsheets leave them.
+
+        Args:
+            ragged: rows that end early are filled up with blank cells.
+        """
+        heads = [list(head) for head in self.headers]
+        width = max(len(_without_blanks(head)) for head in heads)
+
+        def fitted(cells: Sequence[str]) -> Sequence[str]:
+            kept = list(cells[:width]) + _without_blanks(cells[width:])
+            return kept + [""] * (width - len(kept)) if ragged else kept
+
+        below = [(line, fitted(cells)) for line, cells in self.below]
+        return replace(self, headers=[fitted(head) for head in heads], below=below)
+
+
+def _without_blanks(cells: Sequence[str]) -> list[str]:
+    """Cells without the blank ones at their end."""
+    kept = list(cells)
+    while kept and not kept[-1]:
+        kept.pop()
+    return kept
 
 
 def read_table(
-    path: str | Path, what: str, headers: int = 1, *, largest: int = LARGEST_TABLE, parquet: bool = False
-) -> Table:
+    path: str | Path, what: str, headers: int = 1, *, largest: int = LARGEST_TABLE, parquet: bool = False,
+    mark: str = ",",
+) -> Table:  # fmt: skip
     """Read a CSV file; lines that start with `#` are comments.
 
     Args:
@@ -125,6 +155,7 @@ def read_table(
         headers: number of header rows; a file with fewer rows has empty ones.
         largest: size of the file at most, bytes.
         parquet: whether a file that ends in `.parquet` is read as such.
+        mark: what stands between cells.
 
     Raises:
         InputError: if it cannot be read, or is not CSV.
@@ -136,28 +167,40 @@ def read_table(
     else:
         text = read_text(path, what, largest)
         comments = [line.strip() for line in text.splitlines() if line.lstrip().startswith("#")]
-        found = csv_rows(text, path, what)
+        found = csv_rows(text, path, what, mark)
     heads = [tuple(cells) for _, cells in found[:headers]]
-    return Table(path, [*heads, *[()] * (headers - len(heads))], found[headers:], comments)
+    return Table(path, [*heads, *[()] * (headers - len(heads))], found[headers:], comments, mark)
 
 
-def read_readings(path: str | Path, what: str, headers: int = 1) -> Table:
-    """Read a CSV file of readings, and check that it holds some, in columns between commas.
+def separator_of(text: str) -> str:
+    """What stands between the columns of a table: a comma, semicolon or tab, by the first line that has one."""
+    lines = (line for line in text.splitlines() if not line.lstrip().startswith("#"))
+    head = next((line for line in lines if any(mark in line for mark in ",;\t")), ",")
+    return max(",;\t", key=head.count)
+
+
+def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool = False) -> Table:
+    """Read a CSV file of readings, and check that it holds some.
+
+    Semicolons or tabs may stand between columns, as where numbers have decimal commas. Blank cells at the ends of rows
+    are left out.
 
     Args:
         path: the file.
         what: what it should be, for the sentence of an error.
         headers: number of header rows.
+        ragged: rows that end early are filled up with blank cells.
 
     Raises:
         InputError: if it cannot be read, is not CSV, has no rows, other separators, or too many columns.
     """
-    table = read_table(path, what, headers)
+    table = read_table(path, what, headers, mark=separator_of(read_text(checked_path(path, what), what, LARGEST_TABLE)))
+    table = table.trimmed(ragged=ragged)
     if not table.below:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
     width = len(table.header)
-    if width == 1 and (other := next((mark for mark in ";\t|" if mark in table.header[0]), None)):
-        raise InputError(f"{path}: its columns are separated by {other!r}; allowed: commas")
+    if width == 1 and "|" in table.header[0]:
+        raise InputError(f"{path}: its columns are separated by '|'; allowed: commas, semicolons or tabs")
     if width > MOST_COLUMNS:
         raise InputError(f"{path} has {width} columns; allowed: at most {MOST_COLUMNS}")
     return table

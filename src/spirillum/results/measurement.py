@@ -57,7 +57,8 @@ def measure(
         setup: the setup file.
         output: folder for the results; None writes nothing.
         marks: table of readings by hand, which replace what is seen on their frames.
-        track: table of trackpy or DeepLabCut with the positions of one video, instead of our own tracking.
+        track: table of trackpy, DeepLabCut or Tracker with the positions of one video in pixels, instead of our own
+            tracking.
         tracking: look for the robot in the videos; if not, the readings by hand are all there is.
         annotated: write an annotated video of each trial.
         figures: draw figures and write the report.
