@@ -30,6 +30,12 @@ def seconds(frames: np.ndarray) -> np.ndarray:
     return frames / 30.0
 
 
+def frames_at(times: np.ndarray) -> np.ndarray:
+    """Frames at 30 frames a second; none is as far off as a third of a step."""
+    near = np.round(30.0 * times)
+    return np.where(np.abs(30.0 * times - near) < 0.33, near, np.nan)
+
+
 def written(folder: Path, text: str) -> Path:
     path = folder / "marks.csv"
     path.write_text(text)
@@ -176,6 +182,71 @@ def test_trackpy_and_deeplabcut_give_the_same_speed(
     assert tracks[1].heading[0] == pytest.approx(0.0)
 
 
+_ROWS = [(index, 200.0 + 0.25 * index, 239.5) for index in range(40)]
+_TRACKS = {
+    "trackpy": ["x,y,frame", *(f"{x},{y},{k}" for k, x, y in _ROWS)],
+    "trailing commas": ["x,y,frame,,", *(f"{x},{y},{k},," for k, x, y in _ROWS)],
+    "commas after the rows alone": ["x,y,frame", *(f"{x},{y},{k},," for k, x, y in _ROWS)],
+    "decimal commas": ["x;y;frame", *(f"{x};{y};{k}".replace(".", ",") for k, x, y in _ROWS)],
+    "tabs": ["x\ty\tframe", *(f"{x}\t{y}\t{k}" for k, x, y in _ROWS)],
+    "Tracker": ["mass_A", "t,x,y", *(f"{k / 30:.3f},{x},{y}" for k, x, y in _ROWS)],
+    "Tracker, German": ["mass_A", " t;x;y", *(f"{k / 30:.3f};{x};{y}".replace(".", ",") for k, x, y in _ROWS)],
+    "Tracker, trailing": ["mass_A;;", "t;x;y;", *(f"{k / 30:.3f};{x};{y};".replace(".", ",") for k, x, y in _ROWS)],
+    "DeepLabCut": [
+        "scorer,s,s,s", "bodyparts,centre,centre,centre", "coords,x,y,likelihood",
+        *(f"{k},{x},{y},0.9" for k, x, y in _ROWS),
+    ],
+    "DeepLabCut, one animal of one": [
+        "scorer,s,s", "individuals,ind1,ind1", "bodyparts,centre,centre", "coords,x,y",
+        *(f"{k},{x},{y}" for k, x, y in _ROWS),
+    ],
+    "DeepLabCut, one animal of two has points, short rows": [
+        "scorer,s,s,s,s", "individuals,one,one,two,two", "bodyparts,centre,centre,centre,centre", "coords,x,y,x,y",
+        *(f"{k},{x},{y}" for k, x, y in _ROWS),
+    ],
+    "DeepLabCut, marks that belong to no animal": [
+        "scorer,s,s,s,s", "individuals,one,one,single,single", "bodyparts,centre,centre,lamp,lamp", "coords,x,y,x,y",
+        *(f"{k},{x},{y},5,6" for k, x, y in _ROWS),
+    ],
+    "DeepLabCut, labels of images": [
+        "scorer,,,s,s", "bodyparts,,,centre,centre", "coords,,,x,y",
+        *(f"labeled-data,film,img{k:04d}.png,{x},{y}" for k, x, y in _ROWS),
+    ],
+    "DeepLabCut, labels by path": [
+        "scorer,s,s", "bodyparts,centre,centre", "coords,x,y",
+        *(f"labeled-data/film/img{k:04d}.png,{x},{y}" for k, x, y in _ROWS),
+    ],
+}  # fmt: skip
+"""The same positions, as programs and spreadsheets write them."""
+
+
+@pytest.mark.parametrize("kind", _TRACKS)
+def test_tables_of_other_programs(tmp_path: Path, make_track: Callable[..., Track], kind: str) -> None:
+    path = written(tmp_path, "\n".join(_TRACKS[kind]) + "\n")
+    track = read_track(path, make_track().setup, "a.mp4", RULED, seconds, frames_at)
+    assert track.frame == pytest.approx([row[0] for row in _ROWS])
+    assert track.picture[:, :2] == pytest.approx(np.array([row[1:] for row in _ROWS]))
+
+
+def test_pixels_of_other_programs_are_those_of_the_stored_picture(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """The pixel in column k of a picture stretched by 4/3 covers the columns 4/3 k to 4/3 (k + 1)."""
+    ruled = Ruled(RULED.scale, RULED.size, RULED.points, (4 / 3, 1.0))
+    path = written(tmp_path, "x,y,frame\n0,10,0\n479,20,1\n")
+    track = read_track(path, make_track().setup, "a.mp4", ruled, seconds)
+    assert track.picture[:, 0] == pytest.approx([4 / 6 - 0.5, 4 / 3 * 479.5 - 0.5])
+    assert track.picture[:, 1] == pytest.approx([10, 20])
+    with pytest.raises(InputError, match="row 2, column x: '480'; allowed: 0 to 479"):
+        read_track(written(tmp_path, "x,y,frame\n480,10,0\n"), make_track().setup, "a.mp4", ruled, seconds)
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_readings_between_other_marks(tmp_path: Path, mark: str) -> None:
+    text = "frame,x_px,\n0,1.5,\n10,2.5,\n".replace(",", mark).replace(".", ",")
+    assert read_marks(written(tmp_path, text))[""].pixels[:, 0] == pytest.approx([1.5, 2.5])
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -216,7 +287,17 @@ def test_a_bad_table_of_readings_is_one_sentence(tmp_path: Path, text: str, word
             "row 4, column centre y: '-9'; allowed: 0 to 479",
         ),
         ("scorer,s,s\nbodyparts,eye,eye\ncoords,x,y\n0,1,2\n", "points eye; allowed: nose and rear, or centre"),
-        ("scorer,s,s\nindividuals,a,a\nbodyparts,nose,nose\n0,1,2\n", "holds several individuals"),
+        (
+            "scorer,s,s,s,s\nindividuals,a,a,b,b\nbodyparts,centre,centre,centre,centre\ncoords,x,y,x,y\n0,1,2,3,4\n",
+            "holds several individuals (a, b); allowed: a table of one",
+        ),
+        (
+            "scorer,s,s\nindividuals,a,a\nbodyparts,nose,nose\n0,1,2\n1,2,3\n",
+            "header rows are 'individuals', 'bodyparts', '0'",
+        ),
+        ("t,x,y\n0.5,1,2\n0.516,1,2\n", "row 3, column t: '0.516'; allowed: the time of a frame of the video, s"),
+        ("x|y|frame\n1|2|0\n", "its columns are separated by '|'; allowed: commas, semicolons or tabs"),
+        ("x;y;frame\n1,5;2;zero\n", "row 2, column frame: 'zero'"),
         ("scorer,s,s\nbodyparts,centre,centre\ncoords,x,y\n0,1,far\n", "row 4, column centre y: 'far'"),
     ],
 )
@@ -224,7 +305,7 @@ def test_a_bad_track_of_others_is_one_sentence(
     tmp_path: Path, make_track: Callable[..., Track], text: str, words: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        read_track(written(tmp_path, text), make_track().setup, "a.mp4", RULED, seconds)
+        read_track(written(tmp_path, text), make_track().setup, "a.mp4", RULED, seconds, frames_at)
     assert words in str(caught.value)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.errors import InputError
-from spirillum.measurement.setup_template import setup_answer
+from spirillum.measurement.setup_template import setup_answer, setup_text
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track import scouting
@@ -48,6 +48,17 @@ def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, proposed):
     assert written.read_text() == found.text
     with pytest.raises(InputError, match=r"camera.view = 'FILL IN' is not allowed.*\(and 5 more: camera.height, "):
         load_setup(written)
+
+
+def test_heights_to_fill_in_are_not_exact(film, proposed):
+    """Each has an uncertainty that is active, as in the file of `setup new`."""
+    import tomllib
+
+    table, example = tomllib.loads(proposed.text), tomllib.loads(setup_text())
+    for part, key in (("camera", "height"), ("tank", "surface"), ("tank", "index"), ("markers", "height"),
+                      ("robot", "axis_height")):  # fmt: skip
+        assert table[part][key] == "FILL IN"
+        assert table[part][f"{key}_uncertainty"] == example[part][f"{key}_uncertainty"]
 
 
 def test_a_filled_in_proposal_is_a_setup_that_fits_the_film(film, proposed, tmp_path):

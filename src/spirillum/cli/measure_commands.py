@@ -51,7 +51,9 @@ def measure(
     track: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Positions from trackpy or DeepLabCut (CSV) instead of ours.", rich_help_panel=_BY_HAND
+            metavar="FILE",
+            help="Positions in pixels from trackpy, DeepLabCut or Tracker (CSV).",
+            rich_help_panel=_BY_HAND,
         ),
     ] = None,
     no_annotated: Annotated[bool, typer.Option("--no-annotated", help="Write no annotated video.")] = False,

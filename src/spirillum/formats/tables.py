@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -120,6 +120,30 @@ class Table:
                 )
         return [Row(self.path, line, self.header, cells) for line, cells in self.below]
 
+    def trimmed(self, *, ragged: bool = False) -> Table:
+        """The table without blank cells beyond its named columns, as spreadsheets leave them.
+
+        Args:
+            ragged: rows that end early are filled up with blank cells.
+        """
+        heads = [list(head) for head in self.headers]
+        width = max(len(_without_blanks(head)) for head in heads)
+
+        def fitted(cells: Sequence[str]) -> Sequence[str]:
+            kept = list(cells[:width]) + _without_blanks(cells[width:])
+            return kept + [""] * (width - len(kept)) if ragged else kept
+
+        below = [(line, fitted(cells)) for line, cells in self.below]
+        return replace(self, headers=[fitted(head) for head in heads], below=below)
+
+
+def _without_blanks(cells: Sequence[str]) -> list[str]:
+    """Cells without the blank ones at their end."""
+    kept = list(cells)
+    while kept and not kept[-1]:
+        kept.pop()
+    return kept
+
 
 def read_table(
     path: str | Path, what: str, headers: int = 1, *, largest: int = LARGEST_TABLE, parquet: bool = False
@@ -148,18 +172,19 @@ def read_table(
     return Table(path, [*heads, *[()] * (headers - len(heads))], found[headers:], comments)
 
 
-def read_readings(path: str | Path, what: str, headers: int = 1) -> Table:
-    """Read a CSV file of readings, and check that it holds some, in several columns.
+def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool = False) -> Table:
+    """Read a CSV file of readings, and check that it holds some. Blank cells at the ends of rows are left out.
 
     Args:
         path: the file.
         what: what it should be, for the sentence of an error.
         headers: number of header rows.
+        ragged: rows that end early are filled up with blank cells.
 
     Raises:
         InputError: if it cannot be read, is not CSV, has no rows, other separators, or too many columns.
     """
-    table = read_table(path, what, headers)
+    table = read_table(path, what, headers).trimmed(ragged=ragged)
     if not table.below:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
     width = len(table.header)

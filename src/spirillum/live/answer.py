@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.answer import envelope, quantity
+from spirillum.measurement.setup_template import setup_remarks
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.shown import Shown
 
@@ -52,7 +53,7 @@ class Tracked(Shown):
         found = [*self.notes, *([self.stopped] if self.stopped else [])]
         if self.trial is not None:
             said = [flag.sentence for flag in self.trial.flags]
-            found += said
+            found += [*said, *setup_remarks(self.trial.track.setup)]
             for name in RATE_NAMES:
                 item = self.trial.quantities[name]
                 if not math.isfinite(item.value) and item.reason not in said:

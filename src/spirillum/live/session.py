@@ -75,7 +75,7 @@ def track(
     length = None if duration is None else seconds("duration", duration, most=1e7)
     chosen, _ = load_setup(setup)
     between = chosen.start, chosen.end
-    pictures = source_of(str(source), size=size, fps=fps, rate=chosen.camera.frames_per_second, between=between)
+    pictures = source_of(str(source), size=size, fps=fps, camera=chosen.camera, between=between)
     if pace == "fast" and pictures.kind != "film":
         raise InputError(f"pace = 'fast' with {pictures.name}; allowed: 'real', as a {pictures.kind} has its own pace")
     tracker = LiveTracker(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -15,7 +15,10 @@ from spirillum.argument_kinds import as_number
 from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
-from spirillum.vision.video.frames import converter, open_video
+from spirillum.vision.flag import Flag
+from spirillum.vision.setup import CameraSetup
+from spirillum.vision.video.display import converter, display_flags, frame_display, stated_aspect
+from spirillum.vision.video.frames import open_video
 
 __all__ = ["Arrived", "Source", "source_of"]
 
@@ -63,6 +66,8 @@ class Source:
     """How it is opened: see `source_of`."""
     words: str = ""
     """What a film says of itself, such as that it is synthetic."""
+    flags: list[Flag] = field(default_factory=list, repr=False)
+    """What was odd about its pictures while they were read."""
 
     def frames(self) -> Generator[Arrived, None, None]:
         """Its pictures until it ends.
@@ -79,8 +84,8 @@ class Source:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was odd about a film while it was read, a sentence each: for example, that it breaks off."""
-        return tuple(flag.sentence for flag in self.options["video"].flags) if self.kind == "film" else ()
+        """What was odd about its pictures, a sentence each: for example, that a film breaks off."""
+        return tuple(flag.sentence for flag in self.flags)
 
 
 def source_of(
@@ -88,7 +93,7 @@ def source_of(
     *,
     size: tuple[int, int] | None = None,
     fps: float | None = None,
-    rate: float | None = None,
+    camera: CameraSetup | None = None,
     between: tuple[float, float | None] = (0.0, None),
 ) -> Source:
     """The source that a word names.
@@ -97,12 +102,13 @@ def source_of(
         word: a film or folder, `camera:0` or `/dev/video0`, or the address of a stream.
         size: width and height that a camera is asked for, pixels.
         fps: frames a second that it is asked for.
-        rate: frames a second of a folder's images, or in place of a film's own times.
+        camera: of the setup, for the rate of a folder's images, and for what replaces a film's own times or pixels.
         between: first and last time of a film that count, s.
 
     Raises:
         InputError: for another word, or options that the source does not have.
     """
+    aspect = camera and camera.pixel_aspect_ratio
     scheme = word.partition("://")[0].lower() if "://" in word else ""
     device = re.fullmatch(r"camera:(.+)", word) or re.fullmatch(r"/dev/video(\d+)", word)
     if device is None and not (size is None and fps is None):
@@ -113,7 +119,7 @@ def source_of(
         kind, place = _DEVICES.get(sys.platform, _DEVICES["linux"])
         wanted = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
         wanted |= {} if fps is None else {"framerate": f"{fps:g}"}
-        options = {"file": place.format(device[1]), "format": kind, "options": wanted, "size": size}
+        options = {"file": place.format(device[1]), "format": kind, "options": wanted, "size": size, "aspect": aspect}
         return Source(word, "camera", options)
     if scheme:
         if scheme not in _PROTOCOLS:
@@ -121,11 +127,10 @@ def source_of(
         quick = {"flags": "low_delay", "analyzeduration": "1000000"}  # in microseconds
         wanted = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
         address = scheme + word[len(scheme) :]
-        return Source(
-            _without_secrets(word), "stream", {"file": address, "format": None, "options": wanted, "size": None}
-        )
-    video = open_video(word, rate)  # says what is wrong with a film
-    return Source(video.name, "film", {"video": video, "between": between}, video.words)
+        options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
+        return Source(_without_secrets(word), "stream", options)
+    video = open_video(word, camera and camera.frames_per_second, aspect)  # says what is wrong with a film
+    return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
 
 
 def _without_secrets(word: str) -> str:
@@ -137,7 +142,7 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
     """Pictures of a camera or stream, with the least delay."""
     av = required("av", "tracking a camera", "video")
     count, last, origin, size = 0, -1.0, None, source.options["size"]
-    rgb, start = converter(), 0.0
+    rgb, start = None, 0.0
     try:
         with av.open(
             source.options["file"],
@@ -147,10 +152,12 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
         ) as container:
             if not container.streams.video:
                 raise InputError(f"{source.name} has no pictures; allowed: {_ALLOWED}")
-            for packet in container.demux(container.streams.video[0]):
+            stream = container.streams.video[0]
+            for packet in container.demux(stream):
                 came = time.perf_counter()
                 for frame in packet.decode():
                     size = _checked_size(source.name, (frame.width, frame.height), size)
+                    rgb = rgb or _shown(source, stream, frame)
                     start = start or came
                     stamp = came - start if frame.time is None else float(frame.time)
                     origin = stamp if origin is None else origin
@@ -168,6 +175,14 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
         raise InputError(f"{source.name} gave no picture; allowed: {_ALLOWED}")
     if source.kind == "camera":
         raise InputError(f"{source.name} stopped after {count} frames: what was tracked is kept")
+
+
+def _shown(source: Source, stream: Any, frame: Any) -> Callable[[Any], np.ndarray]:
+    """What gives pictures as they are shown, by the first one; flags of the source say what is done to them."""
+    stated, given = float(stream.sample_aspect_ratio or 0.0) or None, source.options["aspect"]
+    display, slant = frame_display(frame, stated_aspect(source.name, stated, given))
+    source.flags.extend(display_flags(display, (frame.width, frame.height), stated, given, slant))
+    return converter(display)
 
 
 def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | None) -> tuple[int, int]:

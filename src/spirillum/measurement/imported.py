@@ -1,9 +1,11 @@
-"""Tracks that other programs have found: trackpy's and DeepLabCut's tables."""
+"""Tracks that other programs have found: tables of trackpy, DeepLabCut and Tracker."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.files.limits import LARGEST_TABLE
-from spirillum.formats.tables import Row, read_readings
+from spirillum.formats.tables import Row, Table, read_readings
 from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
 from spirillum.vision.flag import Flag
@@ -21,7 +23,14 @@ from spirillum.vision.track.track import Track
 
 __all__ = ["read_track"]
 
-_WHAT = "a track of trackpy or DeepLabCut (CSV)"
+_WHAT = "a track of trackpy, DeepLabCut or Tracker in pixels (CSV)"
+_NEEDED = "x, y and frame (trackpy) or t (Tracker), or DeepLabCut's table"
+_TIMES = ("t", "time", "time_s")
+"""Columns of times in s, in place of `frame`."""
+_OWNERS = "individuals"
+"""First cell of DeepLabCut's header row that is there in projects of several animals."""
+_ALONE = "single"
+"""DeepLabCut's individual of points that belong to none."""
 _LIKELY = 0.6
 """A point that DeepLabCut calls less likely than this is left out."""
 _MIDDLES = ("centre", "center", "body", "middle")
@@ -32,12 +41,18 @@ _POINT_ERROR = 0.5
 
 
 def read_track(
-    path: str | Path, setup: Setup, video: str, ruled: Ruled, time_of: Callable[[Samples], Samples]
+    path: str | Path,
+    setup: Setup,
+    video: str,
+    ruled: Ruled,
+    time_of: Callable[[Samples], Samples],
+    frame_of: Callable[[Samples], Samples] | None = None,
 ) -> Track:
-    """A track from another program's table, in pixels.
+    """A track from another program's table, in pixels of the stored picture from its upper left corner.
 
-    trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. DeepLabCut: three header rows (scorer,
-    bodyparts, coords) and the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
+    trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a line
+    with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts, coords) and
+    the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
 
     Args:
         path: the table.
@@ -45,15 +60,18 @@ def read_track(
         video: name of the video.
         ruled: turns pixels into lengths.
         time_of: takes numbers of frames to times, s.
+        frame_of: takes times, s, to the numbers of the frames that were taken then; NaN where there is none.
 
     Raises:
-        InputError: if it is neither, or a cell is wrong; the sentence names row and column.
+        InputError: if it is none of them, or a cell is wrong; the sentence names row and column.
     """
     path = Path(path)
-    first = read_text(path, _WHAT, LARGEST_TABLE).lstrip().split(",", 1)[0].strip().lower()
-    frame, nose, rear, centre = (_deeplabcut if first == "scorer" else _trackpy)(path, ruled.size)
-    order = np.argsort(frame, kind="stable")
-    frame, nose, rear, centre = frame[order], nose[order], rear[order], centre[order]
+    first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()
+    size = ruled.stored_size
+    points = _deeplabcut(path, size) if first == "scorer" else _trackpy(path, size, frame_of)
+    order = np.argsort(points[0], kind="stable")
+    frame = points[0][order]
+    nose, rear, centre = (ruled.shown(item[order]) for item in points[1:])
     if np.any(np.diff(frame) <= 0):
         raise InputError(f"{path}: frame {frame[1:][np.diff(frame) <= 0][0]:g} stands twice; allowed: once a frame")
     front, back = ruled.points(nose), ruled.points(rear)
@@ -90,63 +108,116 @@ def _check_inside(rows: Sequence[Row], points: Samples, names: tuple[str, str], 
 _Points = tuple[Samples, Samples, Samples, Samples]
 
 
-def _trackpy(path: Path, size: tuple[int, int]) -> _Points:
-    table = read_readings(path, _WHAT)
+def _named(path: Path) -> Table:
+    """A table with one header row, which may stand below a line with the track's name, as Tracker writes."""
+    table = read_readings(path, _WHAT, ragged=True)
+    if len(table.header) == 1 and table.below and len(table.below[0][1]) > 1:
+        table = replace(table, headers=[table.below[0][1]], below=table.below[1:]).trimmed(ragged=True)
+    return replace(table, headers=[tuple(cell.lower() for cell in table.header)])
+
+
+def _trackpy(path: Path, size: tuple[int, int], frame_of: Callable[[Samples], Samples] | None) -> _Points:
+    table = _named(path)
     rows = table.rows()
-    places = {name: table.column(name) for name in ("x", "y", "frame", "particle")}
-    for name in ("x", "y", "frame"):
-        if places[name] is None:
-            raise InputError(
-                f"{path}: column '{name}' is missing; needed: x, y, frame (trackpy), or DeepLabCut's table"
-            )
+    timed = next((name for name in _TIMES if name in table.header), None) if "frame" not in table.header else None
+    for name in ("x", "y", timed or "frame"):
+        if table.header.count(name) != 1:
+            wrong = "is missing" if name not in table.header else "stands twice"
+            raise InputError(f"{path}: column '{name}' {wrong}; needed: {_NEEDED}")
 
     def column(name: str) -> Samples:
-        place = places[name]
-        assert place is not None  # noqa: S101 - checked above
-        return np.array([row.number(place, name) for row in rows])
+        return np.array([row.number(name, name) for row in rows])
 
-    for row, number in zip(rows, column("frame"), strict=True):
-        if math.isnan(number) or number < 0:
-            raise row.error("frame", f"{number:g}", "a whole number from 0")
-    if places["particle"] is not None:
+    frame = _frame_numbers(rows, column(timed or "frame"), timed, frame_of)
+    if "particle" in table.header:
         particles = np.unique(column("particle"))
         if particles.size > 1:
             raise InputError(f"{path}, column particle: {particles.size} particles; allowed: the robot's alone")
     centre = np.stack([column("x"), column("y")], axis=1)
     _check_inside(rows, centre, ("x", "y"), size)
-    return column("frame"), np.full_like(centre, np.nan), np.full_like(centre, np.nan), centre
+    return frame, np.full_like(centre, np.nan), np.full_like(centre, np.nan), centre
+
+
+def _frame_numbers(
+    rows: Sequence[Row], values: Samples, timed: str | None, frame_of: Callable[[Samples], Samples] | None
+) -> Samples:
+    """Numbers of frames, from a column of them or, with its name, from one of times."""
+    for row, value in zip(rows, values, strict=True):
+        if math.isnan(value) or value < 0:
+            raise row.error(timed or "frame", f"{value:g}", "a time from 0 s" if timed else "a whole number from 0")
+    if timed is None:
+        return values
+    if frame_of is None:
+        raise InputError(f"{rows[0].path}: column 'frame' is missing; needed: {_NEEDED}")
+    frame = frame_of(values)
+    for row, time, number in zip(rows, values, frame, strict=True):
+        if math.isnan(number):
+            raise row.error(timed, f"{time:g}", "the time of a frame of the video, s")
+    return frame
 
 
 def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
-    table = read_readings(path, _WHAT, headers=3)
+    table = read_readings(path, _WHAT, headers=3, ragged=True)
+    if table.headers[1][0].lower() == _OWNERS:
+        table = read_readings(path, _WHAT, headers=4, ragged=True)
     rows = table.rows()
-    parts, coordinates = (tuple(cell.lower() for cell in head) for head in table.headers[1:3])
-    if parts[0] == "individuals":
-        raise InputError(f"{path} holds several individuals; allowed: a table of one")
-    if parts[0] != "bodyparts" or coordinates[0] != "coords":
-        raise InputError(
-            f"{path}: header rows are '{parts[0][:20]}', '{coordinates[0][:20]}'; allowed: bodyparts, coords"
-        )
-    frame = np.array([row.number(0, "frame") for row in rows])
+    heads = {head[0].lower(): [cell.lower() for cell in head] for head in table.headers}
+    if not {"bodyparts", "coords"} <= set(heads):
+        shown = "', '".join(head[0][:20] for head in table.headers[1:])
+        raise InputError(f"{path}: header rows are '{shown}'; allowed: bodyparts, coords")
+    columns = _columns(heads, rows, path)
+    frame = _frames(rows, heads["coords"])
 
     def point(names: tuple[str, ...]) -> Samples | None:
-        name = next((name for name in names if name in parts), None)
+        name = next((name for name in names if (name, "x") in columns or (name, "y") in columns), None)
         if name is None:
             return None
-        place = {c: i for i, (p, c) in enumerate(zip(parts, coordinates, strict=True)) if p == name}
-        if not {"x", "y"} <= set(place):
+        if (name, "x") not in columns or (name, "y") not in columns:
             raise InputError(f"{path}: point '{name}' has no columns x and y; allowed: x, y, likelihood")
-        found = np.array([[row.number(place[c], f"{name} {c}") for c in ("x", "y")] for row in rows])
-        if "likelihood" in place:
-            likely = np.array([row.number(place["likelihood"], f"{name} likelihood") for row in rows])
+        found = np.array([[row.number(columns[name, c], f"{name} {c}") for c in ("x", "y")] for row in rows])
+        if (place := columns.get((name, "likelihood"))) is not None:
+            likely = np.array([row.number(place, f"{name} likelihood") for row in rows])
             found[~(likely >= _LIKELY)] = np.nan
         _check_inside(rows, found, (f"{name} x", f"{name} y"), size)
         return found
 
     nose, rear, centre = point(_FRONTS), point(_REARS), point(_MIDDLES)
     if (nose is None or rear is None) and centre is None:
-        raise InputError(
-            f"{path}: points {', '.join(dict.fromkeys(parts[1:]))[:100]}; allowed: nose and rear, or centre, among them"
-        )
+        parts = ", ".join(dict.fromkeys(part for part, _ in columns))
+        raise InputError(f"{path}: points {parts[:100]}; allowed: nose and rear, or centre, among them")
     missing = np.full((frame.size, 2), np.nan)
     return frame, *(missing if item is None else item for item in (nose, rear, centre))  # type: ignore[return-value]
+
+
+def _columns(heads: dict[str, list[str]], rows: Sequence[Row], path: Path) -> dict[tuple[str, str], int]:
+    """Columns by point and coordinate, of the one individual that has points.
+
+    Raises:
+        InputError: if several have some.
+    """
+    parts, coordinates = heads["bodyparts"], heads["coords"]
+    places = [place for place, cell in enumerate(coordinates) if place > 0 and cell]
+    owners = heads.get(_OWNERS, [""] * len(parts))
+    named = dict.fromkeys((*_FRONTS, *_REARS, *_MIDDLES))
+    seen = dict.fromkeys(
+        owners[place] for place in places if parts[place] in named and any(row.text(place) for row in rows)
+    )
+    animals = [owner for owner in seen if owner != _ALONE]
+    if len(animals) > 1:
+        raise InputError(f"{path} holds several individuals ({', '.join(animals)[:100]}); allowed: a table of one")
+    kept = {*animals, _ALONE} if seen else set(owners)
+    return {(parts[place], coordinates[place]): place for place in places if owners[place] in kept}
+
+
+def _frames(rows: Sequence[Row], coordinates: Sequence[str]) -> Samples:
+    """Numbers of frames, by the first column; where labels are of images, by the numbers that end their names."""
+    last = next((place for place, cell in enumerate(coordinates) if place > 0 and cell), 1) - 1
+    if last == 0 and "." not in "".join(row.text(0) for row in rows[:1]):
+        return np.array([row.number(0, "frame") for row in rows])
+    found = []
+    for row in rows:
+        number = re.search(r"(\d+)(?:\.\w+)?$", row.text(last), re.ASCII)
+        if number is None:
+            raise row.error("image", row.text(last), "the name of an image that ends in the number of its frame")
+        found.append(float(number[1]))
+    return np.array(found)

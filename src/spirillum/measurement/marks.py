@@ -62,6 +62,17 @@ class Ruled:
     """Width and height of the picture, pixels."""
     points: Callable[[Samples], Samples] = field(repr=False)
     """Maps pixels (k, 2) to (x, y) at the height of the axis, m, (k, 2)."""
+    stretch: tuple[float, float] = (1.0, 1.0)
+    """Shown over stored pixels along rows and columns: other programs count the stored ones."""
+
+    @property
+    def stored_size(self) -> tuple[int, int]:
+        """Width and height of the stored picture, upright, pixels."""
+        return round(self.size[0] / self.stretch[0]), round(self.size[1] / self.stretch[1])
+
+    def shown(self, stored: Samples) -> Samples:
+        """Pixels (k, 2) of the shown picture by those of the stored one."""
+        return np.asarray((stored + 0.5) * np.array(self.stretch) - 0.5)
 
     @classmethod
     def plain(cls, scale: Scale, size: tuple[int, int], *, leftward: bool) -> Ruled:

@@ -21,7 +21,9 @@ from spirillum.measurement.marks import (
     read_marks,
     track_of_marks,
 )
+from spirillum.measurement.setup_template import setup_remarks
 from spirillum.measurement.summary import Summary, compared, summary_of
+from spirillum.measurement.track_check import check_track
 from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
 from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.robot.load import load
@@ -65,6 +67,8 @@ class Measurement(Shown):
     def warnings(self) -> tuple[str, ...]:
         """What to be careful about, a sentence each."""
         found = [sentence for trial in self.trials for sentence in _sentences(trial)]
+        if any(math.isfinite(trial.track.scale.length_per_pixel) for trial in self.trials):
+            found += setup_remarks(self.trials[0].track.setup)
         found += [f"{video}: not measured: {sentence}" for video, sentence in self.failures]
         total = self.summary.trials
         few = {name: count for name, count in self.summary.counts.items() if name in RATE_NAMES and 0 < count < total}
@@ -149,7 +153,7 @@ def asked_of(
         videos: films or folders of images, each once.
         setup: the setup file.
         marks: table of readings by hand.
-        track: table of trackpy or DeepLabCut with the positions of one video.
+        track: table of trackpy, DeepLabCut or Tracker with the positions of one video, in pixels.
         tracking: look for the robot in the videos.
         start: time in the video from which on to measure, s, instead of the setup's.
         end: time until which to measure, s.
@@ -213,7 +217,9 @@ def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Asked) -
     if asked.track is not None:
         assert seen.ruled is not None  # noqa: S101 - asked for
         assert seen.time_of is not None  # noqa: S101
-        return read_track(asked.track, asked.setup, path.name, seen.ruled, seen.time_of)
+        found = read_track(asked.track, asked.setup, path.name, seen.ruled, seen.time_of, seen.frame_of)
+        doubts = check_track(found, asked.track, path, asked.setup, asked.robot, asked.folder)
+        return replace(found, flags=(*found.flags, *seen.flags, *doubts))
     if marks is None:
         raise InputError(f"{path} has no readings by hand; allowed: some, or tracking")
     check_times(marks, seen.duration)

@@ -20,7 +20,7 @@ from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
 
-__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_text", "toml_value"]
+__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_remarks", "setup_text", "toml_value"]
 
 _HEAD = """\
 # A setup: what is known of camera, tank, ruler and robot. Heights count from the reference plane: the tank's floor
@@ -28,6 +28,7 @@ _HEAD = """\
 """
 OPEN = "FILL IN"
 """Stands for a number that only the experimenter knows: no file with it is valid."""
+_YOURS = "CHECK: a usual standard uncertainty, not yours"
 _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "": (
         ("# start", '"2 s"', "time in the video from which on to measure, as when the robot has started up"),
@@ -38,6 +39,7 @@ _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("height", '"210 mm"', "of the lens above the reference plane"),
         ("height_uncertainty", '"2 mm"', ""),
         ("# frames_per_second", "30.0", "for a folder of images, or instead of a video's own time stamps"),
+        ("# pixel_aspect_ratio", "1.0", "width of a stored pixel over its height, if the video states it wrongly"),
     ),
     "# camera.checkerboard": (
         ("# images", '"checkerboard"', "pictures of a checkerboard in air, a folder beside this file"),
@@ -98,7 +100,8 @@ def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: 
     Args:
         found: fields by their dotted names, each with its value as it stands in TOML and a comment; others are left
             out. None: every field has an example.
-        open_fields: fields that are left to be filled in: the file is not valid until they are.
+        open_fields: fields that are left to be filled in: the file is not valid until they are. Their uncertainties
+            are those of the example.
     """
     lines = [_HEAD.rstrip()]
     for section, fields in _SECTIONS.items():
@@ -112,6 +115,8 @@ def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: 
                     name, (value, comment) = field.lstrip("# "), found[dotted]
                 elif dotted in open_fields:
                     value, comment = f'"{OPEN}"', words
+                elif dotted.removesuffix("_uncertainty") in open_fields:
+                    comment = _YOURS
                 elif section and not field.startswith("#"):
                     name = f"# {field}"
             lines.append(f"{f'{name} = {value}':<38}{f'# {comment}' if comment else ''}".rstrip())
@@ -150,13 +155,9 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     }
     shares = depth_shares(setup)
     total = sum(share**2 for share in shares.values()) ** 0.5
-    warnings = [] if shares else ["no uncertainty is given: intervals of lengths hold what the picture shows alone"]
+    warnings = setup_remarks(setup)
     if robot.seal is None or not (setup.robot.stripes or robot.seal.stripes):
         warnings.append("the robot has no stripes: its body's rotation cannot be seen")
-    if same := _as_in_example(setup):
-        warnings.append(
-            f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own"
-        )
     content = {
         "file": str(path),
         "valid": True,
@@ -169,6 +170,23 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
         content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
         warnings += [flag.sentence for flag in flags]
     return envelope("setup-check", content, warnings)
+
+
+def setup_remarks(setup: Setup) -> list[str]:
+    """What a setup says of its uncertainties that whoever uses its lengths has to know, a sentence each.
+
+    Args:
+        setup: the setup.
+    """
+    found = []
+    if not depth_shares(setup):
+        found.append(
+            "the setup states no uncertainty of its heights or scale: intervals of lengths hold what the picture shows "
+            "alone; set the *_uncertainty fields"
+        )
+    if same := _as_in_example(setup):
+        found.append(f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own")
+    return found
 
 
 def _as_in_example(setup: Setup) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.measurement.marks import Ruled
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Video, open_video
 
@@ -31,6 +32,10 @@ class Untracked:
     """Length of the video, s; None where it is not known."""
     seen: bool = True
     """Whether there was a video to open."""
+    frame_of: Callable[[Samples], Samples] | None = field(default=None, repr=False)
+    """Takes times, s, to numbers of frames; NaN where none was taken."""
+    flags: Sequence[Flag] = ()
+    """What was odd about the video while it was read."""
 
 
 def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Untracked:
@@ -49,42 +54,61 @@ def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) ->
 
     rate = setup.camera.frames_per_second
     try:
-        video = open_video(path, rate)
+        video = open_video(path, rate, setup.camera.pixel_aspect_ratio)
     except InputError:
         if needed:
             raise
-        return Untracked(None, None if rate is None else _at(rate), seen=False)
-    times = _times(video, rate)
+        return Untracked(None, None if rate is None else _Stamps(None, rate).time_of, seen=False)
+    stamps = _Stamps(video, rate)
     if not needed:
-        return Untracked(None, times, video.words, video.duration)
+        return Untracked(None, stamps.time_of, video.words, video.duration)
     found, video = scale_of(video, setup, folder=folder)
     optics = found.optics
 
     def points(pixels: Samples) -> Samples:
         return np.asarray((optics.points(pixels, optics.axis_height) - optics.origin)[:, :2])
 
-    return Untracked(Ruled(found.scale, video.size, points), times, video.words, video.duration)
+    ruled = Ruled(found.scale, video.size, points, video.stretch)
+    return Untracked(ruled, stamps.time_of, video.words, video.duration, frame_of=stamps.frame_of, flags=video.flags)
 
 
-def _at(rate: float) -> Callable[[Samples], Samples]:
-    """Times of frames at a given rate."""
+class _Stamps:
+    """Times of frames by their numbers: at a given rate, else the video's own, read once when they are asked for."""
 
-    def time_of(frames: Samples) -> Samples:
-        return np.asarray(frames / rate)
+    def __init__(self, video: Video | None, rate: float | None) -> None:
+        self._video, self._rate = video, rate
+        self._read: tuple[Samples, Samples] | None = None
 
-    return time_of
+    def time_of(self, frames: Samples) -> Samples:
+        """Times of frames, s.
 
+        Raises:
+            InputError: for a frame that is not there.
+        """
+        if self._rate is not None:
+            return np.asarray(frames / self._rate)
+        numbers, times = self._all()
+        place = np.minimum(np.searchsorted(numbers, frames), numbers.size - 1)
+        for frame in frames[numbers[place] != frames]:
+            assert self._video is not None  # noqa: S101 - its stamps were read
+            raise InputError(f"{self._video.name} has no frame {frame:g}; allowed: 0 to {numbers[-1]:g}")
+        return np.asarray(times[place])
 
-def _times(video: Video, rate: float | None) -> Callable[[Samples], Samples] | None:
-    """Times of frames by their numbers: the video's own stamps, read once when they are asked for."""
-    if rate is not None:
-        return _at(rate)
+    def frame_of(self, times: Samples) -> Samples:
+        """Numbers of the frames nearest to some times; NaN for a time that is half a step from all."""
+        if self._rate is not None:
+            return np.asarray(np.round(times * self._rate))
+        numbers, stamps = self._all()
+        place = np.clip(np.searchsorted(stamps, times), 1, max(1, stamps.size - 1))
+        place = np.minimum(place, stamps.size - 1)
+        before = np.maximum(place - 1, 0)
+        nearest = np.where(times - stamps[before] < stamps[place] - times, before, place)
+        step = float(np.median(np.diff(stamps))) if stamps.size > 1 else 1.0
+        return np.where(np.abs(stamps[nearest] - times) < 0.5 * step, numbers[nearest], np.nan)
 
-    def time_of(frames: Samples) -> Samples:
-        stamps: dict[int, float] = {frame.index: frame.time for frame in video.frames()}
-        for frame in frames:
-            if int(frame) not in stamps:
-                raise InputError(f"{video.name} has no frame {frame:g}; allowed: 0 to {max(stamps, default=0)}")
-        return np.array([stamps[int(frame)] for frame in frames])
-
-    return time_of
+    def _all(self) -> tuple[Samples, Samples]:
+        if self._read is None:
+            assert self._video is not None  # noqa: S101 - without a video the rate is given
+            found = [(frame.index, frame.time) for frame in self._video.frames()]
+            self._read = np.array([index for index, _ in found], float), np.array([time for _, time in found])
+        return self._read

@@ -26,9 +26,9 @@ from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import Trial
 from spirillum.results.measurement_report import write_measurement_report
 from spirillum.view.annotate import annotated_film
+from spirillum.vision.camera.camera import opened
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.video.frames import open_video
 
 __all__ = ["measure"]
 
@@ -57,7 +57,8 @@ def measure(
         setup: the setup file.
         output: folder for the results; None writes nothing.
         marks: table of readings by hand, which replace what is seen on their frames.
-        track: table of trackpy or DeepLabCut with the positions of one video, instead of our own tracking.
+        track: table of trackpy, DeepLabCut or Tracker with the positions of one video in pixels, instead of our own
+            tracking.
         tracking: look for the robot in the videos; if not, the readings by hand are all there is.
         annotated: write an annotated video of each trial.
         figures: draw figures and write the report.
@@ -163,7 +164,7 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
         folder.thumbnails[name] = picture
 
     target = folder.path / f"{name}.{_FILM}"
-    video = open_video(path, asked.setup.camera.frames_per_second)
+    video = opened(path, asked.setup)
     words = {"title": f"{path.name}, annotated"}
     if says_synthetic(video.words):
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}

@@ -57,6 +57,8 @@ class CameraSetup(Section):
     """Standard uncertainty of that height."""
     frames_per_second: Annotated[float, Field(strict=True, ge=0.01, le=1e5, allow_inf_nan=False)] | None = None
     """Frames a second of a folder of images, or instead of a video's own time stamps."""
+    pixel_aspect_ratio: Annotated[float, Field(strict=True, ge=0.2, le=5.0, allow_inf_nan=False)] | None = None
+    """Width of a stored pixel over its height (1: square), instead of what the video states."""
     checkerboard: Checkerboard | None = None
     """Calibration of the lens; without it the lens is taken as free of distortion, beyond what the markers show."""
 

@@ -45,7 +45,10 @@ def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = N
 
 def opened(video: str | Path | Video, setup: Setup) -> Video:
     """Open a video; one that is open is returned unchanged."""
-    return video if isinstance(video, Video) else open_video(video, setup.camera.frames_per_second)
+    camera = setup.camera
+    if isinstance(video, Video):
+        return video
+    return open_video(video, camera.frames_per_second, camera.pixel_aspect_ratio)
 
 
 def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
@@ -133,7 +136,7 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None, fr
     """
     factor = video.size[0] // still.shape[1]
     board = setup.camera.checkerboard
-    lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size)
+    lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size, video.display)
     if setup.markers.spacing is None:
         return given_camera(setup, video.size, lens)._replace(reduction=factor)
     bounds = bounds_of(setup, video)

@@ -10,13 +10,13 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.vision.setup import Checkerboard
-from spirillum.vision.video.pictures import read_image
+from spirillum.vision.video.display import AS_STORED, Display
+from spirillum.vision.video.pictures import IMAGES, bits_of, eight_bit, read_header, read_image
 
 __all__ = ["Lens", "lens_of"]
 
 _FEWEST = 3
 """Fewest pictures with a detected board."""
-_PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _POOR_FIT = 2.0
 """Largest root mean square reprojection error, pixels."""
 
@@ -40,13 +40,14 @@ class Lens(NamedTuple):
     """Number of pictures in which the board was detected."""
 
 
-def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int]) -> Lens:
+def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
     """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion.
 
     Args:
         board: the checkerboard; its `images` is a folder relative to that of the setup file.
         folder: folder of the setup file.
-        size: width and height of the video and of the calibration pictures, pixels.
+        size: width and height of the video and of the calibration pictures as shown, pixels.
+        display: how the video's pictures are shown; so are pictures that have the size of the stored ones.
 
     Raises:
         InputError: if the folder is missing, fewer than three pictures show the board, or the fit is poor.
@@ -55,12 +56,16 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int]) -> Lens:
     images = folder / board.images
     if not images.is_dir():
         raise InputError(f"camera.checkerboard.images = {board.images!r} is no folder; allowed: a folder of pictures")
-    names = sorted(entry for entry in images.iterdir() if entry.suffix.lower() in _PICTURES)
+    names = sorted(entry for entry in images.iterdir() if entry.suffix.lower() in IMAGES)
     pattern, found = (board.columns, board.rows), []
     for name in names:
-        grey = read_image(name, grey=True)
-        if grey is None:
+        stored, header = read_image(name, grey=True), read_header(name)
+        if stored is None or header is None:
             raise InputError(f"camera.checkerboard: {name} cannot be read as an image; allowed: png, jpg, tif, bmp")
+        stored = eight_bit(stored, bits_of(stored))
+        grey = header.display.shown(stored)
+        if grey.shape[::-1] != size and display.size(header.size) == size:
+            grey = display.shown(stored)
         if grey.shape[::-1] != size:
             seen_size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
             raise InputError(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,34 +15,38 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.files import checked_path, opened
-from spirillum.files.limits import MOST_IMAGES, MOST_PIXELS, SMALLEST_SIDE
+from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
 from spirillum.vision.flag import Flag
-from spirillum.vision.video.pictures import read_image, reduced
-from spirillum.vision.video.provenance import one_line, stated_size, words_of_images
+from spirillum.vision.video.display import AS_STORED, Display, converter, display_flags, frame_display, stated_aspect
+from spirillum.vision.video.image_sequence import ImageSequence, image_folder, image_stack
+from spirillum.vision.video.pictures import STACKS, reduced
+from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.read_ahead import ahead
+from spirillum.vision.video.streams import (
+    UNSTATED,
+    VIDEO,
+    Stated,
+    film_stream,
+    frame_clock,
+    open_container,
+    short_reason,
+    stated_length,
+)
 
-__all__ = ["FILMS", "PICTURES", "Frame", "Video", "converter", "open_video"]
+__all__ = ["FILMS", "Frame", "Video", "open_video"]
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
 """Endings of films."""
-PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-"""Endings of images in a folder."""
 
-_WHAT = "a film (mp4, avi, mov, mkv) or a folder of images (png, jpg, tif, bmp)"
 _PURPOSE = "measuring a video"
 _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
 """Most and fewest frames that wait between two threads, and the bytes that they may take between."""
-_OPENING = {
-    "protocol_whitelist": "file",
-    "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc,"
-    "wav,mp3",
-    "max_streams": "100",
-}
-"""A film is one file: no playlist that opens other files, or asks a network for them."""
 _SAME_RATE = 0.01
 """Relative difference from which on two rates are not the same."""
-_FEW = 10
-"""Images whose usual size is that of a folder's pictures."""
+_BATCH = 16
+"""Most pages of a TIFF file that are decoded at a time."""
+_FEW, _MISSING = 2, 0.02
+"""Number and share of frames, and share of the length, that a film may lack of what its file states."""
 _NEAR = 10.0
 """Seconds that are rather decoded through than jumped over."""
 
@@ -86,14 +88,21 @@ class Video:
     """Frames a second as the file states them, or as the setup gives them."""
     given_rate: float | None = None
     """Frames a second that replace a film's own time stamps."""
-    images: tuple[Path, ...] = ()
-    """The images of a folder, in their order."""
-    numbers: tuple[int, ...] = ()
-    """Their numbers, counted as they were recorded."""
+    images: ImageSequence | None = None
+    """The images of a folder or stack; None for a film."""
+    display: Display = AS_STORED
+    """How the stored pictures of a film or its images are shown."""
+    stated: Stated = UNSTATED
+    """How long the file states a film to be."""
     words: str = ""
     """What the file says of itself: title and comment of a film, texts in a folder's first image and its README."""
     flags: list[Flag] = field(default_factory=list)
     """What was found while reading."""
+
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """Shown over stored pixels along the shown picture's rows and columns."""
+        return self.display.stretch(self.display.stored(self.size))
 
     @property
     def name(self) -> str:
@@ -130,16 +139,16 @@ class Video:
         Raises:
             InputError: if there is none at all.
         """
-        if self.images:
+        if self.images is not None:
             stamps = self._stamps()
             chosen = sorted({int(np.searchsorted(stamps, time - 1e-9)) for time in times})
-            read = (self._image(index) for index in chosen if index < len(stamps))
-            return [frame for frame in read if frame is not None]
+            pictures = ((index, self._noted(index, self.images.read(index))) for index in chosen if index < len(stamps))
+            return [Frame(index, float(stamps[index]), one) for index, one in pictures if one is not None]
         return self._film_samples(list(times))
 
     def _read(self, start: float, end: float | None) -> Iterator[Frame]:
         first = True
-        for index, time, image in self._pictures() if self.images else self._film():
+        for index, time, image in self._film() if self.images is None else self._pictures(start):
             if time < start - 1e-9:
                 continue
             if end is not None and time > end + 1e-9:
@@ -149,23 +158,27 @@ class Video:
                 first = False
                 yield Frame(index, time, picture)
         if first:
-            raise InputError(f"{self.path} has no frame {_between(start, end)}; allowed: {_WHAT}")
+            raise InputError(f"{self.path} has no frame {_between(start, end)}; allowed: {VIDEO}")
 
-    def _pictures(self) -> Iterator[tuple[int, float, Any]]:
-        for index, time in enumerate(self._stamps()):
-            yield index, float(time), lambda index=index: (found := self._image(index)) and found.image
+    def _pictures(self, start: float) -> Iterator[tuple[int, float, Any]]:
+        assert self.images is not None  # noqa: S101 - asked where it is so
+        stamps = self._stamps()
+        first = int(np.searchsorted(stamps, start - 1e-9))
+        read = self.images.read_from(first, self.frames_within(_AHEAD_BYTES, 1, _BATCH))
+        for index, picture in enumerate(read, first):
+            yield index, float(stamps[index]), partial(self._noted, index, picture)
 
     def _stamps(self) -> np.ndarray:
-        assert self.rate is not None  # noqa: S101 - open_video has seen to it
-        return np.array(self.numbers, dtype=float) / self.rate
+        assert self.images is not None and self.rate is not None  # noqa: S101, PT018 - open_video has seen to it
+        return np.array(self.images.numbers, dtype=float) / self.rate
 
-    def _image(self, index: int) -> Frame | None:
-        picture = _read_image(self.images[index])
+    def _noted(self, index: int, picture: np.ndarray | None) -> np.ndarray | None:
+        """An image, with a note where it could not be read."""
         if picture is None:
-            self._note("unreadable-frames", f"{self.images[index].name} cannot be read: such images are left out")
-            return None
-        _check_same_size(self.images[index], picture.shape[1::-1], self.size)
-        return Frame(index, float(self._stamps()[index]), picture)
+            assert self.images is not None  # noqa: S101
+            name = self.images.name(index)
+            self._note("unreadable-frames", f"{name} cannot be read: such images are left out")
+        return picture
 
     def _note(self, name: str, sentence: str) -> None:
         if all(flag.name != name for flag in self.flags):
@@ -173,45 +186,58 @@ class Video:
 
     def _film(self) -> Iterator[tuple[int, float, Any]]:
         """Index, time and a function that gives the picture, of every frame that can be decoded."""
-        before, last, origin, rgb = None, None, None, converter()
-        for index, frame in enumerate(self._decoded()):
-            if (frame.width, frame.height)[:: _turn(frame)] != self.size:
+        before, last, origin, rgb = None, None, None, converter(self.display)
+        index = -1
+        for index, (frame, stamp) in enumerate(self._decoded()):
+            if self.display.size((frame.width, frame.height)) != self.size:
                 self._note("unreadable-frames", "the film changes its size on the way: frames of another are left out")
                 continue
-            if self.given_rate or frame.time is None:
+            if self.given_rate or stamp is None:
                 time = index / (self.rate or 30.0)
             else:
-                origin = frame.time if origin is None else origin
-                time = float(frame.time - origin)
+                origin = stamp if origin is None else origin
+                time = float(stamp - origin)
             if last is not None and time <= last:
                 self._note("unordered-times", "time stamps that do not rise were found: such frames are left out")
                 continue
             before, last = last, time
             yield index, time, partial(rgb, frame)
-        if before is not None and last is not None and self.duration:
-            missing = self.duration - (2.0 * last - before)
-            if missing > max(0.5, 0.02 * self.duration):
-                self._ends_early(f"it ends at {last:.2f} s, {missing:.1f} s are missing")
+        if before is not None and last is not None:
+            self._check_end(index + 1, last, last - before)
 
-    def _decoded(self) -> Iterator[Any]:
-        """The film's frames until its end, or until it cannot be decoded any further.
+    def _check_end(self, frames: int, last: float, step: float) -> None:
+        """Note what is missing of the length that the file states, in time or in frames."""
+        duration, stated, tolerance = self.stated
+        missing = 0.0 if duration is None else duration - (last + step)
+        if duration is not None and missing > max(tolerance, _MISSING * duration):
+            self._ends_early(f"it ends at {last:.2f} s, {missing:.1f} s are missing")
+        elif stated - frames > max(_FEW, _MISSING * stated):
+            sentence = (
+                f"the file states {stated} frames, {frames} can be read: the others are empty, hidden by its edit "
+                "list, or damaged"
+            )
+            self._note("frames-not-read", sentence)
+
+    def _decoded(self) -> Iterator[tuple[Any, float | None]]:
+        """The film's frames, each with its time, until its end, or until it cannot be decoded any further.
 
         Raises:
             InputError: if not even the first can be decoded.
         """
         av = required("av", _PURPOSE, "video")
         count = 0
-        with _opened(self.path) as container:
-            stream = container.streams.video[0]
-            stream.thread_type = "AUTO"
+        with open_container(self.path) as container:
+            stream = _threaded(container)
+            time_of = frame_clock(container, stream)
             try:
                 for frame in container.decode(stream):
                     count += 1
-                    yield frame
+                    yield frame, time_of(frame)
             except (av.error.FFmpegError, ValueError) as error:
+                reason = short_reason(error)
                 if not count:
-                    raise InputError(f"{self.path} cannot be decoded ({_short(error)}); allowed: {_WHAT}") from error
-                self._ends_early(f"after {count} frames: {_short(error)}")
+                    raise InputError(f"{self.path} cannot be decoded ({reason}); allowed: {VIDEO}") from error
+                self._ends_early(f"after {count} frames: {reason}")
 
     def _ends_early(self, reason: str) -> None:
         self._note("video-ends-early", f"the video could not be read to its end ({reason}): what was read is kept")
@@ -221,10 +247,10 @@ class Video:
             return self._some(self._passed(times))
         av = required("av", _PURPOSE, "video")
         found: list[Frame] = []
-        with _opened(self.path) as container, suppress(av.error.FFmpegError, ValueError):  # what can be read has to do
-            stream = container.streams.video[0]
-            stream.thread_type = "AUTO"
-            decoded, now, origin, rgb = container.decode(stream), -1.0, None, converter()
+        with open_container(self.path) as container, suppress(av.error.FFmpegError, ValueError):  # what can be read
+            stream = _threaded(container)
+            decoded, now, origin, rgb = container.decode(stream), -1.0, None, converter(self.display)
+            time_of = frame_clock(container, stream)
             for wanted in times:
                 if now >= wanted:
                     continue
@@ -232,8 +258,9 @@ class Video:
                     container.seek(int((wanted + origin) / stream.time_base), stream=stream)
                     decoded = container.decode(stream)
                 for frame in decoded:
-                    origin = frame.time if origin is None else origin
-                    now = now if frame.time is None else frame.time - origin
+                    stamp = time_of(frame)
+                    origin = stamp if origin is None else origin
+                    now = now if stamp is None or origin is None else stamp - origin
                     if now >= wanted - 1e-9:
                         found.append(Frame(-1, float(now), rgb(frame)))
                         break
@@ -252,62 +279,69 @@ class Video:
 
     def _some(self, found: list[Frame]) -> list[Frame]:
         if not found:
-            raise InputError(f"{self.path} has no frame that can be decoded; allowed: {_WHAT}")
+            raise InputError(f"{self.path} has no frame that can be decoded; allowed: {VIDEO}")
         return found
 
 
-def open_video(path: str | Path, frames_per_second: float | None = None) -> Video:
-    """Open a film, or a folder of images in their natural order.
+def open_video(
+    path: str | Path, frames_per_second: float | None = None, pixel_aspect_ratio: float | None = None
+) -> Video:
+    """Open a film, a TIFF file of several pages, or a folder of images in their natural order.
 
-    Numbers at the end of the images' names count the frames as they were recorded, if they rise in steps of which the
-    smallest is 1: a number that is missing is a frame that was dropped.
+    Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
 
     Args:
-        path: the film or folder.
-        frames_per_second: rate of a folder's images, or instead of a film's own time stamps.
+        path: the film, TIFF file or folder.
+        frames_per_second: rate of images, or instead of a film's own time stamps.
+        pixel_aspect_ratio: width of a pixel over its height, instead of what the file states.
 
     Raises:
-        InputError: if it is missing, empty, not a video, has no pictures or an absurd size, or a folder has no rate.
+        InputError: if it is missing, empty, not a video, has no pictures or an absurd size, or images have no rate.
     """
-    path = checked_path(path, _WHAT)
+    path = checked_path(path, VIDEO)
     try:
         if path.is_dir():
-            return _folder(path, frames_per_second)
-        with opened(path, _WHAT, sys.maxsize) as stream:
+            return _images(path, frames_per_second, pixel_aspect_ratio)
+        with opened(path, VIDEO, sys.maxsize) as stream:
             if not stream.read(1):
-                raise InputError(f"{path} is empty; allowed: {_WHAT}")
+                raise InputError(f"{path} is empty; allowed: {VIDEO}")
     except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); allowed: {_WHAT}") from error
-    return _film(path, frames_per_second)
+        raise InputError(f"{path} cannot be read ({error.strerror}); allowed: {VIDEO}") from error
+    if path.suffix.lower() in STACKS:
+        return _images(path, frames_per_second, pixel_aspect_ratio)
+    return _film(path, frames_per_second, pixel_aspect_ratio)
 
 
-def _film(path: Path, frames_per_second: float | None) -> Video:
+def _film(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:
     av = required("av", _PURPOSE, "video")
-    with _opened(path) as container:
+    with open_container(path) as container:
         if not container.streams.video:
-            raise InputError(f"{path} has no pictures; allowed: {_WHAT}")
-        stream = container.streams.video[0]
+            raise InputError(f"{path} has no pictures; allowed: {VIDEO}")
+        stream, flags = film_stream(container)
         if stream.codec_context is not None and stream.width and stream.height:
             _check_size(path, (stream.width, stream.height))
+        stated = stated_length(container, stream)
+        own_rate = float(stream.average_rate or 0.0)
         try:
             frame = next(container.decode(stream), None)
         except (av.error.FFmpegError, ValueError) as error:
-            raise InputError(f"{path} cannot be decoded ({_short(error)}); allowed: {_WHAT}") from error
+            raise InputError(f"{path} cannot be decoded ({short_reason(error)}); allowed: {VIDEO}") from error
         if frame is None:
-            raise InputError(f"{path} has no frames; allowed: {_WHAT}")
-        size = (frame.width, frame.height)[:: _turn(frame)]
-        _check_size(path, size)
-        duration = None
-        if stream.duration is not None and stream.time_base is not None:
-            duration = float(stream.duration * stream.time_base)
-        elif container.duration is not None:
-            duration = container.duration / av.time_base
-        rate = frames_per_second or (float(stream.average_rate) if stream.average_rate else None)
-        flags = _replaced(frames_per_second, float(stream.average_rate or 0.0))
-        if frames_per_second:  # its own length is in its own times, which do not count
-            duration = stream.frames / frames_per_second if stream.frames else None
+            raise InputError(f"{path} has no frames; allowed: {VIDEO}")
+        ratio = float(stream.sample_aspect_ratio or 0.0) or None
+        display, slant = frame_display(frame, stated_aspect(str(path), ratio, aspect))
+        stored = frame.width, frame.height
         words = [str(container.metadata.get(key, "")) for key in ("title", "comment", "description")]
-    return Video(path, size, duration, rate, frames_per_second, words=one_line(" ".join(words)), flags=flags)
+    size = display.size(stored)
+    _check_size(path, size)
+    if frames_per_second:  # its own length is in its own times, which do not count
+        duration = stated.frames / frames_per_second if stated.frames else None
+        stated = stated._replace(duration=duration, tolerance=3.0 / frames_per_second)
+    flags += [*_replaced(frames_per_second, own_rate), *display_flags(display, stored, ratio, aspect, slant)]
+    return Video(
+        path, size, stated.duration, frames_per_second or own_rate or None, frames_per_second,
+        display=display, stated=stated, words=one_line(" ".join(words)), flags=flags,
+    )  # fmt: skip
 
 
 def _replaced(given: float | None, own: float) -> list[Flag]:
@@ -321,52 +355,26 @@ def _replaced(given: float | None, own: float) -> list[Flag]:
     return [Flag("rate-replaced", sentence)]
 
 
-def _folder(path: Path, frames_per_second: float | None) -> Video:
-    pictures = (entry for entry in path.iterdir() if entry.suffix.lower() in PICTURES and entry.is_file())
-    names = [entry for entry in pictures if not entry.name.startswith(".")]
-    if len(names) > MOST_IMAGES:
-        raise InputError(f"{path} holds {len(names)} images; allowed: at most {MOST_IMAGES}")
-    if not names:
-        raise InputError(f"{path} holds no images; allowed: {_WHAT}")
+def _images(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:
+    """A folder of images, or a TIFF file."""
+    sequence = image_folder(path, aspect) if path.is_dir() else image_stack(path, aspect)
     if frames_per_second is None:
-        raise InputError(
-            f"camera.frames_per_second is missing, but {path} is a folder of images; allowed: their rate, 0.01 to 1e5"
-        )
-    names.sort(key=lambda entry: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", entry.name)])
-    ends = [re.findall(r"\d+", entry.stem)[-1:] for entry in names]
-    numbers = np.array([int(end[0]) for end in ends]) if all(ends) else np.arange(len(names))
-    steps = np.diff(numbers)
-    if len(names) > 1 and (steps.min() != 1 or steps.max() > 1e6):
-        numbers = np.arange(len(names))
-    first = [(name, picture.shape[1::-1]) for name in names[:_FEW] if (picture := _read_image(name)) is not None]
-    if not first:
-        read_image(names[0])  # says where it is no picture for its size
-        raise InputError(f"{path}: {names[0].name} cannot be read as an image; allowed: {_WHAT}")
-    width, height = Counter(size for _, size in first).most_common(1)[0][0]
-    _check_size(path, (width, height))
-    stated = ((name, stated_size(name)) for name in names)
-    for name, size in (*first, *((name, size) for name, size in stated if size is not None)):
-        _check_same_size(name, size, (width, height))
-    counted = tuple(int(number - numbers[0]) for number in numbers)
-    duration = (counted[-1] + 1) / frames_per_second
+        what = "a folder of images" if path.is_dir() else "a TIFF file"
+        raise InputError(f"camera.frames_per_second is missing, but {path} is {what}; allowed: its rate, 0.01 to 1e5")
+    size = sequence.display.size(sequence.header.size)
+    _check_size(path, size)
     return Video(
-        path,
-        (width, height),
-        duration,
-        frames_per_second,
-        frames_per_second,
-        tuple(names),
-        counted,
-        words_of_images(path, names[0]),
-    )
+        path, size, (sequence.numbers[-1] + 1) / frames_per_second, frames_per_second, frames_per_second, sequence,
+        sequence.display, words=words_of_images(path if path.is_dir() else path.parent, sequence.files[0]),
+        flags=list(sequence.flags),
+    )  # fmt: skip
 
 
-def _opened(path: Path) -> Any:
-    av = required("av", _PURPOSE, "video")
-    try:
-        return av.open(f"file:{path}", options=_OPENING, metadata_errors="replace")
-    except (av.error.FFmpegError, ValueError, OSError) as error:
-        raise InputError(f"{path} cannot be read as a film ({_short(error)}); allowed: {_WHAT}") from error
+def _threaded(container: Any) -> Any:
+    """The stream that is measured, decoded by several threads."""
+    stream, _ = film_stream(container)
+    stream.thread_type = "AUTO"
+    return stream
 
 
 def _check_size(path: Path, size: tuple[int, int]) -> None:
@@ -377,49 +385,5 @@ def _check_size(path: Path, size: tuple[int, int]) -> None:
         )
 
 
-def _check_same_size(image: Path, size: tuple[int, ...], expected: tuple[int, int]) -> None:
-    """Pictures of one folder are of one camera, and of one part of what it sees: else no place can be compared."""
-    if size != expected:
-        raise InputError(
-            f"{image} has {size[0]} x {size[1]} pixels, others in its folder {expected[0]} x {expected[1]}; allowed: "
-            "images of one size"
-        )
-
-
-def _read_image(path: Path) -> np.ndarray | None:
-    try:
-        picture = read_image(path)
-    except InputError:
-        return None
-    return None if picture is None else np.ascontiguousarray(picture[:, :, ::-1])
-
-
-def _quarters(frame: Any) -> int:
-    """Quarter turns against the clock by which a phone's film has to be turned to stand upright."""
-    return round(getattr(frame, "rotation", 0) / 90.0) % 4
-
-
-def _turn(frame: Any) -> int:
-    """Step through (width, height) that gives them as shown."""
-    return -1 if _quarters(frame) % 2 else 1
-
-
-def converter() -> Callable[[Any], np.ndarray]:
-    """A function that gives a decoded frame's picture, for one thread: what converts is set up once, not every time."""
-    av = required("av", _PURPOSE, "video")
-    reformatter = av.video.reformatter.VideoReformatter()
-
-    def rgb(frame: Any) -> np.ndarray:
-        picture: np.ndarray = reformatter.reformat(frame, format="rgb24").to_ndarray()
-        quarters = _quarters(frame)
-        return np.ascontiguousarray(np.rot90(picture, quarters)) if quarters else picture
-
-    return rgb
-
-
 def _between(start: float, end: float | None) -> str:
     return f"from {start:g} s on" if end is None else f"from {start:g} s to {end:g} s"
-
-
-def _short(error: BaseException) -> str:
-    return str(getattr(error, "strerror", None) or error)[:120]
