@@ -23,7 +23,7 @@ def number_in(text: str) -> float:
 
 
 def separator_of(lines: Sequence[str]) -> str:
-    """The character between columns, by the first line that holds one: comma, semicolon or tabulator."""
+    """The character between columns, by the first line that holds one: comma, semicolon or tab."""
     for line in lines:
         counts = [_QUOTED.sub("", line).count(mark) for mark in _SEPARATORS]
         if any(counts):
@@ -34,7 +34,7 @@ def separator_of(lines: Sequence[str]) -> str:
 def with_plain_numbers(rows: Sequence[Sequence[str]], separator: str) -> list[list[str]]:
     """Cells in which numbers have a decimal point and an ASCII minus sign; other texts stay as they are.
 
-    Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabulators
+    Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabs
     separate, or some comma that cannot mark thousands. No number may have a point then. Else they stay.
 
     Args:

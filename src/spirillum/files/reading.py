@@ -181,7 +181,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
 def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
     """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
 
-    Commas, semicolons or tabulators separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines
+    Commas, semicolons or tabs separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines
     that start with `#` are comments. They are left out, and so are rows of separators alone, the line `sep=` and empty
     columns at the end, as spreadsheets write.
 

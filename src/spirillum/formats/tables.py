@@ -189,7 +189,7 @@ def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
     width = len(table.header)
     if width == 1 and "|" in table.header[0]:
-        raise InputError(f"{path}: its columns are separated by '|'; allowed: commas, semicolons or tabulators")
+        raise InputError(f"{path}: its columns are separated by '|'; allowed: commas, semicolons or tabs")
     if width > MOST_COLUMNS:
         raise InputError(f"{path} has {width} columns; allowed: at most {MOST_COLUMNS}")
     return table
