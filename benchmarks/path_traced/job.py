@@ -157,11 +157,11 @@ def _frames(scene: Scene, height: float, robot: Any) -> list[dict[str, Any]]:
 
 
 def _hand_place(scene: Scene, time: float) -> tuple[float, float, float]:
-    """The wrist's place: the hand comes from behind the tank, rests over its edge, and leaves."""
+    """Middle of the palm: the hand comes from behind the tank, rests above its edge, and leaves."""
     share = time / scene.duration
     near = np.clip(min(share - 0.1, 0.85 - share) / 0.25, 0.0, 1.0)
     near = near * near * (3.0 - 2.0 * near)
-    return 30.0 + 3.0 * float(np.sin(9.0 * time)), 230.0 - 100.0 * float(near), scene.oil + 25.0
+    return 30.0 + 3.0 * float(np.sin(9.0 * time)), 230.0 - 125.0 * float(near), scene.oil + 25.0
 
 
 def _windows(scene: Scene, pose: dict[str, Any], height: float, robot: Any) -> list[tuple[int, int, int, int]]:

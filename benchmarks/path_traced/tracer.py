@@ -147,6 +147,18 @@ def glass(name, index, colour=(1.0, 1.0, 1.0)):
     return material
 
 
+def clear_after_diffuse(material) -> None:
+    """No interface for paths that have left a diffuse surface: Cycles does not scale radiance by the index squared."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    path, mix, clear = (nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "MixShader", "BsdfTransparent"))
+    bsdf = next(node for node in nodes if node.type == "BSDF_GLASS")
+    out = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    links.new(path.outputs["Diffuse Depth"], mix.inputs[0])
+    links.new(bsdf.outputs[0], mix.inputs[1])
+    links.new(clear.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], out.inputs[0])
+
+
 def let_light_through(seen) -> None:
     """Light goes straight from lamps to diffuse surfaces, as if the object were not there."""
     seen.visible_shadow = seen.visible_diffuse = False
@@ -203,7 +215,12 @@ def add_tank(job, folder: Path) -> None:
         material = printed(f"paper {number}", folder / paper["picture"])
         rectangle(f"paper {number}", paper["centre"], paper["size"], material, paper["height"])
     surface = glass("oil", oil["index"], (0.985, 0.99, 0.965))
-    let_light_through(rectangle("oil", (0, 0), (2000, 2000), surface, oil["height"]))
+    seen = rectangle("oil", (0, 0), (2000, 2000), surface, oil["height"])
+    if job["caustics"]:
+        clear_after_diffuse(surface)
+        seen.visible_shadow = False
+    else:
+        let_light_through(seen)
     material = glass("tube", tube["index"] / oil["index"])
     x = np.array([-0.5, 0.5]) * tube["length"]
     for name, radius, outward in (("outside", tube["outer"], True), ("inside", tube["inner"], False)):

@@ -258,8 +258,8 @@ class View:
 
 _LAMP_LIGHT = 0.22
 """Linear light of a lamp in the oil's surface, where white paper has 0.8; a surface of oil mirrors 3 %; assumed."""
-_LAMP_SIZES = ((0.12, 0.20), (0.30, 0.22))
-"""Least sides of a lamp over the picture's width and height, and what is added at most; assumed."""
+_LEAST_LAMP, _LARGEST_LAMP = (0.12, 0.20), (0.27, 0.31)
+"""Sides of a lamp over the picture's width and height; assumed."""
 
 
 def _mirrored_lamps(count: int, seed: int, size: tuple[int, int]) -> np.ndarray:
@@ -270,7 +270,7 @@ def _mirrored_lamps(count: int, seed: int, size: tuple[int, int]) -> np.ndarray:
     light = np.zeros((rows, columns))
     for _ in range(count):
         middle = rng.uniform(0.1, 0.9, 2) * size
-        half = 0.5 * (np.array(_LAMP_SIZES[0]) + rng.uniform(0.0, 0.5, 2) * np.array(_LAMP_SIZES[1])) * size
+        half = 0.5 * rng.uniform(_LEAST_LAMP, _LARGEST_LAMP) * size
         turn = rng.uniform(-0.12, 0.12)
         along = np.abs((u - middle[0]) * np.cos(turn) + (v - middle[1]) * np.sin(turn)) - half[0]
         down = np.abs((v - middle[1]) * np.cos(turn) - (u - middle[0]) * np.sin(turn)) - half[1]
