@@ -107,14 +107,32 @@ def test_draws_stay_within_their_factor() -> None:
     assert abs(np.mean(signs)) < 4 / np.sqrt(400)
 
 
-def test_a_silent_camera_switches_the_drive_off(toy: Any) -> None:
+@pytest.mark.parametrize("seed", range(40))
+def test_the_drive_is_off_a_second_after_the_last_frame_has_arrived(toy: Any, seed: int) -> None:
+    """At the latest; and not sooner than a period before, where the remote takes no more than half a second."""
+    draw = np.random.default_rng(seed)
+    fails, latency = draw.uniform(0.5, 3.0), draw.choice([0.0, draw.uniform(0.0, 0.4)])
+    fps, period, delay = draw.uniform(5.0, 60.0), draw.uniform(0.02, 0.25), draw.uniform(0.0, 0.25)
     watching = Always()
     watching.blind = False
+    camera, remote = {"fps": fps, "latency": latency, "fails_at": fails}, {"period": period, "delay": delay}
     plant = toy(SPEED)
-    run = run_loop(plant, watching, lab(camera={"fails_at": 1.0}), 10.0)
-    assert run.silent == pytest.approx(1.0 + SILENCE, abs=0.25)
-    assert plant.state.x < SPEED * (1.0 + SILENCE + 0.3)
+    run = run_loop(plant, watching, lab(camera=camera, remote=remote), 10.0)
+    last = max(time for time, sight in run.frames if sight is not None)
+    off = max(moment.time for moment in run.moments if moment.values["duty"] > 0.0)
+    assert last < fails
+    assert off <= last + latency + SILENCE + 1e-9 <= fails + latency + SILENCE + 1e-9
+    assert off >= last + latency + SILENCE - period - 1e-9
+    assert run.silent == pytest.approx(off - delay)
+    assert plant.state.x == pytest.approx(SPEED * (off - delay))
     assert run.moments[-1].values["duty"] == 0.0
+
+
+def test_a_slow_remote_is_no_silent_camera(toy: Any) -> None:
+    watching = Always()
+    watching.blind = False
+    run = run_loop(toy(SPEED), watching, lab(remote={"period": 0.4, "delay": 2.0}), 10.0)
+    assert run.silent is None
 
 
 @pytest.mark.parametrize("asked", [np.nan, 1.5, -0.1])

@@ -25,7 +25,9 @@ from spirillum.errors import InputError
 __all__ = ["SILENCE", "Decision", "LoopRun", "run_loop"]
 
 SILENCE = 1.0
-"""Beyond its latency the camera may be silent for so long before the drive is switched off, s."""
+"""The drive is off so long after the last frame has arrived, s."""
+_LEAST_PATIENCE = 0.5 * SILENCE
+"""A remote that needs more than the rest of `SILENCE` switches the drive off later, by what it needs more, s."""
 _LONGEST_WAIT = 12.0
 """So long the robot swims on without being seen while it is learnt how it looks, s."""
 _AT_ONCE = 1e-9
@@ -112,7 +114,9 @@ class _Loop:
         self._order = count()
         self._sights: list[Sight] = []
         self._readings: list[Reading] = []
-        self._last_delivery = 0.0
+        self._arrived = lab.camera.latency
+        remote = lab.remote.period + lab.remote.delay  # what a decision may wait, and what its command takes
+        self._patience = max(SILENCE - remote, _LEAST_PATIENCE)
 
     def push(self, time: float, kind: _Kind, content: Any = None) -> None:
         """Put an event into the queue."""
@@ -138,10 +142,11 @@ class _Loop:
 
     def decide(self, time: float) -> bool:
         """Let the controller decide and send its command; whether it gave a valid one."""
-        if self._sights:
-            self._last_delivery = time
         waiting = "" if self.controller.blind else self.senses.not_ready(time)
         if waiting:
+            self._arrived = max(self._arrived, self.senses.pictured + self.lab.camera.latency)
+        silent = not self.controller.blind and time - self._arrived > self._patience
+        if waiting and not silent:
             return self.swim_until_seen(time, waiting)
         truth = self.now() if self.controller.knowing else None
         asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
@@ -150,14 +155,13 @@ class _Loop:
         if not 0.0 <= command.duty <= 1.0:
             self.run.ended = f"the controller asked for a duty of {command.duty:g}; allowed: 0 to 1"
             return False
-        if not self.controller.blind and time - self._last_delivery > SILENCE + self.lab.camera.latency:
+        if silent:
             command = Command(0.0)
             self.run.silent = time if self.run.silent is None else self.run.silent
         return self.send(time, command, dict(self.controller.estimate()))
 
     def swim_until_seen(self, time: float, waiting: str) -> bool:
         """Swim at the robot's own duty while its look is learnt, but not for ever; whether there is still time."""
-        self._last_delivery = time
         if time > _LONGEST_WAIT:
             self.run.ended = f"nothing is seen after {time:.3g} s: {waiting}"
             return False
@@ -175,7 +179,7 @@ class _Loop:
     def handle(self, time: float, kind: _Kind, content: Any) -> bool:
         """One event; whether the run goes on."""
         if kind is _Kind.DELIVERY:
-            (self._sights if isinstance(content, Sight) else self._readings).append(content)
+            self._deliver(time, content)
             return True
         if kind is _Kind.ARRIVAL:
             return self.arrive(time, content)
@@ -198,6 +202,14 @@ class _Loop:
             case _:
                 return False
         return True
+
+    def _deliver(self, time: float, content: Sight | Reading) -> None:
+        """A frame or a reading reaches the controller."""
+        if isinstance(content, Sight):
+            self._sights.append(content)
+            self._arrived = time
+        else:
+            self._readings.append(content)
 
     def arrive(self, time: float, sent: Command) -> bool:
         """A command reaches the robot; whether what carries it is still there, and the run goes on."""

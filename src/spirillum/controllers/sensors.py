@@ -84,6 +84,8 @@ class Senses:
 
     def __init__(self, lab: Lab, seed: int) -> None:
         self._lab = lab
+        self.pictured = 0.0
+        """Time of the last frame that was not lost, whether or not the robot is seen on it, s."""
         self._camera, self._meter, self._remote = (_stream(seed, name) for name in ("camera", "meter", "remote"))
         self._scale = 1.0 + lab.camera.scale_error * float(self._camera.standard_normal())
         self._sizes = np.array(
@@ -105,6 +107,7 @@ class Senses:
         self._wander_across = kept * self._wander_across + np.sqrt(1.0 - kept**2) * noise_across[1]
         if lost or (camera.fails_at is not None and moment.time >= camera.fails_at):
             return None
+        self.pictured = moment.time
         errors = (self._sizes[0] * noise[0] + self._sizes[1] * self._wander).tolist()
         across = self._scale * moment.pose.position[1:] + self._sizes[:, 0] @ [noise_across[0], self._wander_across]
         return Sight(
@@ -128,7 +131,7 @@ class Senses:
         )
 
     def not_ready(self, time: float) -> str:  # noqa: ARG002 - modelled ones are ready at once
-        """Why nothing can be seen yet at a time, s, in half a sentence; empty once it can, and if no frames come."""
+        """Why nothing can be seen yet at a time, s, in half a sentence; empty once it can."""
         return ""
 
     def deliver(self, command: Command) -> Command:

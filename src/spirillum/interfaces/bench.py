@@ -9,7 +9,6 @@ from __future__ import annotations
 from contextlib import ExitStack
 
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.loop import SILENCE
 from spirillum.controllers.sensors import Senses
 from spirillum.controllers.signals import Command, Sight
 from spirillum.dynamics.plant import Moment, Plant
@@ -57,7 +56,7 @@ class Bench(Senses):
             InputError: for a robot that the camera cannot show, or a port without a remote.
         """
         super().__init__(lab, seed)
-        self._left, self._pictured = ExitStack(), 0.0
+        self._left = ExitStack()
         self._reason = "the tracker has not yet learnt how the robot looks"
         self._eye: VirtualCamera | None = None
         self._tracker: LiveTracker | None = None
@@ -83,10 +82,9 @@ class Bench(Senses):
         folder = self._left.enter_context(scratch_folder())
         self._tracker = LiveTracker(self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera")
 
-    def not_ready(self, time: float) -> str:
-        """Why nothing can be seen yet at a time, s; empty once the tracker knows the robot, and if no pictures come."""
-        waiting = self._tracker is not None and not self._tracker.learnt and time - self._pictured <= SILENCE
-        return self._reason if waiting else ""
+    def not_ready(self, time: float) -> str:  # noqa: ARG002 - it has learnt or not
+        """Why nothing can be seen yet at a time, s; empty once the tracker knows the robot."""
+        return self._reason if self._tracker is not None and not self._tracker.learnt else ""
 
     def sight(self, moment: Moment) -> Sight | None:
         """What the tracker says of the next picture; None while it learns, and where frame or robot are lost."""
@@ -97,7 +95,7 @@ class Bench(Senses):
         if modelled is None:
             self._tracker.left_out(1)
             return None
-        seen, self._pictured = self._tracker.update(shot.image, shot.time), moment.time
+        seen = self._tracker.update(shot.image, shot.time)
         self._reason = seen.reason or self._reason
         if not seen.seen:
             return None

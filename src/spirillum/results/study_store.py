@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,7 +28,7 @@ from spirillum.files import (
 )
 from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
-from spirillum.studies.estimate import estimate_of, is_large
+from spirillum.studies.estimate import Estimate, Pace, estimate_of, is_large
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.regions import Region, layout_of
@@ -41,6 +42,8 @@ __all__ = ["store_answer", "stored_study"]
 
 _MARK = "study.json"
 _NOTES = "notes"
+_GOLDEN = 0.618
+"""Share of all regions between one and the next that is computed, so that any number of them is spread evenly."""
 
 Tell = Callable[[str, int, int], None]
 
@@ -81,9 +84,8 @@ def stored_study(
         if outcome is None:
             _write_headers(plan, folder, {**attributes, "finished": "no"})
         if missing:
-            if is_large(loaded):
-                tell(estimate_of(loaded, observed, plan, len(missing), crew).words, 0, 0)
-            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, tell)
+            estimate = estimate_of(loaded, observed, plan, len(missing), crew) if is_large(loaded) else None
+            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, tell, estimate)
         if outcome is None:
             outcome = _summed(loaded, [_note_of(folder / plan.note(region)) for region in plan.layout.regions()])
         _write_headers(plan, folder, {**attributes, **outcome._asdict(), "finished": "yes"})
@@ -174,7 +176,8 @@ def _holds(path: Path, content: bytes) -> bool:
     return False
 
 
-def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tell) -> None:
+def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tell, estimate: Estimate | None) -> None:
+    """Compute and write regions; what that takes is told once their pace is known."""
     plan, total = work.plan, work.plan.layout.count
     models = ", ".join(work.loaded.study.models)
     done, here = total - len(missing), [""]
@@ -184,11 +187,24 @@ def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tel
             here[0] = words
             tell(f"{models}: {words}", done, total)
 
-    jobs = region_jobs(work.loaded, work.observed, plan, missing)
+    pace = None if estimate is None else Pace(sum(region.size for region in missing), estimate.workers)
+    jobs = region_jobs(work.loaded, work.observed, plan, _spread(missing))
     for job, files in shared_out(encoded_region, jobs, crew, besides="; what was written is kept", tell=at_work):
         write_pieces(work.folder, files)
         done += 1
+        seconds = None if pace is None or done == total else pace.seconds(job.region.size)
+        if estimate is not None and seconds is not None:
+            tell(estimate.words(seconds), 0, 0)
+            pace = None
         tell(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
+
+
+def _spread(regions: Sequence[Region]) -> list[Region]:
+    """Regions in an order in which the first ones stand for all: long tails cost more than short ones."""
+    step = max(round(len(regions) * _GOLDEN), 1)
+    while gcd(step, len(regions)) > 1:
+        step += 1
+    return [regions[(len(regions) // 2 + number * step) % len(regions)] for number in range(len(regions))]
 
 
 def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:

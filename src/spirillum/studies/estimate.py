@@ -1,10 +1,11 @@
-"""How long a large study takes, and how much memory: from a few of its robots, or measured rates, before it starts."""
+"""How long a large study takes, from the pace of its first regions, and how much memory, from a few of its robots."""
 
 from __future__ import annotations
 
 import tracemalloc
+from collections.abc import Callable
 from math import prod
-from time import process_time
+from time import monotonic
 from typing import NamedTuple
 
 from spirillum.crews import ESTIMATE, Crew
@@ -16,34 +17,69 @@ from spirillum.studies.regions import Layout, Region, cut, layout_of
 from spirillum.studies.stored import Plan, RegionJob, encoded_region, plan_of
 from spirillum.studies.work import groups
 
-__all__ = ["Estimate", "estimate_of", "is_large"]
+__all__ = ["Estimate", "Pace", "estimate_of", "is_large"]
 
 _FEW, _MORE = 200, 2000
-"""Robots that are computed to know the rest of them."""
-_SECONDS_PER_ROBOT, _SECONDS_PER_PLACE = 0.5, 10.0
-"""Of a model that solves for the flow, and of a place of one that solves for the walls, too: processor time, measured
-for the paper's robot, with the second resolution for the error estimate."""
+"""Robots that are computed to know the memory of the rest of them."""
 _SOLVING_MEMORY = 5e8
 """Of a solve of body and walls, bytes; measured for the paper's robot."""
 
 
+_ROUNDS, _LEAST_TIME = 3, 2.0
+"""Regions of every process behind its first one, and time in s, from which a pace is taken."""
+
+
+class Pace:
+    """The time that a study takes as a whole, from when its regions are done."""
+
+    def __init__(self, robots: int, workers: int, clock: Callable[[], float] = monotonic) -> None:
+        """The study begins.
+
+        Args:
+            robots: number of robots to compute.
+            workers: number of processes.
+            clock: time, s.
+        """
+        self._robots, self._workers, self._clock = robots, workers, clock
+        self._start = self._from = clock()
+        self._regions = self._done = self._before = 0
+
+    def seconds(self, robots: int) -> float | None:
+        """Take note of a region that is done, and return the time from begin to end, s; None: not known yet.
+
+        The first region of every process is left out of the pace: before it, the process loads what it needs.
+
+        Args:
+            robots: number of robots of the region.
+        """
+        now = self._clock()
+        self._regions, self._done = self._regions + 1, self._done + robots
+        if self._regions == self._workers:
+            self._from, self._before = now, self._done
+        if self._regions < (1 + _ROUNDS) * self._workers or now - self._from < _LEAST_TIME:
+            return None
+        rate = (self._done - self._before) / (now - self._from)
+        return now - self._start + (self._robots - self._done) / rate
+
+
 class Estimate(NamedTuple):
-    """What a study will take."""
+    """What a study takes beside its time."""
 
     results: int
-    seconds: float
-    """Of all its workers together, over their number."""
     memory: float
     """Most that all processes of this machine take together, bytes."""
     disk: float
     """Of the results before compression, bytes."""
     workers: int
 
-    @property
-    def words(self) -> str:
-        """The estimate in a line."""
+    def words(self, seconds: float) -> str:
+        """Return the estimate in a line.
+
+        Args:
+            seconds: time that the study takes, s.
+        """
         return (
-            f"{ESTIMATE}{self.results} results, about {_duration(self.seconds)} with {self.workers} "
+            f"{ESTIMATE}{self.results} results, about {_duration(seconds)} with {self.workers} "
             f"worker{'' if self.workers == 1 else 's'}, {self.memory / 1e6:.0f} MB of memory here, at most "
             f"{self.disk / 1e6:.0f} MB on disk"
         )
@@ -66,7 +102,6 @@ def is_large(loaded: LoadedStudy) -> bool:
 
 
 class _Cost(NamedTuple):
-    seconds: float
     memory: float
     encoded: float
     """Size of a region's files, bytes."""
@@ -82,14 +117,13 @@ def estimate_of(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan
         missing: number of regions that are to be computed.
         crew: who computes.
     """
-    cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0, 0.0)
+    cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0)
     workers, base = crew.size, memory_in_use()
     alone = crew.cluster is None and (workers == 1 or missing < 2)
     here = base + (cost.memory if alone else AHEAD * workers * cost.encoded)
     others = 0 if alone or crew.cluster is not None else min(workers, missing)
     return Estimate(
         results=loaded.study.size,
-        seconds=missing * cost.seconds / workers,
         memory=here + others * (base + cost.memory),
         disk=plan.bytes_of_results,
         workers=workers,
@@ -97,20 +131,18 @@ def estimate_of(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan
 
 
 def _tried(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan) -> _Cost:
-    """Time and memory of a region of full size."""
+    """Memory of a region of full size."""
     layout = plan.layout
     first = next(layout.regions())
     slow = [name for name in loaded.study.models if not _is_quick(name, loaded)]
     if slow:
-        placed = any(find_swimmer_model(name).placed for name in slow)
-        seconds = len(slow) * first.size * _SECONDS_PER_ROBOT + (_SECONDS_PER_PLACE if placed else 0.0)
         readings = len(loaded.study.friction)
-        return _Cost(seconds, _SOLVING_MEMORY, plan.bytes_of_results / loaded.count / readings * first.size)
+        return _Cost(_SOLVING_MEMORY, plan.bytes_of_results / loaded.count / readings * first.size)
     small, large = (_job(loaded, observed, layout, first, count) for count in (_FEW, _MORE))
-    few = _timed(small)
+    few = _traced(small)
     if large.region.size == small.region.size:
         return few
-    more = _timed(large)
+    more = _traced(large)
     share = (first.size - small.region.size) / (large.region.size - small.region.size)
     return _Cost(*(max(a + (b - a) * share, a) for a, b in zip(few, more, strict=True)))
 
@@ -135,15 +167,12 @@ def _job(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, f
     return RegionJob(next(plan.layout.regions()), own, seen, plan)
 
 
-def _timed(job: RegionJob) -> _Cost:
-    """One region: once to be warm, once for the time, once for the memory."""
+def _traced(job: RegionJob) -> _Cost:
+    """One region: once to load what it needs, once for the memory."""
     encoded_region(job)
-    start = process_time()
-    files = encoded_region(job)
-    seconds = process_time() - start
     tracemalloc.start()
     try:
-        encoded_region(job)
-        return _Cost(seconds, float(tracemalloc.get_traced_memory()[1]), float(sum(map(len, files.values()))))
+        files = encoded_region(job)
+        return _Cost(float(tracemalloc.get_traced_memory()[1]), float(sum(map(len, files.values()))))
     finally:
         tracemalloc.stop()
