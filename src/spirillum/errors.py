@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["InputError", "clipped", "did_you_mean"]
+__all__ = ["TOO_LARGE", "InputError", "clipped", "did_you_mean", "failure_sentence"]
 
 
 _LONGEST = 800
+TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
+"""What is said of a MemoryError."""
 
 
 class InputError(ValueError):
@@ -30,6 +32,21 @@ def _one_line(text: str) -> str:
     """The text in one printable line, whatever a user's file put into it."""
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text[:_LONGEST].split()))
     return line if len(text) <= _LONGEST else f"{line}…"
+
+
+def failure_sentence(error: BaseException) -> str:
+    """Return what a thread or process that goes on tells of an error that ended a piece of its work.
+
+    Args:
+        error: what was raised; what is neither bad input nor want of memory is a fault of the program.
+    """
+    if isinstance(error, InputError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return TOO_LARGE
+    return _one_line(
+        f"a fault of the program ended this request ({type(error).__name__}: {error}); allowed: another one"
+    )
 
 
 def clipped(value: object, longest: int = 60) -> str:

@@ -182,7 +182,7 @@ def _explained(error: BaseException) -> int | None:
     """Say an error that is the user's in a sentence; None for one that is ours."""
     from typer import Abort
 
-    from spirillum.errors import InputError
+    from spirillum.errors import TOO_LARGE, InputError
 
     if isinstance(error, (KeyboardInterrupt, Abort)) or _interrupts:
         kept = str(error) if isinstance(error, Abort) else ""
@@ -190,7 +190,7 @@ def _explained(error: BaseException) -> int | None:
     if isinstance(error, InputError):
         return _fail(str(error), 2)
     if isinstance(error, MemoryError):
-        return _fail("the request does not fit into memory; allowed: a smaller one", 2)
+        return _fail(TOO_LARGE, 2)
     if isinstance(error, OSError) and (sentence := _of_place(error)):
         return _fail(sentence, 2)
     if hasattr(error, "format_message"):  # a usage error of the command-line library

@@ -22,6 +22,7 @@ from spirillum.controllers.run_record import record
 from spirillum.controllers.scores import Scores, scored
 from spirillum.controllers.sensors import Drawn, Senses
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
+from spirillum.costs import check_memory
 from spirillum.dynamics.averages import vertical_drift
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 __all__ = ["Control", "control"]
 
 _MOST_SEEDS = 10_000
+_EVENT = 3000.0
+"""Memory of an event of a run with what the robot did until then, bytes."""
 _LAST_SEED = 2**31 - 1
 _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
 
@@ -166,6 +169,7 @@ def control(
     nominal = plant_of(robot, arguments, Drawn(1.0, 1.0), progress)
     lab, cautions = _without_unknown_flow(lab, nominal.model)
     job = Job(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)
+    _check_memory(job.brief.duration, lab)
     actual, drawn = draw_plant(job)
     learner = Learner(lab, Bank(robot, lab.unknown, arguments, progress)) if learn else None
     pace = _Pace() if live else None
@@ -250,6 +254,13 @@ def _dataset(job: Job, run: LoopRun, plant: Plant) -> xr.Dataset:
         controller=job.controller,
         seed=job.seed,
     )
+
+
+def _check_memory(duration: float, lab: Lab) -> None:
+    """Refuse a run whose record does not fit into memory."""
+    rate = lab.camera.fps + lab.meter.rate + 2.0 / lab.remote.period
+    cause = f"task.duration = {show(duration, 's')} with {rate:.4g} frames, readings, decisions and commands a second"
+    check_memory(cause, duration * rate, "events", _EVENT, "as with a shorter duration or a lower camera.fps")
 
 
 def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapping[str, Any]) -> None:

@@ -145,7 +145,7 @@ class LearnedTube(Corrected):
     name = "tube"
 
     def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        return [*Slender().part_domain(batch, "robot"), *seat_limits(batch, "robot")]
+        return seat_limits(batch, "robot", Slender().part_domain(batch, "robot"))
 
 
 class LearnedSlender(Corrected):

@@ -58,6 +58,8 @@ _STILL = 1e-4
 """Largest change of the wobble from one stretch to the next, rad."""
 _MOST_STRETCHES = 25
 _MOST_RATES = 2000
+_MOST_WORK = 3e7
+"""Turns of all stretches, each over the share of the step-out rate at which it is turned: a quarter of an hour."""
 
 
 class _Mean(NamedTuple):
@@ -123,6 +125,7 @@ def magnetic_sweep(
     if not 4 <= turns <= 1e4:
         raise InputError(f"turns = {turns}; allowed: 4 to 10000")
     asked = _rates(rates, held)
+    _check_work(asked, turns, held.step_out_rate)
     batch = replace(held.batch, options=own.model)
     closed = swim(held.batch.with_values({"magnetic.rotation_rate": asked}), held.model, calibrated=False)
     inertia = _check_stokes(batch, asked, closed.forward_velocity, closed.tail_rotation_rate)
@@ -189,6 +192,21 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
             "rates do not increase in size from above 0 in one sense; allowed: increasing rates, all > 0 or < 0"
         )
     return asked
+
+
+def _check_work(rates: Samples, turns: float, step_out: float) -> None:
+    """Refuse a sweep of hours: what the field aligns within a turn at step-out takes as many steps in any slower one.
+
+    Raises:
+        InputError: for too many turns at too low rates.
+    """
+    slowness = np.maximum(step_out / np.abs(rates), 1.0) if np.isfinite(step_out) else np.ones(rates.size)
+    work = turns * float(np.sum(slowness))
+    if work > _MOST_WORK:
+        raise InputError(
+            f"rates from {show(float(np.abs(rates).min()), 'Hz')} on, {turns:g} turns each, take as long as {work:.2g} "
+            f"turns near step-out ({show(step_out, 'Hz')}); allowed: {_MOST_WORK:.0e}, as with higher or fewer rates"
+        )
 
 
 def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:

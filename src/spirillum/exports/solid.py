@@ -8,12 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.costs import check_memory
 from spirillum.files import MARK
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.surface import Faces, mass_properties
 
 __all__ = ["UnitedBody", "is_watertight", "is_watertight_file", "stl_bytes", "united"]
 
+_TRIANGLE = 900.0
+"""Memory of a triangle while pieces are united, bytes."""
 _MERGED = (1e-6, 1e-5, 1e-4)
 """Edges shorter than this fraction of the robot's length are collapsed, since single precision merges their ends. The
 first value that leaves a watertight body is used."""
@@ -46,10 +49,15 @@ def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
 
     Args:
         pieces: pieces that overlap where they are joined.
+
+    Raises:
+        InputError: for more triangles than fit into memory.
     """
     from manifold3d import Manifold, Mesh64, OpType
 
     chosen = list(pieces)
+    triangles = sum(len(piece.faces) for piece in chosen)
+    check_memory("one closed body", triangles, "triangles", _TRIANGLE, "as with a smaller fineness")
     # Scaled to its own length: a robot of micrometres is then no smaller than one of metres.
     size = float(np.ptp(np.concatenate([piece.vertices for piece in chosen]), axis=0).max())
     solids = [

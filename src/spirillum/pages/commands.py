@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import traceback
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +12,7 @@ from spirillum.errors import InputError, clipped
 from spirillum.robot.load import load
 from spirillum.robot.text import robot_text
 
-__all__ = ["number_of", "refusal_of", "robot_tables", "text_of"]
+__all__ = ["number_of", "refusal_of", "report_fault", "robot_tables", "text_of"]
 
 _SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
 """What a sentence about a field says of where the robot comes from: here it stands at the knob."""
@@ -51,6 +52,16 @@ def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
         raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
     return float(value)
+
+
+def report_fault(error: BaseException) -> None:
+    """Print the traceback of a fault of the program, from a thread or process that goes on; the client gets a sentence.
+
+    Args:
+        error: what was raised; bad input and want of memory are no faults, and a sentence says all of them.
+    """
+    if not isinstance(error, (InputError, MemoryError)):
+        traceback.print_exception(error)
 
 
 def refusal_of(command: Mapping[str, Any], sentence: str) -> str:

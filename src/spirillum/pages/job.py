@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, failure_sentence
+from spirillum.pages.commands import report_fault
 
 __all__ = ["Job", "worker"]
 
@@ -30,7 +31,7 @@ class Job:
             request: what it is asked for, as JSON on its standard input.
             tell: called from a thread when there is progress.
         """
-        self._tell = tell
+        self._tell, self._stopped = tell, False
         self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
         self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments
             [sys.executable, "-m", module],
@@ -53,6 +54,7 @@ class Job:
 
     def stop(self) -> None:
         """Leave off."""
+        self._stopped = True
         self._process.terminate()
 
     def _follow(self, request: str) -> None:
@@ -62,15 +64,19 @@ class Job:
             self._process.stdin.close()
         with self._process.stdout as told:
             for line in told:
-                self._said = json.loads(line)
-                self._tell()
+                with suppress(ValueError):  # what a library prints is no progress
+                    self._said = dict(json.loads(line))
+                    self._tell()
         if self._process.wait() != 0 and "failed" not in self._said:
-            self._said = {"failed": "it was left off"}
+            lost = "the process was ended from outside, as for want of memory; allowed: a smaller request"
+            self._said = {"failed": "it was left off" if self._stopped else lost}
         self._tell()
 
 
 def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
-    """Do what standard input asks for, and tell how it goes; the process ends with 2 where the input was wrong.
+    """Do what standard input asks for, and tell how it goes.
+
+    The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
 
     Args:
         work: called with the request and with what is to be told of progress; what it returns is told at the end.
@@ -89,7 +95,8 @@ def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Map
 
     try:
         found = work(json.loads(sys.stdin.read()), progress)
-    except InputError as error:
-        tell(failed=str(error))
-        sys.exit(2)
+    except Exception as error:  # whoever waits for it is told why it comes to nothing
+        report_fault(error)
+        tell(failed=failure_sentence(error))
+        sys.exit(2 if isinstance(error, (InputError, MemoryError)) else 1)
     tell(done=True, **found)

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, failure_sentence
+from spirillum.pages.commands import report_fault
 from spirillum.pages.flowing import Flowing
 from spirillum.pages.knobs import MODELS, Settings
 from spirillum.pages.numbers import SERIES, quantity_list
@@ -26,6 +27,20 @@ __all__ = ["Built", "Lane", "build"]
 _ONE_TURN = 1.0
 """Changes of one knob within this time are one step of undo, s."""
 _MOST_UNDO = 200
+
+
+_Shape = tuple[Any, dict[str, Any]]
+"""What decides a shape, and the shape."""
+
+
+def _shaped(robot: Robot, before: _Shape | None) -> _Shape:
+    """The shape of a robot; the one before where it is the same.
+
+    Raises:
+        InputError: for a robot with too many triangles.
+    """
+    solid = (robot.body, robot.seal, robot.coupling, robot.tail, robot.channel, robot.motor)
+    return before if before is not None and before[0] == solid else (solid, shape_of(robot))
 
 
 @dataclass(frozen=True)
@@ -96,7 +111,7 @@ class Lane:
     _undo: list[Settings] = field(default_factory=list)
     _redo: list[Settings] = field(default_factory=list)
     _last: tuple[str, float] = ("", 0.0)
-    _shape: tuple[Any, dict[str, Any]] | None = None
+    _shape: _Shape | None = None
 
     @classmethod
     def of(cls, source: Any) -> Lane:
@@ -202,8 +217,9 @@ class Lane:
         duty = self.duty if self.remote else 0.0
         try:
             self.moment = self.built.plant.step(dt, duty=duty)
-        except InputError as error:
-            self.trouble = str(error)
+        except Exception as error:  # the other robots swim on
+            report_fault(error)
+            self.trouble = failure_sentence(error)
             return
         self.recording.add(self.moment, duty)
 
@@ -226,6 +242,7 @@ class Lane:
     def _become(self, settings: Settings, name: str) -> None:
         robot = settings.robot()
         settings.placement()
+        self._shape = _shaped(robot, self._shape)
         self._remember(self.settings, name)
         self.settings, self.robot = settings, robot
         self.start_anew()
@@ -253,10 +270,7 @@ class Lane:
 
     def scene(self) -> dict[str, Any]:
         """What changes when something is set: shape, knobs, model, prediction."""
-        robot = self.robot
-        solid = (robot.body, robot.seal, robot.coupling, robot.tail, robot.channel, robot.motor)
-        if self._shape is None or self._shape[0] != solid:
-            self._shape = (solid, shape_of(robot))
+        self._shape = _shaped(self.robot, self._shape)
         built = self.built
         return {
             "robot": self.robot.name,

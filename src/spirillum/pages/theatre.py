@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from spirillum.errors import InputError
-from spirillum.pages.commands import number_of, refusal_of, robot_tables, text_of
+from spirillum.errors import InputError, failure_sentence
+from spirillum.pages.commands import number_of, refusal_of, report_fault, robot_tables, text_of
 from spirillum.pages.knobs import Settings
 from spirillum.pages.lane import Built, Lane, build
 from spirillum.pages.numbers import prediction_answer, quantity_list
@@ -27,6 +27,8 @@ _LATE = 1.0
 """Time by which the run may fall behind before it no longer tries to catch up, s."""
 SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
 _MOST_WAITING = 2_000
+_PAUSE = 0.2
+"""Rest of the thread of the simulation after a fault, s."""
 
 Command = tuple[Mapping[str, Any], Callable[[str], None]]
 """What a client asks for, and where to say why not."""
@@ -144,17 +146,26 @@ class Theatre:
             self._want(index)
         last = time.perf_counter()
         while not self._ending.is_set():
-            moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
-            changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
-            now = time.perf_counter()
-            if moving and now - last >= 0.9 / RATE:
-                self._advance(now - last)
-                last = now
-                changed = True
-            elif not moving:
-                last = now
-            if changed:
-                self._tell_frame()
+            try:
+                last = self._go_on(last)
+            except Exception as error:  # the thread lives on, whatever a robot meets
+                report_fault(error)
+                self._ending.wait(_PAUSE)
+
+    def _go_on(self, last: float) -> float:
+        """Listen, move and tell once; the time of the last motion, which is returned."""
+        moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
+        changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
+        now = time.perf_counter()
+        if moving and now - last >= 0.9 / RATE:
+            self._advance(now - last)
+            last = now
+            changed = True
+        elif not moving:
+            last = now
+        if changed:
+            self._tell_frame()
+        return last
 
     def _moves(self, lane: Lane) -> bool:
         return lane.built is not None and not lane.trouble and not (lane.moment and lane.moment.ended)
@@ -185,8 +196,9 @@ class Theatre:
             try:
                 with self._lock:
                     self._do(command)
-            except InputError as error:
-                refuse(refusal_of(command, str(error)))
+            except Exception as error:  # the thread lives on, whatever a command meets
+                report_fault(error)
+                refuse(refusal_of(command, failure_sentence(error)))
             changed = True
             try:
                 item = self._inbox.get_nowait()
@@ -307,8 +319,9 @@ class Theatre:
                     self._built.put((index, *asked, built, None, ""))
                     self._wake_up()
                 self._built.put((index, *asked, None, self._numbers(predicted, settings, model), ""))
-            except InputError as error:
-                self._built.put((index, *asked, None, None, str(error)))
+            except Exception as error:  # the thread lives on, whatever a robot's numbers meet
+                report_fault(error)
+                self._built.put((index, *asked, None, None, failure_sentence(error)))
             self._wake_up()
 
     def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:

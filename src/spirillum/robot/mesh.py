@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.costs import check_memory
 from spirillum.errors import InputError
 from spirillum.robot.geometry import Centreline, centreline
 from spirillum.robot.links import outlines_of
@@ -52,6 +53,8 @@ COLOURS: dict[str, Colour] = {
 _AROUND_BODY, _AROUND_WIRE, _PER_TURN = 96, 24, 48
 """Sides of a body and of a wire, and points along a turn of the tail, at fineness 1."""
 _FINENESS = (0.1, 20.0)
+_TRIANGLE = 400.0
+"""Memory of a triangle with its share of vertices and colours, and while it is written, bytes."""
 _ROOT = 0.2
 """Fraction of the tail's length within which a sharp bend belongs to the root."""
 _SHARPEST = 0.9
@@ -117,7 +120,8 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
         fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
 
     Raises:
-        InputError: if the fineness is out of range, or the seal longer than the body behind its nose.
+        InputError: if the fineness is out of range, the seal longer than the body behind its nose, or a piece has more
+            triangles than fit into memory.
     """
     fineness = _checked_fineness(fineness)
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
@@ -129,6 +133,13 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
         turned = surface._replace(vertices=surface.vertices @ turn.T)
         pieces.append(_piece(name, "rotor", turned, (name,), (COLOURS[name],)))
     return tuple(pieces)
+
+
+def _check_triangles(cause: str, rings: int, around: int) -> None:
+    """Refuse a surface of rings of so many vertices that does not fit into memory."""
+    check_memory(
+        cause, 2.0 * rings * around, "triangles", _TRIANGLE, "as with a smaller fineness or a longer wavelength"
+    )
 
 
 def _checked_fineness(fineness: float) -> float:
@@ -223,6 +234,8 @@ def _rotor(
     wire = tail_line(robot, fineness=fineness)
     if np.linalg.norm(wire.points[0] - root) > 1e-9 * radius:
         found.append(("arm", rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)))
+    turns = robot.tail.length / robot.tail.wavelength
+    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", len(wire.points), sides)
     found.append(("tail", swept(wire.points, wire.tangents, radius, sides)))
     return found
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from spirillum.arrays import Samples
+from spirillum.costs import check_memory
 from spirillum.robot.outline import Arc, Line, Outline
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ Faces: TypeAlias = Int[_Integers, "..."]
 """Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
 
 _LEAST_AROUND = 3
+_SHADED = 2100.0
+"""Memory of a triangle while its normals are averaged with its neighbours', bytes."""
 
 
 class Surface(NamedTuple):
@@ -238,7 +241,11 @@ def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
         vertices: (n, 3).
         faces: outward oriented, (m, 3).
         crease: the angle, rad.
+
+    Raises:
+        InputError: for more triangles than fit into memory.
     """
+    check_memory("smooth shading", len(faces), "triangles", _SHADED, "as with a smaller fineness")
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     area: Samples = np.cross(b - a, c - a)
     unit = _unit_or_zero(area)

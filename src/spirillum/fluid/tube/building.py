@@ -33,6 +33,7 @@ from spirillum.fluid.tube.rest import (
 )
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.tube import check_solvable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.film_table import film_at
@@ -63,12 +64,15 @@ def built_tables(
         progress: told what is being solved, how much is done, and of how much.
 
     Raises:
-        InputError: for a robot without a table, such as one whose tail is wider than its body.
+        InputError: for a robot without a table, such as one whose tail is wider than its body, or whose flow does not
+            fit into memory.
         KeyboardInterrupt: if it was interrupted; says how many places are kept.
     """
     every = [Places(geometry, radius) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
     wanted = [place for some in nodes for place in some]
+    for places, some in zip(every, nodes, strict=True):
+        _check_memory(places.geometry, some)
     if progress is not None:
         count, kept = _solved_before(wanted)
         progress(announcement(count, workers, kept), 0, count)
@@ -120,6 +124,17 @@ def _nodes(places: Places) -> list[Solution]:
         Solution((tail(place), mirrored(*tail(place))), place.seat, fineness_at(place.seat)) for place in _yawed(places)
     ]
     return level + yawed
+
+
+def _check_memory(geometry: RobotGeometry, nodes: Sequence[Solution]) -> None:
+    """Refuse a table for whose nodes the memory does not suffice, before the first is solved for.
+
+    The level node of each gap stands for the tilted ones with it, and the first with yaw, nearest to the glass, for all
+    with yaw.
+    """
+    level = [node for node in nodes if node.seat.level]
+    for node in (*level, *[node for node in nodes if node.seat.yaw][:1]):
+        check_solvable(geometry, node.seat, node.fineness)
 
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -82,24 +83,34 @@ class _Films(NamedTuple):
 
 
 def seat_limits(
-    batch: RobotBatch, part: str, *, thinnest_gap: float = _THINNEST_GAP, wire_film: float = WIRE_FILM
+    batch: RobotBatch,
+    part: str,
+    kept: Sequence[Limit],
+    *,
+    thinnest_gap: float = _THINNEST_GAP,
+    wire_film: float = WIRE_FILM,
 ) -> list[Limit]:
-    """Requirements on the seat in the tube for one of `PIECES`; robots that cannot be built are left out.
+    """Requirements on the seat in the tube for one of `PIECES`, after those that do not depend on it.
+
+    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine
+    for the memory.
 
     Args:
         batch: the robots.
         part: one of `PIECES`.
+        kept: what the robots have to fulfil in unbounded fluid, the number of stations along the tail among it.
         thinnest_gap: least gap under the body, over its diameter.
         wire_film: least film between wire and wall, over the wire's radius.
     """
     fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
     through = f"the tail would pass through the wall ({fields})"
     resolved = f"the film under the wire is resolved down to {wire_film:g} of its radius, and below 0 "
-    films = _films(batch, part, thinnest_gap)
+    films = _films(batch, part, kept, thinnest_gap)
     turned = _turned(batch)
     open_ended = batch.placement.ends == "open"
     thinnest = thinnest_gap * batch.body_diameter
     return [
+        *kept,
         Limit.of(
             "there is no [channel]: channel.diameter",
             batch.channel_diameter,
@@ -175,10 +186,10 @@ def _turned(batch: RobotBatch) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _films(batch: RobotBatch, part: str, thinnest_gap: float) -> _Films:
+def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: float) -> _Films:
     asked, largest, coupling, tail = (np.full(batch.size, np.inf) for _ in range(4))
     where = ""
-    for index in within(batch):
+    for index in within(batch, kept):
         g, radius = RobotGeometry.of(batch, index), tube_radius(batch, index)
         if not np.isfinite(radius):
             continue

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.costs import check_memory
 from spirillum.fluid.tube.level_rings import LevelRings
 from spirillum.fluid.tube.rings import Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
@@ -27,7 +28,7 @@ from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
-__all__ = ["MOTIONS", "Fineness", "Solids"]
+__all__ = ["MOTIONS", "Fineness", "Solids", "check_fits"]
 
 MOTIONS = 13
 """Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, held back."""
@@ -111,6 +112,17 @@ class Solids:
     def size(self) -> int:
         """Number of unknowns of each parity."""
         return 0 if self.none else int(3 * self.counts.sum())
+
+    @cached_property
+    def memory(self) -> float:
+        """Memory that the equations with their waves take, bytes, estimated before any of it is taken."""
+        if self.none:
+            return 0.0
+        rows, waves, modes = 3.0 * self.panels.size, self.waves(self.gap).k.size, self.modes
+        factors = (4.0 if self.seat.yaw else 2.0) * float(self.size) ** 2  # one system of both families, or two
+        free = modes * rows**2
+        level = waves * (12.0 * modes * rows + 2.0 * (3.0 * modes) ** 2) if self.seat.level else 0.0
+        return 8.0 * (factors + free + level)
 
     @cached_property
     def gap(self) -> float:
@@ -198,6 +210,7 @@ class Solids:
             factors: tuple[Samples, np.ndarray] = lu_factor(matrix, overwrite_a=True, check_finite=False)
             return factors
 
+        check_fits(self.memory)
         with one_thread():
             sizes = [sum(family.dual.size for family in system) for system in self.systems]
             matrices = [np.zeros((size, size), order="F") for size in sizes]
@@ -261,6 +274,19 @@ class Solids:
             axis=0,
         )
         return total
+
+
+def check_fits(memory: float) -> None:
+    """Refuse solids whose equations do not fit.
+
+    Args:
+        memory: see `Solids.memory`.
+
+    Raises:
+        InputError: if they do not.
+    """
+    cause = "the flow in the tube at this gap and tolerance (placement.gap, channel.diameter, body.length)"
+    check_memory(cause, memory / 2**30, "GiB of equations", 2.0**30, "as with a wider gap or a narrower channel")
 
 
 def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples) -> np.ndarray:

@@ -117,8 +117,8 @@ class TabledTube(Tube):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        seats = seat_limits(batch, part, thinnest_gap=THINNEST_GAP, wire_film=0.0)
-        return [*Slender().part_domain(batch, part), *seats]
+        unbounded = Slender().part_domain(batch, part)
+        return seat_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)

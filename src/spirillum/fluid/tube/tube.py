@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.costs import MOST_MEMORY
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
@@ -29,7 +30,7 @@ from spirillum.fluid.stated import CHECKED, said_of_tail, what_is_fitted
 from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
-from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids
+from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
 from spirillum.fluid.wire.stokeslets import Wire
@@ -39,7 +40,7 @@ from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
-__all__ = ["END_LOSS", "Tube", "held_robot", "solved", "solved_together"]
+__all__ = ["END_LOSS", "Tube", "check_solvable", "held_robot", "solved", "solved_together"]
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -94,6 +95,12 @@ def _waves(key: _SolidKey) -> int:
     """Number of waves between solids and wall."""
     solids = Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
     return 0 if solids.none else sum(solids.waves(solids.gap).orders)
+
+
+@lru_cache(maxsize=4096)
+def _memory(key: _SolidKey) -> float:
+    """See `Solids.memory`."""
+    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3)).memory
 
 
 def _turned(wire: Wire, phase: float) -> Wire:
@@ -180,6 +187,20 @@ def solved_together(
     return found
 
 
+def check_solvable(geometry: RobotGeometry, seat: Seat, fineness: Fineness) -> None:
+    """Refuse a place at which the flow around a whole robot does not fit into memory.
+
+    Args:
+        geometry: of the robot.
+        seat: where it is.
+        fineness: how finely the flow is resolved.
+
+    Raises:
+        InputError: if it does not.
+    """
+    check_fits(_memory(_solid_key(geometry, "robot", seat, fineness)))
+
+
 def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux.
 
@@ -250,19 +271,22 @@ class Tube(SwimmerModel):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        limits = [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
-        unknowns, waves = np.zeros(batch.size), np.zeros(batch.size)
+        limits = seat_limits(batch, part, Slender().part_domain(batch, part))
+        unknowns, waves, memory = np.zeros((3, batch.size))
         for index in within(batch, limits):
             g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
             key = _solid_key(g, part, seat, self.fineness(batch.options))
             unknowns[index] = _size(key)
             if unknowns[index] <= _MOST_UNKNOWNS:
                 waves[index] = _waves(key)
+                if waves[index] <= _MOST_WAVES:
+                    memory[index] = _memory(key) / 2**30
         name, why = (
             "that gap and tolerance ask for",
             "a wider placement.gap, a larger model.tube.tolerance or a narrower",
         )
-        asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES))
+        gibibytes = "GiB of memory", memory, MOST_MEMORY / 2**30
+        asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES), gibibytes)
         return limits + [
             Limit.of(f"{what} {name}", count, "at most", float(most), "1", f"{why} channel needs fewer", "gap-too-thin")
             for what, count, most in asked

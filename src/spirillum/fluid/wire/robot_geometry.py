@@ -8,15 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import PerRobot
-from spirillum.fluid.wire.stokeslets import Wire, stations_along
+from spirillum.costs import check_memory
+from spirillum.fluid.wire.stokeslets import Wire, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.parts import End, Shape
+from spirillum.units import show
 
 __all__ = ["PIECES", "RobotGeometry", "number_of"]
 
 _POINTS_PER_TURN = 200
+_STATION = 20_000.0
+"""Memory of a station while clearances over a turn are sought, bytes."""
 PIECES = {
     "body": ("body",),
     "coupling": ("coupling",),
@@ -83,6 +87,9 @@ class RobotGeometry(NamedTuple):
 
         Args:
             spacing: of the stations, relative to the standard one.
+
+        Raises:
+            InputError: for more stations than fit into memory; models refuse far fewer, see their domains.
         """
         return _wire(self, spacing)
 
@@ -90,6 +97,10 @@ class RobotGeometry(NamedTuple):
 @lru_cache(maxsize=64)
 def _wire(g: RobotGeometry, spacing: float) -> Wire:
     turns = g.tail_length / g.wavelength
+    length = g.tail_length * np.hypot(1.0, 2.0 * np.pi * g.amplitude / g.wavelength) + g.amplitude
+    stations = float(station_count(np.array([length]), np.array([0.5 * g.wire_diameter]))[0]) / spacing
+    cause = f"tail.wire_diameter = {show(g.wire_diameter, 'mm')}"
+    check_memory(cause, stations, "stations along the tail", _STATION, "as with a thicker wire")
     count = int(np.ceil(_POINTS_PER_TURN * turns)) + 400
     share = np.linspace(0.0, 1.0, count)
     xi = g.tail_length * share

@@ -1,0 +1,87 @@
+"""The threads of the page: what one robot's numbers meet is told, and the next robot is answered for."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from spirillum.pages import theatre as module
+from spirillum.pages.lane import Lane
+from spirillum.pages.theatre import Theatre
+
+pytest.importorskip("aiohttp", reason="the page is an extra")
+
+
+@pytest.fixture
+def theatre() -> Iterator[Theatre]:
+    found = Theatre("ecoli", lambda: None)
+    yield found
+    found.stop()
+
+
+def lane_of(theatre: Theatre) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(theatre.scene)["lanes"][0]
+    return found
+
+
+def until(true: Callable[[], Any], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(MemoryError(), "does not fit into memory; allowed: a smaller one"), (RuntimeError("odd"), "RuntimeError: odd")],
+)
+def test_numbers_go_on_after_any_exception(
+    theatre: Theatre, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+) -> None:
+    honest = module.build
+
+    def failing(*arguments: Any) -> Any:
+        monkeypatch.setattr(module, "build", honest)
+        raise error
+
+    monkeypatch.setattr(module, "build", failing)
+    theatre.start()
+    until(lambda: said in lane_of(theatre)["trouble"])
+    theatre.ask({"do": "restart"}, lambda _text: None)
+    until(lambda: lane_of(theatre)["numbers"] and not lane_of(theatre)["trouble"])
+    assert lane_of(theatre)["swims_by"] == "slender"
+
+
+def test_motion_goes_on_after_any_exception(theatre: Theatre, monkeypatch: pytest.MonkeyPatch) -> None:
+    honest, refused = Lane.set, list[str]()
+
+    def failing(self: Lane, name: str, value: str) -> None:
+        monkeypatch.setattr(Lane, "set", honest)
+        raise MemoryError
+
+    monkeypatch.setattr(Lane, "set", failing)
+    theatre.start()
+    theatre.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
+    until(lambda: refused)
+    assert "does not fit into memory" in json.loads(refused[0])["sentence"]
+    theatre.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
+    until(lambda: lane_of(theatre)["undo"] == 1)
+    assert len(refused) == 1
+
+
+def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: Theatre) -> None:
+    """One message each; the first once took gigabytes, and the page's numbers for good."""
+    refused = list[str]()
+    theatre.start()
+    theatre.ask({"do": "set", "field": "tail.wire_diameter", "value": "1 nm"}, refused.append)
+    until(lambda: "stations along the tail" in lane_of(theatre)["trouble"])
+    theatre.ask({"do": "undo"}, refused.append)
+    until(lambda: lane_of(theatre)["swims_by"])
+    coil = {"do": "set", "field": "tail.wavelength", "value": "7.2 nm"}
+    theatre.ask(coil, refused.append)
+    until(lambda: refused or lane_of(theatre)["trouble"])
+    theatre.ask({"do": "preset", "value": "ecoli"}, refused.append)
+    until(lambda: lane_of(theatre)["swims_by"] and lane_of(theatre)["numbers"])
