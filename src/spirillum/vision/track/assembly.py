@@ -127,7 +127,7 @@ def track_of(
         *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
-        *stands_flag(motion, pixel),
+        *(() if known.stands else stands_flag(motion, pixel)),
     )
     return Track(
         time=time,

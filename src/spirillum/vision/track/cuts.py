@@ -92,7 +92,8 @@ def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | Non
         "without it (start and end of the setup)"
     )
     flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else ())
-    return Hops(*(abs(hop.size) if hop else 0.0 for hop in hops), (flag,))
+    place, body, phase = (abs(hop.size) if hop else 0.0 for hop in hops)
+    return Hops(place, body, phase, (flag,))
 
 
 class Clock(NamedTuple):

@@ -113,7 +113,7 @@ def _brightness(
     columns, rows = np.clip(pixels, (left, top), (right - 1, bottom - 1)).T
     grey = np.median([image[rows, columns].mean(axis=1) for image in images], axis=0).reshape(inside.shape)
     profile = np.median(grey, axis=1)
-    return np.interp(np.arange(along.size), np.flatnonzero(kept), profile[kept])
+    return np.asarray(np.interp(np.arange(along.size), np.flatnonzero(kept), profile[kept]))
 
 
 def _sharp_steps(profile: Samples, wide: int) -> Samples:

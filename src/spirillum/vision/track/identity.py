@@ -41,6 +41,8 @@ class Identified(NamedTuple):
     robot: bool
     """Whether stripes or tail match the robot; both have to where the size is unexpected, the whole tail where the
     contrast is."""
+    stands: bool = False
+    """Whether its stripes were found in the static background, without its tail."""
 
     @property
     def whole(self) -> bool:
@@ -60,7 +62,13 @@ class Identified(NamedTuple):
     def flags(self) -> tuple[Flag, ...]:
         """Warnings on another object, or on a second robot."""
         flags = []
-        if not self.robot:
+        if self.stands:
+            sentence = (
+                "the robot's stripes are in view and stand still, but its tail is not found behind them, so that "
+                "nothing is given: film it while it moves; if it should move, check its motor"
+            )
+            flags.append(Flag("robot-stands-still", sentence, (*EVERYTHING, *LENGTHS[1:])))
+        elif not self.robot:
             sentence = (
                 "stripes and tail do not look like the robot's, and nothing is given: look at the annotated film; "
                 "where the outline is not on the robot, draw a [region] around it; where it is, glare or poor light "
@@ -75,6 +83,12 @@ class Identified(NamedTuple):
             )
             flags.append(Flag("two-robots", sentence, EVERYTHING))
         return tuple(flags)
+
+    @property
+    def stripes_read(self) -> float:
+        """Share of the frames learnt from on which the stripes are read."""
+        seen = self.start.seen
+        return float(np.mean([np.isfinite(self.stripes.read(image, pose)[0]) for image, pose in seen])) if seen else 0.0
 
     def _matches(self, image: np.ndarray, pose: BodyPose) -> bool:
         """Whether stripes or tail match the robot at a pose."""
@@ -101,10 +115,10 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
             return found
     except InputError as error:
         found = error
-    standing = _standing(name, setup, stated, frames, still)
-    if standing is not None:
-        return standing
     half = not isinstance(found, InputError) and found.robot  # its tail does not fit: another size has to fit wholly
+    standing = None if half else _standing(name, setup, stated, frames, still)
+    if standing is not None and standing.robot:
+        return standing
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
         least = FIRST_LOOK.clearness if half else SIZE.clearness
@@ -114,6 +128,8 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
                 other = identified_at(name, setup, resized(stated, about * size), frames, still, about * size)
                 if other.robot and (other.whole or not half):
                     return other
+    if standing is not None:
+        return standing
     if isinstance(found, InputError):
         raise found
     if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
@@ -122,10 +138,10 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
 
 
 def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified | None:
-    """The robot in the static background, with its stripes and its whole tail; None where there is none."""
+    """The robot in the static background; None where its stripes are not there, no `robot` where its tail is not."""
     if not stripes_of(setup, stated.robot):
         return None  # a tail alone may be chance: all frames show the same background
-    nothing = np.zeros_like(still)
+    nothing, striped = np.zeros_like(still), None
     for body in standing_bodies(stated, still):
         with suppress(InputError):
             for some in (frames[:: STANDING.stride], frames):  # what is no robot is found out sooner by few
@@ -135,7 +151,9 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
             else:
                 found.start.body.look_within(stated.bounds)
                 return found
-    return None
+            if striped is None and found.stripes.fits and found.stripes_read > IDENTITY.sure_share:
+                striped = found._replace(robot=False, stands=True)
+    return striped
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
