@@ -17,8 +17,8 @@ from spirillum.formats.h264 import h264_writer
 
 __all__ = ["develop", "setup_text", "truth_of"]
 
-_FEATHER = 16
-"""Pixels over which a window joins the still picture."""
+_FEATHER = 32
+"""Most pixels over which a window joins the still picture, so that the end of its shadow is no edge."""
 _VIGNETTING = 0.12
 _SYNTHETIC = "synthetic: path traced, not a measurement"
 
