@@ -108,7 +108,7 @@ def source_of(
     Raises:
         InputError: for another word, or options that the source does not have.
     """
-    aspect = camera and camera.pixel_aspect_ratio
+    pace, aspect = (None, None) if camera is None else (camera.frames_per_second, camera.pixel_aspect_ratio)
     scheme = word.partition("://")[0].lower() if "://" in word else ""
     device = re.fullmatch(r"camera:(.+)", word) or re.fullmatch(r"/dev/video(\d+)", word)
     if device is None and not (size is None and fps is None):
@@ -129,7 +129,7 @@ def source_of(
         address = scheme + word[len(scheme) :]
         options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
         return Source(_without_secrets(word), "stream", options)
-    video = open_video(word, camera and camera.frames_per_second, aspect)  # says what is wrong with a film
+    video = open_video(word, pace, aspect)  # says what is wrong with a film
     return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
 
 

@@ -139,7 +139,7 @@ def image_stack(path: Path, aspect: float | None) -> ImageSequence:
 
 def _spread(count: int) -> list[int]:
     """Places of some images of all."""
-    return np.unique(np.linspace(0, count - 1, min(count, _FEW)).round().astype(int)).tolist()
+    return [int(place) for place in np.unique(np.linspace(0, count - 1, min(count, _FEW)).round())]
 
 
 def _sequence(

@@ -6,7 +6,6 @@ import sys
 import warnings
 from collections.abc import Iterator
 from io import BytesIO
-from math import inf
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -123,7 +122,8 @@ def eight_bit(image: np.ndarray, bits: int) -> np.ndarray:
     """
     if image.dtype == np.uint8:
         return image
-    return np.minimum(image >> (bits - 8), 255).astype(np.uint8)
+    bright: np.ndarray = np.minimum(image >> (bits - 8), 255)
+    return bright.astype(np.uint8)
 
 
 def read_image(path: Path, *, grey: bool = False, display: Display | None = None) -> np.ndarray | None:
@@ -216,7 +216,7 @@ def _header(stream: BinaryIO | BytesIO, path: Path) -> Header | None:
                 sizes, mode, is_tiff = list(_sizes(image)), image.mode, image.format == "TIFF"
                 densities, orientation = _densities(image), image.getexif().get(_ORIENTATION)
     except Image.DecompressionBombError:
-        sizes, mode, is_tiff, densities, orientation = [(inf, 1)], "L", False, (1.0, 1.0, False), None
+        sizes, mode, is_tiff, densities, orientation = [(MOST_PIXELS + 1, 1)], "L", False, (1.0, 1.0, False), None
     except Exception:  # a damaged file raises whatever the library meets first
         return None
     if max(width * height for width, height in sizes) > MOST_PIXELS:
