@@ -63,12 +63,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _leave_threads(code: int) -> None:
     """Leave without the interpreter's own end where a thread is still at work: in compiled code that would abort it."""
-    others = [thread for thread in threading.enumerate() if thread is not threading.current_thread()]
-    if not any(thread.daemon for thread in others):
+    if not any(thread.daemon for thread in threading.enumerate()):
         return
-    for thread in others:
-        if not thread.daemon:
-            thread.join()
+    threading._shutdown()  # type: ignore[attr-defined]  # noqa: SLF001 - waits for the other threads
     atexit._run_exitfuncs()  # noqa: SLF001 - such as those that remove temporary folders
     for stream in (sys.stdout, sys.stderr):
         _flushed(stream)

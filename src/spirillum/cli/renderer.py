@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import partial
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
 from typing import Any
 
@@ -84,6 +84,14 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
     return nullcontext() if quiet or not console.is_terminal else console.status(what)
 
 
+def _print_line(line: str) -> None:
+    """Print a line on standard error; one that is closed or full changes nothing else."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):
+            sys.stderr.write(f"{line}\n")
+            sys.stderr.flush()
+
+
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar on standard error with the time left, plain lines where it is no terminal; silent for `--json`.
@@ -95,17 +103,17 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     from spirillum.fluid.tube.announced import ANNOUNCED, OF_A_RUN, TILTED
 
     lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, TILTED)
-    console = Console(stderr=True, soft_wrap=True)
     if quiet:
 
         def announce(what: str, _done: int, _total: int) -> None:
             if what.startswith(lines):
-                console.print(what, highlight=False)
+                _print_line(what)
 
         yield announce
         return
+    console = Console(stderr=True, soft_wrap=True)
     if not console.is_terminal:
-        with progress_lines(partial(console.print, highlight=False, markup=False), lines) as told:
+        with progress_lines(_print_line, lines) as told:
             yield told
         return
     from rich.progress import (

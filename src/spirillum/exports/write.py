@@ -165,7 +165,8 @@ def _shape_of(
     still = described or target.suffix == ".glb"
     pieces = robot_mesh(robot, phase=0.0 if still else angle, fineness=fineness)
     beside = {} if resistance is None else sidecar_of(robot, resistance, angle if described else 0.0)
-    solid, cautions = None, []
+    solid: Mapping[str, Any] | None = None
+    cautions: list[str] = []
     if target.suffix == ".stl":
         printable, solid, cautions = printable_solid(robot, pieces, unit)
         contents = {target.name: printable}

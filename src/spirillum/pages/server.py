@@ -58,7 +58,7 @@ class _Guarded:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
-            await self._app(scope, receive, send)
+            await self._answer(scope, receive, send)
             return
         key = self._guard.key
         refused = self._refused(scope)

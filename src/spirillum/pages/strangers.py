@@ -57,7 +57,7 @@ def protocol_for(strangers: Strangers) -> type[asyncio.Protocol]:
         strangers: to whom.
     """
 
-    class Reporting(AutoHTTPProtocol):
+    class Reporting(AutoHTTPProtocol):  # type: ignore[misc, valid-type]  # which one it is follows from what is installed
         def connection_made(self, transport: Any) -> None:
             super().connection_made(transport)
             strangers.greet(transport)

@@ -299,8 +299,8 @@ class Theatre:
         self._asked[index:] = [lane.revision]
         with self._work:
             known = "" if lane.built is None else lane.built.model
-            asked = lane.generation, lane.revision
-            self._wanted[index] = (*asked, known, lane.settings, lane.robot, lane.predicted())
+            robots = lane.robot, lane.predicted()
+            self._wanted[index] = (lane.generation, lane.revision, known, lane.settings, *robots)
             self._work.notify()
 
     def _build(self) -> None:
@@ -311,17 +311,17 @@ class Theatre:
                 if self._ending.is_set():
                     return
                 index = next(iter(self._wanted))
-                *asked, model, settings, robot, predicted = self._wanted.pop(index)
+                generation, revision, model, settings, robot, predicted = self._wanted.pop(index)
             try:
                 if not model:
                     built = build(settings, robot)
                     model = built.model
-                    self._built.put((index, *asked, built, None, ""))
+                    self._built.put((index, generation, revision, built, None, ""))
                     self._wake_up()
-                self._built.put((index, *asked, None, self._numbers(predicted, settings, model), ""))
+                self._built.put((index, generation, revision, None, self._numbers(predicted, settings, model), ""))
             except Exception as error:  # the thread lives on, whatever a robot's numbers meet
                 report_fault(error)
-                self._built.put((index, *asked, None, None, failure_sentence(error)))
+                self._built.put((index, generation, revision, None, None, failure_sentence(error)))
             self._wake_up()
 
     def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:

@@ -74,10 +74,11 @@ class Options(Section):
         return checked
 
 
-def _with_note(problem: str, units: Mapping[str, str]) -> str:
+def _with_note(problem: str, units: Mapping[str, str | None]) -> str:
     """A problem; where a text has no unit, with what a float means in its field."""
     field = problem.partition(" ")[0].rpartition(".")[2]
-    return f"{problem}{float_note(units[field])}" if " has no unit; " in problem and field in units else problem
+    unit = units.get(field)
+    return f"{problem}{float_note(unit)}" if unit is not None and " has no unit; " in problem else problem
 
 
 def _with_unit(value: Any, unit: str | None) -> Any:
