@@ -147,7 +147,7 @@ def export(
     wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
         raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")
-    if model not in (None, "slender") and not wanted:
+    if model is not None and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
     return _shape_of(load(robot), target, angle, fineness, unit or "mm", (model or "slender") if wanted else None)
 

@@ -123,6 +123,16 @@ class ModelOptions(Section):
     tube: TubeOptions = TubeOptions()
     """Resolved tail and body in their tube."""
 
+    @property
+    def resolution(self) -> str:
+        """The first option that asks for a resolution of `tube` which no table has, with its value; empty for none."""
+        usual = ModelOptions()
+        for section, name in (("slender", "accuracy"), ("tube", "tolerance"), ("tube", "phases")):
+            value = getattr(getattr(self, section), name)
+            if value != getattr(getattr(usual, section), name):
+                return f"model.{section}.{name} = {value!r}"
+        return ""
+
 
 class Resolution(Options):
     """Numerical resolution of the models `slender` and `tube`; None keeps the robot's own option."""
