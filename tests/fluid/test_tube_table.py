@@ -379,9 +379,11 @@ def test_a_table_is_written_and_read(
         40,
         300.0,
     )
+    assert table.wire is None
+    table = replace(table, wire=0.0123)
     table.write(tmp_path / "robot.table")
     read = TubeTable.read(tmp_path / "robot.table")
-    assert (read.geometry, read.radius, read.key) == (geometry, R, table.key)
+    assert (read.geometry, read.radius, read.key, read.wire) == (geometry, R, table.key, 0.0123)
     assert (read.error_at(0.1)["sideways_force"], read.error_at(0.0)["sideways_force"]) == (0.004, 0.002)
     for offset, pitch in ((0.0101, 0.01), (0.003, -0.05), (0.0, 0.0)):
         kept, made = read.at(offset, pitch, 0.0, 0.4)[0], table.at(offset, pitch, 0.0, 0.4)[0]

@@ -196,10 +196,10 @@ def test_error_estimate(robot: Any) -> None:
 
 
 def test_error_estimate_holds_what_few_phases_miss(robot: Any) -> None:
-    """The second harmonic of the tail's phase stays in a mean over two of them."""
+    """The second harmonic of the tail's phase stays in a mean over two of them; what wires cost is in both errors."""
     few, many = (predicted(robot, resolution={"tolerance": 0.05, "phases": phases}) for phases in (2, 5))
     missed = abs(few.forward_velocity / many.forward_velocity - 1.0)
-    assert 5 * many.error_estimate < missed < few.error_estimate
+    assert missed < few.error_estimate - many.error_estimate
 
 
 def test_placement_of_an_answer() -> None:

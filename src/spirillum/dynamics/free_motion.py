@@ -175,7 +175,7 @@ def free_motion(
         *stuck,
     )
     known = lies and checked.known and not stuck
-    error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
+    error = table.speed_error_at(run.lying.yaw) if known else float("nan")
     error = in_stokes_flow(error, *limits)
     acts = friction_acts(held.friction, held.tail_rate)
     source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)

@@ -92,7 +92,7 @@ def run_in_tube(
         turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
         contact_force=float(dataset["contact_force"][-1]),
     )
-    error = in_stokes_flow(table.error["forward_velocity"], *limits)
+    error = in_stokes_flow(table.speed_error_at(1.0), *limits)
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
         warnings="\n".join(said),

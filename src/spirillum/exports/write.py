@@ -149,7 +149,7 @@ def export(
         raise InputError(
             f"unit = {unit!r} for {target.suffix}; allowed: mm, um or m, only for .stl (the others are in m)"
         )
-    if model not in (None, "slender") and not wanted:
+    if model is not None and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
     return _shape_of(load(robot), target, angle, fineness, unit, (model or "slender") if wanted else None)
 

@@ -106,15 +106,20 @@ class SwimmerModel(ResistanceModel):
     known_speed_error: ClassVar[float | None] = None
     """Relative error of the speed of a reference robot, see `docs/accuracy.md`; None where none is known."""
 
-    def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
-        """This model at another resolution: the relative difference of the forward velocities is the error estimate.
+    def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
+        """This model at other resolutions, each of which differs from the one before in one respect.
 
-        None for a model in closed form, which has a known error only.
+        The error estimate is the sum of the relative differences of the forward velocities from this model's on, and of
+        `unchecked_error`. None for a model in closed form, which has a known error only, and for tables.
         """
-        return None
+        return ()
+
+    def unchecked_error(self, batch: RobotBatch) -> float:
+        """Relative error of the forward velocity that the models of `checked_by` share, as far as it is known."""
+        return 0.0
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
-        """Relative error of the forward velocity at these places, known from a check; NaN without one."""
+        """Relative error of the forward velocity at these places: the sum of what is known; NaN without a check."""
         return float("nan")
 
     @abstractmethod

@@ -11,7 +11,6 @@ from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.slender import Slender
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
-from spirillum.robot.options import SlenderOptions, TubeOptions
 from spirillum.robot.placement import Placement
 
 __all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model", "quickest"]
@@ -53,15 +52,18 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
     """The form of a model that answers first: `tube` from tables where they are, unless a resolution is asked for.
 
     Raises:
-        InputError: where `model.tube.form` asks for a table that is not there.
+        InputError: where `model.tube.form` asks for a table that is not there, or for one with a resolution.
     """
-    options, own = batch.options.tube, batch.options.slender.accuracy
+    options = batch.options.tube
     if not isinstance(model, Tube) or options.form == "direct":
         return model
     from spirillum.fluid.tube.tabled import tabled
 
-    resolved = options != TubeOptions(form=options.form) or own != SlenderOptions().accuracy
-    found = None if resolved and options.form == "auto" else tabled(batch)
+    resolved = batch.options.resolution
+    if resolved and options.form == "table":
+        allowed = "allowed: form 'direct' or 'auto'"
+        raise InputError(f"{resolved} with model.tube.form = 'table', which has its own resolution; {allowed}")
+    found = None if resolved else tabled(batch)
     if found is None and options.form == "table":
         raise InputError(
             "model.tube.form = 'table': there is no table of this robot in this tube that holds at this place; "

@@ -176,16 +176,25 @@ def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelen
 def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None, *models: str) -> Robot:
     """The robot with another resolution of the models `slender` and `tube`.
 
+    A table has its own: with an accuracy, a tolerance or a number of phases, whatever their values, `tube` solves for
+    the flow.
+
     Args:
         robot: a checked robot.
         resolution: fields of `Resolution` that replace the robot's own.
         models: the models that will be asked; none: any.
 
     Raises:
-        InputError: for a wrong value, or a field that none of the models reads.
+        InputError: for a wrong value, a field that none of the models reads, or one beside the form `table`.
     """
     options = robot.model
-    for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
+    given = Resolution.of(resolution).model_dump(exclude_none=True)
+    resolved = next((name for name in given if name != "form"), "")
+    in_tube = not models or "tube" in models
+    if resolved and in_tube and given.get("form", options.tube.form) == "table":
+        said = f"{resolved} = {given[resolved]!r} with form = 'table', which has its own"
+        raise InputError(f"{said}; allowed: form 'direct' or 'auto'")
+    for name, value in given.items():
         section, readers = ("slender", ("slender", "tube")) if name == "accuracy" else ("tube", ("tube",))
         if models and not set(models) & set(readers):
             asked = f"model{'s' if len(models) > 1 else ''} {' and '.join(repr(model) for model in models)}"
@@ -193,6 +202,8 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
             raise InputError(f"{name} = {value!r} with {asked}; allowed: only with model {allowed}")
         changed = getattr(options, section).model_copy(update={name: value})
         options = options.model_copy(update={section: changed})
+    if resolved and in_tube and not options.resolution:  # that of tables, asked for
+        options = options.model_copy(update={"tube": options.tube.model_copy(update={"form": "direct"})})
     return robot.model_copy(update={"model": options})
 
 

@@ -125,6 +125,16 @@ class ModelOptions(Section):
     beyond_stokes: Switch = False
     """Answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong."""
 
+    @property
+    def resolution(self) -> str:
+        """The first option that asks for a resolution of `tube` which no table has, with its value; empty for none."""
+        usual = ModelOptions()
+        for section, name in (("slender", "accuracy"), ("tube", "tolerance"), ("tube", "phases")):
+            value = getattr(getattr(self, section), name)
+            if value != getattr(getattr(usual, section), name):
+                return f"model.{section}.{name} = {value!r}"
+        return ""
+
 
 class Resolution(Options):
     """Numerical resolution of the models `slender` and `tube`; None keeps the robot's own option."""

@@ -21,7 +21,7 @@ from spirillum.studies.observed import ObservedArrays
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
-from spirillum.swimming.steady import requirements, swim
+from spirillum.swimming.steady import requirements, speed_error, swim
 
 __all__ = [
     "AT_RATES",
@@ -298,11 +298,9 @@ def _speed_errors(quick: QuickParts, reading: str, found: Swimming) -> PerRobot:
     """Relative error of the forward velocities: against another resolution, or that of a table; NaN where unknown."""
     errors = np.full(found.forward_velocity.size, np.nan)
     for cut, batch, model in quick:
-        check = model.checked_by(batch.options)
-        if check is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                checked = swim(batch, check, friction=reading).forward_velocity
-                errors[cut] = np.abs(checked / found.forward_velocity[cut] - 1.0)
+        checks = [swim(batch, check, friction=reading).forward_velocity for check in model.checked_by(batch)]
+        if checks:
+            errors[cut] = speed_error([found.forward_velocity[cut], *checks], model.unchecked_error(batch))
         elif not model.closed_form:
             errors[cut] = [model.stated_speed_error(block) for _, block in batch.blocks(1)]
     return errors

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -42,7 +42,7 @@ from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
+from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_error
 from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
@@ -68,7 +68,7 @@ class Prediction(Shown):
     swimming: Swimming = field(repr=False)
     """The quantities, as arrays of length one."""
     error_estimate: float
-    """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
+    """Relative error of the forward velocity, the sum of what is known of it; NaN for a model in closed form."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
     intervals: Intervals | None = field(default=None, repr=False)
@@ -283,7 +283,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
         tell(TILTED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
-    check = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
+    checks = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = case.swim(batch)
     if not result.valid[0]:
         raise InputError(case.why_not(result))
@@ -292,7 +292,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         *([choice.caution] if choice.caution else []),
         *case.warnings(result, names_friction=names_friction),
     ]
-    error = case.error_estimate(result, check)
+    error = case.error_estimate(result, checks)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, case.swim, tell) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
@@ -350,19 +350,19 @@ class _Case:
             motion=self.motion,
         )
 
-    def checked(self) -> Swimming | None:
-        """Steady swimming at another resolution, which tells the error; None where the model is checked by none."""
-        other = self.model.checked_by(self.robot.model)
-        return None if other is None else self.swim(self.batch, other)
+    def checked(self) -> list[Swimming]:
+        """Steady swimming at other resolutions, which tell the error; none where the model is checked by none."""
+        return [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
 
-    def error_estimate(self, result: Swimming, check: Swimming | None) -> float:
-        """Relative difference of the forward velocity from another resolution.
+    def error_estimate(self, result: Swimming, checks: Sequence[Swimming]) -> float:
+        """Relative error of the forward velocity: the sum of what is known of it, see `SwimmerModel.checked_by`.
 
         NaN for a model in closed form, and where inertia rules.
         """
-        found = (
-            self.model.stated_speed_error(self.batch) if check is None else float(speed_difference(check, result)[0])
-        )
+        found = self.model.stated_speed_error(self.batch)
+        if checks:
+            speeds = [one.forward_velocity for one in (result, *checks)]
+            found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
         return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
     def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:

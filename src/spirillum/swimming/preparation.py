@@ -192,4 +192,9 @@ def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:
     radius = tube_radius(batch)
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
+    if resolved := batch.options.resolution:
+        raise InputError(
+            f"{resolved} of a robot whose table is asked for, which has its own resolution; allowed: only where the "
+            "flow is solved for (predict, or simulate with motion 'held')"
+        )
     return RobotGeometry.of(batch), radius

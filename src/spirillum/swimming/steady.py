@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from itertools import pairwise
 from typing import NamedTuple, cast, get_args
 
 import numpy as np
@@ -32,7 +33,7 @@ __all__ = [
     "calibrated_resistance",
     "friction_reading",
     "requirements",
-    "speed_difference",
+    "speed_error",
     "swim",
     "swimming_of",
 ]
@@ -147,10 +148,17 @@ def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
         )
 
 
-def speed_difference(check: Swimming, result: Swimming) -> PerRobot:
-    """Relative difference of the forward velocities: the error estimate of a model that `checked_by` another."""
+def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
+    """Relative error of the forward velocities of a model that is checked by others.
+
+    Args:
+        speeds: forward velocities by the model, then by those of `SwimmerModel.checked_by`.
+        unchecked: error that all share, see `SwimmerModel.unchecked_error`.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.abs(check.forward_velocity / result.forward_velocity - 1.0)
+        changes = [np.abs(after / before - 1.0) for before, after in pairwise(speeds)]
+    total: PerRobot = np.sum(changes, axis=0) + unchecked
+    return total
 
 
 def friction_reading(name: str) -> FrictionReading:

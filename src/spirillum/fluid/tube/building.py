@@ -18,7 +18,7 @@ from spirillum.fluid.tube.announced import announcement, kept_after
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
-from spirillum.fluid.tube.responses import RESPONSES, response_errors
+from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.rest import (
     PHASES,
     Progress,
@@ -35,10 +35,12 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.fluid.wire.slender import MOST_STATIONS
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.film_table import film_at
 from spirillum.robot.outline import Outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.placement import Placement
+from spirillum.robot.seat import Seat, gap_of
 
 __all__ = ["HELD_OUT", "built_tables"]
 
@@ -51,6 +53,8 @@ _FAR, _LITTLE_YAWED = 5, 7
 HELD_OUT = 6
 """Places without yaw, and with it, from which a table's errors are stated."""
 _SEED = 20121
+_WIRE_PHASES, _WIRE_TOLERANCE = 3, 0.05
+"""Resolution at which both forms of the wire are compared: their ratio is good to a hundredth of their difference."""
 
 
 def built_tables(
@@ -99,12 +103,27 @@ def _solved_tables(
     held = [(_held_out(places), _held_out(places, yawed=False)) for places in every]
     asked = [place for both in held for some in both for place in some]
     true = iter(solutions(asked, "checking the table", progress, workers))
+    wires = [_wire_error(places, workers) for places in every]
     tables = []
-    for places, some, table, both in zip(every, nodes, packed, held, strict=True):
+    for places, some, table, both, wire in zip(every, nodes, packed, held, wires, strict=True):
         with_yaw, without = (_largest_errors(table, checked, [next(true) for _ in checked]) for checked in both)
         seconds = (time.perf_counter() - start) / len(every)
-        tables.append(TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds))
+        tables.append(TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds, wire))
     return tables
+
+
+def _wire_error(places: Places, workers: int = 1) -> float | None:
+    """Relative difference of the forward velocities with `standard` and `high` wires, level; None for long wires."""
+    g = places.geometry
+    if g.stations > MOST_STATIONS["high"]:
+        return None
+    seat = Seat.at_gap(g.body, places.radius, max(gap_of(Placement(), g.body_diameter, places.radius), places.thinnest))
+    tail, forms = (g, even_phases(_WIRE_PHASES)), ("standard", "high")
+    asked = [Solution((tail,), seat, Fineness(form, _WIRE_TOLERANCE)) for form in forms]
+    speeds = [
+        response_of(np.mean(found[0], axis=0))[0] for found in solutions(asked, "checking the wire", None, workers)
+    ]
+    return float(abs(speeds[1] / speeds[0] - 1.0))
 
 
 @lru_cache(maxsize=4)

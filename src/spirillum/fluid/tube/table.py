@@ -22,7 +22,9 @@ from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.places import CHECKED_FROM
 from spirillum.fluid.tube.responses import RESPONSES
 from spirillum.fluid.tube.table_file import packed_from, to_bytes
+from spirillum.fluid.tube.wire_error import PLACES, SOLIDS_ERROR, wire_error
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.kernels import tube_table as kernel
 
 __all__ = ["TubeTable", "key_of", "least_checked_gap"]
@@ -49,6 +51,8 @@ class TubeTable:
     """Number of places that were solved."""
     seconds: float
     """Time that it took."""
+    wire: float | None = None
+    """Relative error of the forward velocity by the form of the wire, compared when it was made; None: not compared."""
 
     @property
     def key(self) -> str:
@@ -76,6 +80,15 @@ class TubeTable:
         """
         return self.error if yaw else self.error_without_yaw
 
+    def speed_error_at(self, yaw: float) -> float:
+        """Relative error of the forward velocity: of the interpolation, the wire and the solids together.
+
+        Args:
+            yaw: nose to the side, rad.
+        """
+        wire = wire_error(self.geometry, self.radius) if self.wire is None else PLACES * self.wire
+        return float(self.error_at(yaw)["forward_velocity"]) + wire + FINEST_WIRE_ERROR + SOLIDS_ERROR
+
     def mirrored(self) -> TubeTable:
         """The table of the robot's mirror image, whose tail has the other hand."""
         geometry = self.geometry._replace(hand=-self.geometry.hand)
@@ -91,6 +104,7 @@ class TubeTable:
             "error_without_yaw": dict(self.error_without_yaw),
             "places": self.places,
             "seconds": self.seconds,
+            "wire": self.wire,
         }
         with whole_file(path, replace="any") as temporary:
             temporary.write_bytes(to_bytes(json.dumps(head).encode(), self.packed))
@@ -128,7 +142,7 @@ def _checked(table: TubeTable) -> TubeTable:
         ValueError: if it is not.
     """
     stated = [mapping[name] for mapping in (table.error, table.error_without_yaw) for name in RESPONSES]
-    numbers = (table.radius, table.seconds, table.places, *stated)
+    numbers = (0.0 if table.wire is None else table.wire, table.radius, table.seconds, table.places, *stated)
     if not all(math.isfinite(number) and number >= 0.0 for number in numbers) or table.radius <= 0.0:
         raise ValueError("not the numbers of a table")
     if not kernel.is_whole(table.packed, table.radius):

@@ -24,7 +24,6 @@ from spirillum.kernels.tube_places import PHASES, mean_resistances
 from spirillum.kernels.tube_table import INSIDE, MOTIONS, largest_yaw, mean_resistance_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
-from spirillum.robot.options import ModelOptions
 
 __all__ = ["THINNEST_GAP", "TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
 
@@ -75,7 +74,10 @@ class TabledTube(Tube):
     """The model `tube` for robots that have tables."""
 
     form = "table"
-    error_against = f"solutions, the largest of {HELD_OUT} places between the nodes of its table"
+    error_against = (
+        f"solutions with finer wires: the largest error of {HELD_OUT} places between the nodes of its table, and that "
+        "of the wire and the solids"
+    )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
         """Answer from tables.
@@ -90,15 +92,15 @@ class TabledTube(Tube):
         """The table of one robot."""
         return self._tables[_key(batch, index)]
 
-    def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
+    def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """None: the error of a table is known, see `stated_speed_error`."""
-        return None
+        return ()
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
         """See `SwimmerModel.stated_speed_error`; none beyond the yaws at which the table was checked."""
         seat, table = seat_of(batch, 0), self.table_of(batch)
         known = abs(seat.yaw) <= largest_yaw(table.packed, seat.offset, seat.pitch)
-        return table.error_at(seat.yaw)["forward_velocity"] if known else float("nan")
+        return table.speed_error_at(seat.yaw) if known else float("nan")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """No nearer to the glass, and no further to the side, than where the table's errors are known."""

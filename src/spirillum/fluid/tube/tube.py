@@ -31,9 +31,10 @@ from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
+from spirillum.fluid.tube.wire_error import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
-from spirillum.fluid.wire.slender import Slender
-from spirillum.fluid.wire.stokeslets import Wire
+from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, MOST_STATIONS, Slender, stations_of
+from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, within
 from spirillum.robot.options import ModelOptions
@@ -213,6 +214,11 @@ def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
     return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
 
 
+def _has_finest_wire(batch: RobotBatch) -> bool:
+    """Whether all tails are short enough for `high` wires."""
+    return bool(np.all(stations_of(batch) <= MOST_STATIONS["high"]))
+
+
 class Tube(SwimmerModel):
     """Body, coupling and tail in their tube, and all the flow between them and the wall."""
 
@@ -228,14 +234,15 @@ class Tube(SwimmerModel):
     form = "direct"
     placed = True
 
-    def __init__(self, coarser: float = 1.0, *, between: bool = False) -> None:
+    def __init__(self, coarser: float = 1.0, *, between: bool = False, wire: Accuracy | None = None) -> None:
         """Resolve the flow to each robot's `model.tube.tolerance`, or more coarsely, at evenly spread phases.
 
         Args:
             coarser: factor of the tolerance.
             between: average over the phases halfway between those that start at 0.
+            wire: form of the wire; None: each robot's `model.slender.accuracy`.
         """
-        self._coarser, self._first = coarser, 0.5 if between else 0.0
+        self._coarser, self._first, self._wire = coarser, 0.5 if between else 0.0, wire
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`: the numerics state theirs; what is left is the place that nobody gave."""
@@ -253,11 +260,20 @@ class Tube(SwimmerModel):
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""
-        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST))
+        return Fineness(
+            self._wire or options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST)
+        )
 
-    def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
+    def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """See `SwimmerModel.checked_by`: other phases tell what the mean over a turn misses, too."""
-        return Tube(_COARSER, between=True)
+        coarser = Tube(_COARSER, between=True)
+        if batch.options.slender.accuracy == "high" or not _has_finest_wire(batch):
+            return (coarser,)
+        return coarser, Tube(_COARSER, between=True, wire="high")
+
+    def unchecked_error(self, batch: RobotBatch) -> float:
+        """See `SwimmerModel.unchecked_error`; of wires too long for the finest form what that changes at most."""
+        return FINEST_WIRE_ERROR + (0.0 if _has_finest_wire(batch) else LARGEST_WIRE_ERROR)
 
     def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
         """See `ResistanceModel.placement_of`."""

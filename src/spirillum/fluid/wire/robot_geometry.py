@@ -82,6 +82,12 @@ class RobotGeometry(NamedTuple):
         """Outline and link (0 body, 1 rotor) of each solid of one of `PIECES`."""
         return [(outline, int(name != "body")) for name, outline in self.outlines.items() if name in PIECES[part]]
 
+    @property
+    def stations(self) -> float:
+        """Upper bound of the number of stations along the tail: on the plain helix and the arm to it."""
+        length = self.tail_length * np.hypot(1.0, 2.0 * np.pi * self.amplitude / self.wavelength) + self.amplitude
+        return float(station_count(np.array([length]), np.array([0.5 * self.wire_diameter]))[0])
+
     def wire(self, spacing: float = 1.0) -> Wire:
         """The tail at phase 0.
 
@@ -97,10 +103,8 @@ class RobotGeometry(NamedTuple):
 @lru_cache(maxsize=64)
 def _wire(g: RobotGeometry, spacing: float) -> Wire:
     turns = g.tail_length / g.wavelength
-    length = g.tail_length * np.hypot(1.0, 2.0 * np.pi * g.amplitude / g.wavelength) + g.amplitude
-    stations = float(station_count(np.array([length]), np.array([0.5 * g.wire_diameter]))[0]) / spacing
     cause = f"tail.wire_diameter = {show(g.wire_diameter, 'mm')}"
-    check_memory(cause, stations, "stations along the tail", _STATION, "as with a thicker wire")
+    check_memory(cause, g.stations / spacing, "stations along the tail", _STATION, "as with a thicker wire")
     count = int(np.ceil(_POINTS_PER_TURN * turns)) + 400
     share = np.linspace(0.0, 1.0, count)
     xi = g.tail_length * share

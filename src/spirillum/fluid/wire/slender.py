@@ -24,9 +24,13 @@ from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.options import ModelOptions
 
-__all__ = ["Slender", "robot_solution"]
+__all__ = ["FINEST_WIRE_ERROR", "MOST_STATIONS", "Slender", "robot_solution", "stations_of"]
 
-_MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
+FINEST_WIRE_ERROR = 0.004
+"""Relative error of speeds with `high` wires: the largest of drag, thrust, torque and speed against resolved wires."""
+
+MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
+"""Stations along a tail, by the form of the wire."""
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
 _SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
 _SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness
@@ -39,6 +43,12 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
     "standard": Discretisation("high", order=8, tolerance=1e-4),
     "high": Discretisation("high", order=8, tolerance=1e-4, spacing=1.25),
 }
+
+
+def stations_of(batch: RobotBatch) -> PerRobot:
+    """Return an upper bound of the number of stations along each tail: on the plain helix and the arm to it."""
+    wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
+    return station_count(wire_length, 0.5 * batch.wire_diameter)
 
 
 def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
@@ -130,16 +140,18 @@ class Slender(SwimmerModel):
         clearance = "; the coupling's torque is as good as its clearance" if coupled else ""
         return f"{found}{clearance}{walls_left_out(batch)}"
 
-    def checked_by(self, options: ModelOptions) -> SwimmerModel:
+    def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """See `SwimmerModel.checked_by`."""
-        return Slender(_CHECKS[options.slender.accuracy])
+        return (Slender(_CHECKS[batch.options.slender.accuracy]),)
+
+    def unchecked_error(self, batch: RobotBatch) -> float:
+        """See `SwimmerModel.unchecked_error`."""
+        return FINEST_WIRE_ERROR
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
         coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
-        # No more than the plain helix and the arm from the axis to it.
-        wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
         limits = [
             Limit.of(
                 "coupling.length",
@@ -179,9 +191,9 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "stations along the tail (tail.wire_diameter)",
-                station_count(wire_length, 0.5 * batch.wire_diameter),
+                stations_of(batch),
                 "at most",
-                float(_MOST_STATIONS[resolution.wire]),
+                float(MOST_STATIONS[resolution.wire]),
                 "1",
                 "their equations would fill the memory",
                 "wire-too-thin",
