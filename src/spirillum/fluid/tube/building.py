@@ -118,8 +118,9 @@ def _wire_error(places: Places, workers: int = 1) -> float | None:
     if g.stations > MOST_STATIONS["high"]:
         return None
     seat = Seat.at_gap(g.body, places.radius, max(gap_of(Placement(), g.body_diameter, places.radius), places.thinnest))
-    tail, forms = (g, even_phases(_WIRE_PHASES)), ("standard", "high")
-    asked = [Solution((tail,), seat, Fineness(form, _WIRE_TOLERANCE)) for form in forms]
+    tail = g, even_phases(_WIRE_PHASES)
+    standard, high = Fineness("standard", _WIRE_TOLERANCE), Fineness("high", _WIRE_TOLERANCE)
+    asked = [Solution((tail,), seat, fineness) for fineness in (standard, high)]
     speeds = [
         response_of(np.mean(found[0], axis=0))[0] for found in solutions(asked, "checking the wire", None, workers)
     ]
