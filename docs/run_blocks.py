@@ -29,6 +29,8 @@ ROOT = Path(__file__).parent.parent
 WIDTH = "100"
 _FENCE = re.compile(r"^(<!-- (?:slow|run) -->\n)?```(console|pycon|python|toml|text)\n(.*?)^```$", re.M | re.S)
 _FILE = re.compile(r"# ([\w-]+\.(?:toml|csv))\b")
+_PROGRESS = re.compile(r".*: \d+(?: of \d+)?, .* elapsed(?:, about .* left)?")
+"""A line of progress, which a slow machine prints and a fast one does not."""
 
 
 class Step(NamedTuple):
@@ -70,7 +72,8 @@ def run_command(command: str) -> tuple[int, list[str]]:
             main(arguments)
         except SystemExit as end:
             code = int(end.code or 0)
-    return code, [line.rstrip() for line in (out.getvalue() + err.getvalue()).splitlines()]
+    lines = [line.rstrip() for line in (out.getvalue() + err.getvalue()).splitlines()]
+    return code, [line for line in lines if not _PROGRESS.fullmatch(line)]
 
 
 def matches(shown: list[str], lines: list[str]) -> bool:

@@ -116,7 +116,8 @@ def test_a_few_tails_have_no_standard_error(
     printed = capsys.readouterr().out
     assert "-30.0 (error: -)" in printed
     assert "+-" not in printed
-    fit = SimpleNamespace(experiment=SimpleNamespace(size=count, synthetic=False), warnings=())
+    seen = vars(ranking.best.fit.experiment) | {"size": count, "synthetic": False}
+    fit = SimpleNamespace(experiment=SimpleNamespace(**seen), warnings=())
     words = _cautions([replace(ranking.best, fit=fit, pareto=np.zeros(count))])
     assert words == [
         f"only {said}: standard errors of the log density are withheld, for over fewer than 4 they are chance"

@@ -162,7 +162,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
 
 def test_robot_at_rest_lies_on_its_asperities_with_its_weight(made: Any) -> None:
     """Off, in a thin fluid, for long: the load is the weight, and nothing moves."""
-    _, links, run = made(Surroundings(roughness=1e-4), {"fluid.viscosity": "0.01 Pa s"})
+    _, links, run = made(Surroundings(roughness=1e-4), {"fluid.viscosity": "0.01 Pa s", "model.beyond_stokes": True})
     found = run(StartPlace(gap=2e-4), 60.0, on=[(1e3, 2e3)], samples=1)
     heavy = float(links.weight[:2].sum())
     assert float(found["contact_force"][-1]) == pytest.approx(heavy * np.cos(float(found["azimuth"][-1])), rel=1e-4)

@@ -187,7 +187,7 @@ def test_wrong_input_leaves_nothing(run: xr.Dataset, tmp_path: Path, monkeypatch
     with pytest.raises(sp.InputError, match=r"\.mcap"):
         sp.export_run(run, tmp_path / "run.bag")
     monkeypatch.setitem(__import__("sys").modules, "mcap", None)
-    with pytest.raises(sp.InputError, match=r"pip install 'spirillum\[control\]'"):
+    with pytest.raises(sp.InputError, match=r"pip install '\.\[control\]'"):
         sp.export_run(run, tmp_path / "run.mcap")
     assert list(tmp_path.iterdir()) == []
 
