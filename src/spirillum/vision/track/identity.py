@@ -13,14 +13,14 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.optics import BodyPose, opposite
 from spirillum.vision.flag import Flag
-from spirillum.vision.setup import Setup
+from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
-from spirillum.vision.track.warnings import EVERYTHING
+from spirillum.vision.track.warnings import EVERYTHING, nose_on_the_other_side
 from spirillum.vision.video.frames import Frame
 
 _SIZES = (1.0, 0.3, 3.3)
@@ -87,7 +87,11 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     """
     found: Identified | InputError
     try:
-        found = identified_at(name, setup, stated, frames, still, 1.0)
+        found = identified_at(name, setup, stated, frames, still, 1.0, len(set(stripes_of(setup, stated.robot))))
+        if found.start.search is not None:
+            if found.robot:
+                return _with_nose(name, setup, stated, frames, still, found)
+            found = identified_at(name, setup, stated, frames, still, 1.0)  # another coloured thing
         if found.robot and found.whole:
             return found
     except InputError as error:
@@ -109,6 +113,16 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     return found._replace(start=replace(found.start, flags=()))
 
 
+def _with_nose(
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, found: Identified
+) -> Identified:
+    """A robot that was found by its seal, with a flag where its whole tail is at the other end."""
+    if found.wire.readable > IDENTITY.sure_share or not _turned_round(name, setup, stated, frames, still):
+        return found
+    flags = (nose_on_the_other_side(stated.optics.direction),)
+    return found._replace(start=replace(found.start, flags=flags))
+
+
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
     """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
 
@@ -118,13 +132,13 @@ def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Fram
     turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})
     body = BodyFinder(stated.robot, replace(stated.optics, direction=side), stated.bounds)
     with suppress(InputError):
-        other = identified_at(name, turned, body, frames, still, 1.0)
+        other = identified_at(name, turned, body, frames, still, 1.0, len(set(stripes_of(setup, stated.robot))))
         return other.robot and other.whole
     return False
 
 
 def identified_at(
-    name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float
+    name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float, colours: int = 0
 ) -> Identified:
     """Find the robot at one size.
 
@@ -135,11 +149,12 @@ def identified_at(
         frames: frames spread over the video.
         still: static background of the frames, (h, w, 3).
         size: of this body over that at the stated scale.
+        colours: number of colours of its stripes, if it is looked for by these.
 
     Raises:
         InputError: if no object resembles the robot.
     """
-    start = first_look(name, body, frames, still)
+    start = first_look(name, body, frames, still, colours)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))
