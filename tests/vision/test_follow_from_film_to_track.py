@@ -111,6 +111,7 @@ def test_a_robot_that_is_clear_only_the_other_way_round_names_the_direction(flat
     from spirillum.vision.track import first_look
 
     answers = iter([False, True])
+    monkeypatch.setattr(first_look, "_found_by_seal", lambda *given: None)
     monkeypatch.setattr(first_look, "_clear", lambda found: next(answers, False))
     monkeypatch.setattr("spirillum.vision.track.identity.best_other_size", lambda *given: None)
     with pytest.raises(InputError, match=r"robot.direction = 'right', but .* other side; allowed: 'left'"):

@@ -144,6 +144,13 @@ class Trial:
                 "markers": scale.markers,
                 "apparent_body_size": scale.apparent_size if math.isfinite(scale.apparent_size) else None,
             },
+            "cues": {
+                name: {
+                    "share_of_frames": cue.share,
+                    "disagreement": cue.disagreement if math.isfinite(cue.disagreement) else None,
+                }
+                for name, cue in self.track.cues.items()
+            },
             "flags": [{"name": f.name, "sentence": f.sentence, "spoils": list(f.spoils)} for f in self.flags],
         }
 
@@ -312,7 +319,8 @@ def _velocity(rate: Rate, track: Track, tilt: float) -> Measured:
     least = (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel
     read = any(flag.name in (BY_HAND, IMPORTED) for flag in track.flags)
     drift = _drift(track, least if read else max(least, _wander(rate)))
-    return _with_errors(rate, "m/s", drift, scale, tilt, track.drift, _timing(rate, track))
+    cues = _drift(track, track.cue_drift)
+    return _with_errors(rate, "m/s", drift, scale, tilt, track.drift, cues, _timing(rate, track))
 
 
 def _wander(rate: Rate) -> float:

@@ -12,7 +12,10 @@ from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import CUES, IDENTITY, LOST_FRAMES, STRIPES
+from spirillum.vision.track.contour import EDGE_CUES
+from spirillum.vision.track.cues import Agreement, agreement_of
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.elsewhere import something_else, something_else_flag
@@ -114,9 +117,8 @@ def track_of(
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
-    span = max(float(np.ptp(time)), 1e-9)
-    glare = learnt.glare.drift * pixel / span
-    hops = hops_in(motion, pixel, picture)
+    agreement = _agreement(time, record, cut | other, pixel)
+    glare, hops = learnt.glare.drift * pixel, hops_in(motion, pixel, picture)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
         gap_flags = ()  # by times that are wrong
@@ -146,14 +148,32 @@ def track_of(
         video=video.name,
         words=video.words,
         time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
-        drift=math.hypot(swayed.drift, glare, hops.distance / span),
+        drift=math.hypot(swayed.drift, math.hypot(glare, hops.distance) / max(float(np.ptp(time)), 1e-9)),
         elongation=elongation * optics.focal / sight.optics.focal,
         body_angle_drift=math.hypot(
             even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
         ),
         tail_phase_drift=hops.phase,
-        flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
+        cues=agreement.cues,
+        cue_drift=math.hypot(agreement.drift, _colour_lag(position[:, 0], body)),
+        flags=(*swayed.flags, *early, *agreement.flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
+
+
+def _agreement(time: Samples, record: Record, left_out: np.ndarray, pixel: float) -> Agreement:
+    """Cues of a video, without the frames that are left out."""
+    lost = np.full((len(EDGE_CUES), 2), np.nan)
+    placed = zip(record.placed, left_out.tolist(), strict=True)
+    shifts = [lost if without or one.cues is None else one.cues for one, without in placed]
+    return agreement_of(time, shifts, np.array(record.tail)[:, 0], pixel)
+
+
+def _colour_lag(x: Samples, body: BodyFinder) -> float:
+    """Standard error of the way from the first frame to the last where colours tell the edges, m."""
+    seen = x[np.isfinite(x)]
+    if body.seal is None or not seen.size:
+        return 0.0
+    return min(CUES.colour_drift * body.optics.length_per_pixel, 0.5 * float(np.ptp(seen)))
 
 
 def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,10 @@ from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_pr
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
-from spirillum.vision.track.constants import OUTLINE
+from spirillum.vision.track.constants import OUTLINE, SEAL
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
+from spirillum.vision.track.cues import cue_shifts
+from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
 from spirillum.vision.track.shape import Shape
 
 __all__ = ["BodyFinder", "Placed", "grey_part"]
@@ -31,6 +34,8 @@ class Placed(NamedTuple):
     """Share of the edges that lie in the picture, 0 to 1."""
     elongation: float = np.nan
     """By how much nose and rear lie farther apart than the level body's edges do, m; NaN without edges at both."""
+    cues: Samples | None = None
+    """Displacement of each cue of edges from the pose, and its standard error: see `cue_shifts`; None if unknown."""
 
     @property
     def known(self) -> bool:
@@ -38,11 +43,45 @@ class Placed(NamedTuple):
         return bool(np.isfinite(self.error.x))
 
 
+class _Part(NamedTuple):
+    """A part of a picture, blurred a little."""
+
+    grey: Samples
+    """Brightness, (h, w)."""
+    origin: Samples
+    """Pixel (u, v) of its upper left corner, (2,)."""
+    colours: ColourPart | None
+    """Its colours; None where they are not needed, or nothing is in view."""
+
+
+class _Edges(NamedTuple):
+    """Edges on a frame."""
+
+    shifts: Samples
+    """Displacements along their normals, pixels, (n,)."""
+    known: np.ndarray
+    """Whether they are valid, (n,)."""
+    variance: Samples
+    """Their variances, pixels^2, (n,); infinite where invalid."""
+    slopes: Samples
+    """Jacobian of the displacements by the pose, (n, 3)."""
+    inside: np.ndarray
+    """Whether the edge lies in the picture, (n,)."""
+    votes: np.ndarray
+    """Whether it moves with the body, (n,)."""
+
+
 class BodyFinder:
     """Fits the pose of a body frame by frame, with templates of its edges that it learns from the video."""
 
     def __init__(
-        self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int], contour: Contour | None = None
+        self,
+        robot: Robot,
+        optics: Optics,
+        bounds: tuple[int, int, int, int],
+        contour: Contour | None = None,
+        *,
+        colours: int = 0,
     ) -> None:
         """Compute the apparent contour of the body.
 
@@ -51,8 +90,9 @@ class BodyFinder:
             optics: the camera.
             bounds: part of the picture to look at: left, top, right, bottom.
             contour: the apparent contour of this body before this camera, where it is known already.
+            colours: of the seal's stripes, by which its edges are told; 0: edges are told by brightness alone.
         """
-        self.robot, self.optics, self.bounds = robot, optics, bounds
+        self.robot, self.optics, self.bounds, self.colours = robot, optics, bounds, colours
         self.contour = contour_of(robot, optics) if contour is None else contour
         self._shapes: dict[int, Shape] = {}
         self.half = OUTLINE.half_profile
@@ -63,6 +103,11 @@ class BodyFinder:
         self._steepness: Samples = np.empty(0)
         self._bias = np.zeros(len(self.contour.group))
         self._scatter = self.contour.floor.copy()
+        self.seal = SealEdges(self.contour, colours) if colours else None
+        self._on_seal = np.empty(0, dtype=np.int64) if self.seal is None else self.seal.chosen
+        flank = np.isin(self.contour.group[self._on_seal], [GROUPS.index("left"), GROUPS.index("right")])
+        self._seal_floor = np.where(flank, SEAL.floors[1], SEAL.floors[0])
+        self._seal_scatter = self._seal_floor.copy()
         self.margin = int(self.half + 4 * OUTLINE.blur + 4)
         middle = self.contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
         spacing = float(np.median(np.hypot(*np.diff(middle, axis=0).T)))
@@ -95,21 +140,46 @@ class BodyFinder:
         """
         poses = _smooth(list(poses), times)
         self._bias, self._scatter = np.zeros(len(self.contour.group)), self.contour.floor.copy()
-        found: list[Placed] = []
         parts = [self._part(image, pose) for image, pose in zip(images, poses, strict=True)]
+        found: list[Placed] = []
+        if self.seal is not None:  # what does not move along with the seal is not the body's
+            found = self._learn_seal(parts, poses)
+            poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
         for turn in range(OUTLINE.learning_rounds):
             stack = []
             for part, pose in zip(parts, poses, strict=True):
                 pixels, normals, _, _ = self.contour.places(pose, self.optics)
                 stack.append(self._profiles(part, pixels, normals))
             self._learn_profiles(np.stack(stack))
+            if self.seal is not None and turn == 0:
+                self._learn_biases(parts, found, SEAL.follows_seal)
             found = [self._place(part, pose) for part, pose in zip(parts, poses, strict=True)]
-            if turn >= OUTLINE.smoothed_rounds:
+            if self.seal is not None or turn >= OUTLINE.smoothed_rounds:
                 self._learn_biases(parts, found)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
-            if turn < OUTLINE.smoothed_rounds:
+            if self.seal is None and turn < OUTLINE.smoothed_rounds:
                 poses = _smooth(poses, times)
         return found
+
+    def _learn_seal(self, parts: list[_Part], poses: list[BodyPose]) -> list[Placed]:
+        """Learn the seal's colours from frames with approximately known poses; the poses by its edges alone."""
+        assert self.seal is not None  # noqa: S101 - asked by those who know
+        for turn in range(SEAL.learning_rounds):
+            if turn < 2:
+                coloured = [part.colours for part in parts if part.colours is not None]
+                places = [
+                    self._seal_places(pose) for part, pose in zip(parts, poses, strict=True) if part.colours is not None
+                ]
+                self.seal.learn_colours(coloured, places)
+            found = [self._place(part, pose, seal_only=True) for part, pose in zip(parts, poses, strict=True)]
+            self._learn_seal_biases(parts, found)
+            poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
+        return found
+
+    def _seal_places(self, pose: BodyPose) -> tuple[Samples, Samples]:
+        """Pixels and normals of the seal's edges."""
+        pixels, normals, _, _ = self.contour.places(pose, self.optics)
+        return pixels[self._on_seal], normals[self._on_seal]
 
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
         """Squared gradient of each edge's template along its normal, and weights of the edges.
@@ -136,19 +206,54 @@ class BodyFinder:
         """
         return self._place(self._part(image, guess), guess)
 
-    def _part(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
+    def place_by_seal(self, image: np.ndarray, guess: BodyPose) -> Placed:
+        """Fit the pose to the edges of the seal alone, before anything was learnt.
+
+        Args:
+            image: 8-bit RGB, (h, w, 3).
+            guess: initial pose, good to about five pixels.
+        """
+        return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
+
+    def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
+        """Apparent size of the seal over that of the robot's, by its length and its width; NaN where it is not seen.
+
+        Args:
+            images: 8-bit RGB, (h, w, 3) each.
+            poses: of the body on each of them.
+        """
+        assert self.seal is not None  # noqa: S101 - asked by those who know
+        found = []
+        for image, pose in zip(images, poses, strict=True):
+            part = self._part(image, pose)
+            if part.colours is not None:
+                pixels, normals = self._seal_places(pose)
+                found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels))
+        return float(np.nanmedian(found)) if np.isfinite(found).any() else np.nan
+
+    @property
+    def outline_moves(self) -> bool:
+        """Whether enough edges of the outline, and of its nose, move with the seal."""
+        moves = np.isfinite(self._scatter[~self.contour.seal])
+        nose = np.isfinite(self._scatter[self.contour.group == GROUPS.index("front")])
+        return bool(moves.mean() > SEAL.outline_share and nose.mean() > SEAL.nose_share)
+
+    def _part(self, image: np.ndarray, pose: BodyPose) -> _Part:
         pixels = self.contour.places(pose, self.optics)[0]
         low, high = pixels.min(axis=0) - self.margin, pixels.max(axis=0) + self.margin
         left, top, right, bottom = self.bounds
         ends = [int(np.clip(value, a, b)) for value, a, b in ((low[0], left, right), (low[1], top, bottom))]
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
-            return np.zeros((1, 1)), np.zeros(2)
-        return grey_part(image, (ends[0], ends[1], stops[0], stops[1]), OUTLINE.blur), np.array(ends, dtype=float)
+            return _Part(np.zeros((1, 1)), np.zeros(2), None)
+        bounds = ends[0], ends[1], stops[0], stops[1]
+        grey = grey_part(image, bounds, OUTLINE.blur)
+        colours = None if self.seal is None else colour_part(image, bounds, OUTLINE.blur)
+        return _Part(grey, np.array(ends, dtype=float), colours)
 
-    def _profiles(self, part: tuple[Samples, Samples], pixels: Samples, normals: Samples) -> Samples:
+    def _profiles(self, part: _Part, pixels: Samples, normals: Samples) -> Samples:
         out = np.empty((len(pixels), self.offsets.size))
-        profiles_across(part[0], part[1], pixels, normals, self.offsets, out)
+        profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
         return out
 
     def _learn_profiles(self, stack: Samples) -> None:
@@ -177,8 +282,14 @@ class BodyFinder:
         strength = np.sqrt(np.mean(np.einsum("fik,ik->fi", bare, template) ** 2, axis=0))
         self._strength = strength
 
-    def _learn_biases(self, parts: list[tuple[Samples, Samples]], found: list[Placed]) -> None:
-        """Learn the bias of each edge and the scatter about it, as glare shifts edges."""
+    def _learn_biases(self, parts: list[_Part], found: list[Placed], most: tuple[float, float] = SEAL.follows) -> None:
+        """Learn the bias of each edge and the scatter about it, as glare shifts edges.
+
+        Args:
+            parts: the surroundings of the body on some frames.
+            found: where it is there.
+            most: with a seal, scatter along and across the body beyond which an edge does not move with it, pixels.
+        """
         residuals = []
         for part, one in zip(parts, found, strict=True):
             if one.known:
@@ -187,18 +298,30 @@ class BodyFinder:
                 residuals.append(np.where(known, shifts, np.nan))
         if len(residuals) < 6:
             return
-        stack = np.array(residuals)
-        seen = np.isfinite(stack).sum(axis=0)
-        enough = seen >= 0.4 * len(residuals)
-        stack[:, ~enough] = 0.0
-        middle = np.nanmedian(stack, axis=0)
-        spread = mad_scale(stack - middle, axis=0)
+        middle, spread, enough = _usual(residuals)
         self._bias = np.where(enough, self._bias + np.clip(middle, -1.0, 1.0), self._bias)
         self._scatter = np.where(enough, np.hypot(self.contour.floor, spread), 0.5)
+        if self.seal is not None:
+            bound = np.hypot(*(self.contour.normals * np.array(most)).T)
+            self._scatter[~enough | (self._scatter > bound)] = np.inf
+            self._learn_seal_biases(parts, found)
 
-    def _shifts(
-        self, part: tuple[Samples, Samples], pixels: Samples, normals: Samples
-    ) -> tuple[Samples, np.ndarray, Samples]:
+    def _learn_seal_biases(self, parts: list[_Part], found: list[Placed]) -> None:
+        """Learn the bias of each colour of the seal, and the scatter of its edges."""
+        assert self.seal is not None  # noqa: S101 - asked by those who know
+        seen = [
+            self.seal.shifts(part.colours, *self._seal_places(one.pose))
+            for part, one in zip(parts, found, strict=True)
+            if one.known and part.colours is not None
+        ]
+        if len(seen) < 6:
+            return
+        residuals = [np.where(one.known, one.shifts, np.nan) for one in seen]
+        self.seal.learn_bias(np.array(residuals), np.array([one.kind for one in seen]))
+        _, spread, enough = _usual(residuals)
+        self._seal_scatter = np.where(enough, np.hypot(self._seal_floor, spread), 0.5)
+
+    def _shifts(self, part: _Part, pixels: Samples, normals: Samples) -> tuple[Samples, np.ndarray, Samples]:
         """Displacement of each edge along its normal, pixels, its validity, and its variance."""
         assert self._template is not None  # noqa: S101 - learnt first
         count = len(pixels)
@@ -215,23 +338,42 @@ class BodyFinder:
         ) ** 2
         return shifts - self._bias, known, np.where(known, variance + self._scatter**2, np.inf)
 
-    def _place(self, part: tuple[Samples, Samples], guess: BodyPose) -> Placed:
-        count = len(self.contour.group)
-        used, change, level = np.empty(count), np.empty(3), 1.0
+    def _seen_edges(self, part: _Part, pose: BodyPose, *, seal_only: bool, rough: bool) -> _Edges:
+        """Displacements of all edges: of the outline by brightness, and of the seal by its colours too."""
+        pixels, normals, _, slopes = self.contour.places(pose, self.optics)
+        found = []
+        if not seal_only:
+            shifts, known, variance = self._shifts(part, pixels, normals)
+            found.append(_Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter)))
+        if self.seal is not None and part.colours is not None:
+            here = self._on_seal
+            seen = self.seal.shifts(part.colours, pixels[here], normals[here], rough=rough)
+            variance = np.where(seen.known, seen.variance + self._seal_scatter**2, np.inf)
+            inside = np.isfinite(seen.shifts)
+            found.append(
+                _Edges(seen.shifts, seen.known, variance, slopes[here], inside, np.isfinite(self._seal_scatter))
+            )
+        return _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+    def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> Placed:
+        change, level = np.empty(3), 1.0
         pose = np.array(guess)
         lost = Placed(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
-        for step in range(OUTLINE.iterations):
-            pixels, normals, _, slopes = self.contour.places(BodyPose(*pose), self.optics)
-            shifts, known, variance = self._shifts(part, pixels, normals)
-            inside = np.isfinite(shifts)
+        if seal_only and part.colours is None:
+            return lost
+        for step in range(rough + OUTLINE.iterations):
+            edges = self._seen_edges(part, BodyPose(*pose), seal_only=seal_only, rough=step < rough)
+            known, slopes = edges.known, edges.slopes
             if known.sum() < 12:
                 return lost
-            level = robust_change(np.where(known, shifts, 0.0), slopes, 1.0 / variance, used, change)
+            used = np.empty(known.size)
+            shifts = np.where(known, edges.shifts, 0.0)
+            level = robust_change(shifts, slopes, 1.0 / edges.variance, used, change)
             pose = pose + change
-            if step > 0 and float(np.abs(slopes @ change).max()) < 0.01:
+            if step > rough and float(np.abs(slopes @ change).max()) < 0.01:
                 break
-        fitting = np.count_nonzero(used) / max(1, int(np.count_nonzero(inside)))
-        share = np.count_nonzero(inside) / count
+        fitting = np.count_nonzero(used) / max(1, int(np.count_nonzero(edges.inside & edges.votes)))
+        share = np.count_nonzero(edges.inside) / known.size
         found = BodyPose(*pose.tolist())
         try:
             covariance = np.linalg.inv(slopes.T @ (used[:, None] * slopes)) * max(level, 0.5) ** 2 * self._correlation
@@ -244,8 +386,23 @@ class BodyFinder:
             or share < 0.2
         ):
             return Placed(found, lost.error, fitting, share)
-        left = np.where(known, shifts, 0.0)
-        return Placed(found, errors, fitting, share, _elongation(left, slopes, used, self.contour.group))
+        if seal_only:
+            return Placed(found, errors, fitting, share)
+        count = len(self.contour.group)
+        left = shifts - slopes @ change
+        elongation = _elongation(left[:count], slopes[:count], used[:count], self.contour.group)
+        cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
+        spread = max(level, 0.5) * np.sqrt(self._correlation)
+        return Placed(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, cue, spread))
+
+
+def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:
+    """Median residual of each edge, the scatter about it, and whether it was seen often enough; 0 where it was not."""
+    stack = np.array(residuals)
+    enough = np.isfinite(stack).sum(axis=0) >= 0.4 * len(residuals)
+    stack[:, ~enough] = 0.0
+    middle = np.nanmedian(stack, axis=0)
+    return middle, mad_scale(stack - middle, axis=0), enough
 
 
 def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray) -> float:

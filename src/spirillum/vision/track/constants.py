@@ -15,6 +15,7 @@ __all__ = [
     "APPEARANCE",
     "COLOURS",
     "CONTOUR",
+    "CUES",
     "CUTS",
     "DIRECTION",
     "FIRST_LOOK",
@@ -24,6 +25,7 @@ __all__ = [
     "OUTLINE",
     "PICTURE_CHANGE",
     "SCOUTING",
+    "SEAL",
     "SEARCH",
     "SIZE",
     "STANDING",
@@ -37,6 +39,7 @@ __all__ = [
     "AppearanceConstants",
     "ColourConstants",
     "ContourConstants",
+    "CueConstants",
     "CutConstants",
     "DirectionConstants",
     "FirstLookConstants",
@@ -46,6 +49,7 @@ __all__ = [
     "OutlineConstants",
     "PictureChangeConstants",
     "ScoutingConstants",
+    "SealConstants",
     "SearchConstants",
     "SizeConstants",
     "StandingConstants",
@@ -149,6 +153,84 @@ class OutlineConstants:
     """Largest standard error of a place that is kept, pixels."""
     fewest_at_end: int = 5
     """Fewest edges at the nose, and at rear and seal, that tell how far apart both lie."""
+
+
+@dataclass(frozen=True)
+class SealConstants:
+    """Detection of the seal by its colours, and its edges (`seal`, `seal_search`, `anchored`)."""
+
+    search_width: float = 24.0
+    """Diameter of the body in the grid in which a seal is looked for, points."""
+    search_blur: float = 0.8
+    """Least standard deviation of the blur of the picture in which it is looked for, pixels."""
+    least_score: float = 12.0
+    """Least difference of colour between a seal and its surroundings, of 255; of films without one it was below 6."""
+    clear_share: float = 0.7
+    """Least share of the frames on which it is found and its edges fit."""
+    beside: float = 3.0
+    """Distance from an edge from which on colours are those of one side, pixels."""
+    edge_blur: float = 1.2
+    """Standard deviation of the blur of an edge to begin with, pixels."""
+    floors: tuple[float, float] = (0.1, 0.3)
+    """Least standard error of an edge at the ends and at the silhouettes, pixels."""
+    noise: float = 6.0
+    """Standard deviation of the noise of a colour, of 255."""
+    distinct: float = 2.0
+    """Least distance of a stripe's colour from its surroundings, standard deviations."""
+    strengths: tuple[float, float] = (0.4, 2.0)
+    """Least and largest contrast of an edge over that of its colours."""
+    edges: int = 60
+    """About how many of the seal's edges are used: neighbours have much of their noise in common."""
+    pooled: int = 2
+    """Edges on either side whose surroundings are averaged."""
+    fewest_of_kind: int = 8
+    """Fewest edges from which surroundings, and the bias of a colour, are learnt."""
+    learning_rounds: int = 3
+    """Rounds in which colours, biases and places of the frames are learnt in turn."""
+    follows_seal: tuple[float, float] = (0.5, 0.9)
+    """Scatter of an edge about the motion of the seal alone, along and across the body, beyond which it does not move
+    with the body, pixels: the seal tells the place across less well."""
+    follows: tuple[float, float] = (0.4, 0.4)
+    """The same about the motion of all edges that do."""
+    fewest_of_side: int = 5
+    """Fewest edges at each of two sides whose distance tells the seal's size."""
+    size_tolerance: float = 0.02
+    """Relative difference of its size up to which it is as expected: compression shifts edges of colours."""
+    largest_difference: float = 0.1
+    """Relative difference from the stated size beyond which it is no seal of this robot at this scale."""
+    sizes: int = 3
+    """Most sizes at which it is fitted, each the one that the one before has found."""
+    outline_share: float = 0.6
+    """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""
+    nose_share: float = 0.8
+    """The same of the edges of the nose, which tell the way of the robot."""
+    apart: float = 0.3
+    """Standard deviation between places by the outline alone and by the seal from which on they disagree, pixels."""
+    moves: int = 1
+    """Times that its edges are learnt again where the outline lies."""
+    far_enough: float = 4.0
+    """Way of the robot from which on what moves is told from what stands still, pixels."""
+    agreement: float = 0.015
+    """Relative difference of the sizes by outline and by seal up to which they agree."""
+    rough_steps: int = 3
+    """Steps towards a seal from several pixels away."""
+
+
+@dataclass(frozen=True)
+class CueConstants:
+    """Agreement of the cues to where the body is (`cues`)."""
+
+    fewest: int = 5
+    """Fewest edges of a cue on a frame."""
+    frames: int = 8
+    """Fewest frames with outline and seal from which is told whether they move alike."""
+    apart: float = 0.4
+    """Standard error of the way from the first frame to the last by cues that disagree that is flagged, pixels."""
+    colour_drift: float = 0.1
+    """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
+    of this way.
+
+    Compression lets colours lag by this much: of nine path traced films, at most 0.22 pixels were seen."""
 
 
 @dataclass(frozen=True)
@@ -855,6 +937,8 @@ APPEARANCE = AppearanceConstants()
 SEARCH = SearchConstants()
 CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()
+SEAL = SealConstants()
+CUES = CueConstants()
 FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()

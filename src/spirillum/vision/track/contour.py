@@ -21,10 +21,13 @@ from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, placed
 from spirillum.vision.track.constants import CONTOUR
 
-__all__ = ["GROUPS", "Contour", "contour_of"]
+__all__ = ["EDGE_CUES", "GROUPS", "Contour", "contour_of"]
 
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""
+
+EDGE_CUES = ("outline", "seal", "coupling")
+"""What edges belong to, each a cue of its own to where the body is."""
 
 _ORDERS = 7, 4
 """Orders of the polynomials in the lens's x and y."""
@@ -48,6 +51,13 @@ class Contour:
     """Chebyshev coefficients of the points with the upper and with the lower rims of flat ends, (a, b, 4, n)."""
     _reach: Samples = field(repr=False)
     """Largest distances of the lens along and across, m, (2,)."""
+    cue: np.ndarray = field(repr=False)
+    """Index into `EDGE_CUES` of each point, (n,)."""
+
+    @property
+    def seal(self) -> np.ndarray:
+        """Mask of the points that bound the seal, (n,); none without stripes."""
+        return np.asarray(self.cue == EDGE_CUES.index("seal"))
 
     def points(self, pose: BodyPose) -> Samples:
         """Edge points in the plane through the axis, in the body's frame, m, (n, 2)."""
@@ -57,10 +67,13 @@ class Contour:
 
     def thinned(self, stride: int) -> Contour:
         """Every `stride`-th of the points, without gaps: loops are compiled anew for arrays that have some."""
-        every = slice(None, None, stride)
-        group, normals = (np.ascontiguousarray(values[every]) for values in (self.group, self.normals))
-        factors = np.ascontiguousarray(self._factors[..., every])
-        return Contour(group, normals, self.floor[every], factors, self._reach)
+        return self.some(np.arange(len(self.group)) % stride == 0)
+
+    def some(self, chosen: np.ndarray) -> Contour:
+        """The points of a mask, (n,)."""
+        factors = np.ascontiguousarray(self._factors[..., chosen])
+        cue = self.cue[chosen]
+        return Contour(self.group[chosen], self.normals[chosen], self.floor[chosen], factors, self._reach, cue)
 
     def places(self, pose: BodyPose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
         """Project the edges into the picture.
@@ -114,11 +127,13 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     wide = np.arange(-CONTOUR.end_width * radius, CONTOUR.end_width * radius, max(spacing, 1.8 * radius / 80))
     behind = wide[np.abs(wide) > 0.5 * robot.coupling.diameter + 1e-3]
     sides = _sides(robot, outlines, spacing)
-    kinds = [("front", wide.size), ("rear", behind.size)]
+    kinds = [("front", "outline", wide.size), ("rear", "seal" if striped else "outline", behind.size)]
+    cues = {"striped_side": "seal", "coupling": "coupling"}
     for beside in ("left", "right"):
-        kinds += [(beside, stations.size) for _, _, stations in sides]
-    kinds.append(("seal", len(seal)))
-    count = sum(size for _, size in kinds)
+        kinds += [(beside, cues.get(kind, "outline"), stations.size) for _, kind, stations in sides]
+    kinds.append(("seal", "seal", len(seal)))
+    sizes = [size for _, _, size in kinds]
+    count = sum(sizes)
     nodes = [np.cos(np.pi * (np.arange(count) + 0.5) / count) for count in _NODES]
     surfaces = {name: _surface(outline) for name, outline in outlines.items()}
     flats = [(_flat(outline, 0), wide, 1.0), (_flat(outline, -1), behind, -1.0)]
@@ -151,13 +166,14 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     found = np.moveaxis(found, -1, -2)
     factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0]
     factors = np.ascontiguousarray(factors).reshape(*(order + 1 for order in _ORDERS), 4, count)
-    group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
+    group = np.repeat([GROUPS.index(name) for name, _, _ in kinds], sizes)
     # The near and the far rim of a flat end without stripes are easily confused, and move differently.
     rear = "rear" if striped or _flat(outline, -1) is None else "bare_rear"
     trusted = [getattr(CONTOUR, name) for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
-    floor = np.repeat(trusted, [size for _, size in kinds])
+    floor = np.repeat(trusted, sizes)
     middle = found[_NODES[0] // 2, _NODES[1] // 2, 0].T
-    return Contour(group, _normals(middle, group), floor, factors, np.array(reach))
+    cue = np.repeat([EDGE_CUES.index(name) for _, name, _ in kinds], sizes)
+    return Contour(group, _normals(middle, group), floor, factors, np.array(reach), cue)
 
 
 def _reach(robot: Robot, optics: Optics) -> tuple[float, float]:

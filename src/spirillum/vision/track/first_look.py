@@ -15,7 +15,8 @@ from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, opposite, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import FIRST_LOOK, VISIBILITY
+from spirillum.vision.track.constants import FIRST_LOOK, SEAL, VISIBILITY
+from spirillum.vision.track.seal_search import SealSearch
 from spirillum.vision.track.search import Candidate, close_places, most_likely, refined
 from spirillum.vision.track.shape import Shape
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
@@ -50,10 +51,24 @@ class Start:
     rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which something else stands out as clearly, and where."""
     flags: tuple[Flag, ...]
+    search: SealSearch | None = field(default=None, repr=False)
+    """What looks for the seal in whole pictures, where the robot was found by it."""
 
     def expected(self, time: float) -> BodyPose:
         """Where it should be at a time."""
         return on_the_way(self.path, time)
+
+    def close(self, frame: Frame, still: Samples, guess: BodyPose) -> BodyPose:
+        """Where the body is near a guess, to a pixel.
+
+        Args:
+            frame: the frame.
+            still: static background of the video, (h, w, 3), or reduced by a whole factor.
+            guess: about where it is.
+        """
+        if self.body.seal is not None:
+            return self.body.place_by_seal(frame.image, guess).pose
+        return close_place(frame, still, self.body, guess).pose
 
     def as_clear(self, score: float) -> bool:
         """Whether edges are as clear as a robot's."""
@@ -76,7 +91,18 @@ class _Learnt(NamedTuple):
         return self.poses[len(self.poses) // 2]
 
 
-def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> Start:
+class _Found(NamedTuple):
+    """The robot on some frames, before its edges are learnt."""
+
+    body: BodyFinder
+    about: _Learnt
+    clearness: float
+    rivals: list[tuple[np.ndarray, BodyPose]]
+    flags: tuple[Flag, ...]
+    search: SealSearch | None
+
+
+def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, colours: int = 0) -> Start:
     """Find the robot on some frames, and learn how large it is, within a tenth, and what its edges look like.
 
     Args:
@@ -84,6 +110,44 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
         body: the robot's body, about as large as it looks.
         frames: frames spread over the video.
         still: static background of the frames, (h, w, 3), reduced as far as they are to be searched.
+        colours: number of colours of its seal's stripes, by which it is looked for; 0: by its outline.
+
+    Raises:
+        InputError: if there is no robot.
+    """
+    focal = body.optics.focal
+    found = (_found_by_seal(body, frames, colours) if colours else None) or _by_outline(name, body, frames, still)
+    body, about = found.body, found.about
+    learnt = _learnt(name, body, about)
+    if body.colours:
+        body, learnt = _by_whole_outline(body, learnt) or (body, learnt)
+    outline = _outline_of(body, learnt)
+    stated = True
+    for _ in range(FIRST_LOOK.relearning):
+        if outline.fits(body.optics.length_per_pixel, stated=stated):
+            break
+        resizes, stated = outline.resizes, stated and not outline.resizes
+        body, about = _moved(body, learnt, outline, stated=stated)
+        if resizes and not body.colours:
+            # A body of the wrong size lay at one of its ends, now at this one, now at that.
+            known = [(frame.time, pose) for frame, pose in zip(about.frames, about.poses, strict=True)]
+            about = _roughly(body, known, frames, still)
+        learnt = _learnt(name, body, about)
+        outline = _outline_of(body, learnt)
+    size = body.optics.focal / focal * outline.size
+    every = range(len(learnt.poses))
+    whole = [k for k in every if learnt.whole[k]]
+    seen = [
+        (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= FIRST_LOOK.whole_frames else every)
+    ]
+    path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
+    off = (outline.move.x, outline.move.y) if outline.fits(body.optics.length_per_pixel) else (0.0, 0.0)
+    search = found.search and SealSearch(body.robot, body.optics, body.bounds)
+    return Start(body, size, off, seen, path, learnt.score, found.clearness, found.rivals, found.flags, search)
+
+
+def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> _Found:
+    """Find the robot by the outline of its body.
 
     Raises:
         InputError: if there is no robot.
@@ -91,7 +155,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     every = np.unique(
         np.linspace(0, len(frames) - 1, min(FIRST_LOOK.searched, len(frames))).round().astype(int)
     ).tolist()
-    factor, focal = frames[0].image.shape[1] // still.shape[1], body.optics.focal
+    factor = frames[0].image.shape[1] // still.shape[1]
     images, shape = [frames[k].reduced(factor) for k in every], body.shape(factor)
     found = _places(shape, images, still)
     if not _clear(found):
@@ -108,28 +172,88 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     rivals = rivals_in(body, [frames[k].image for k in every], found, chosen)
     flags = turned_flags(shape, images, still, found, chosen)
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
-    learnt = _learnt(name, body, _roughly(body, known, frames, still))
-    outline = outline_seen(body, learnt.typical)
-    stated = True
-    for _ in range(FIRST_LOOK.relearning):
-        if outline.fits(body.optics.length_per_pixel, stated=stated):
+    return _Found(body, _roughly(body, known, frames, still), clearness(found), rivals, flags, None)
+
+
+def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _Found | None:
+    """Find the robot by the colours of its seal; None where no block of colour has its size on most frames."""
+    if not body.contour.seal.any():
+        return None
+    search = SealSearch(body.robot, body.optics, body.bounds)
+    found = [search.places(frame.image) for frame in frames]
+    scores = np.array([[one.score for one in some] + [0.0] * (2 - len(some)) for some in found])[:, :2]
+    best, clear = np.median(scores, axis=0)[0], float(np.median(scores[:, 0] / np.maximum(scores[:, 1], 1.0)))
+    if best < SEAL.least_score or np.mean(scores[:, 0] > FIRST_LOOK.faint * best) < SEAL.clear_share:
+        return None
+    finder = BodyFinder(body.robot, body.optics, body.bounds, body.contour, colours=colours)
+    guesses, size = [some[0].pose if some else None for some in found], 1.0
+    for _ in range(SEAL.sizes):
+        placed = [
+            None if guess is None else finder.place_by_seal(frame.image, guess)
+            for frame, guess in zip(frames, guesses, strict=True)
+        ]
+        seen = [k for k, one in enumerate(placed) if one is not None and one.known]
+        if len(seen) < SEAL.clear_share * len(frames):
+            return None
+        poses = [one.pose for one in placed if one is not None and one.known]
+        off = finder.size_by_seal([frames[k].image for k in seen], poses)
+        size *= off
+        if not abs(np.log(size)) < SEAL.largest_difference:
+            return None
+        if abs(off - 1.0) < SEAL.size_tolerance:
             break
-        resizes, stated = outline.resizes, stated and not outline.resizes
-        body, about = _moved(body, learnt, outline, stated=stated)
-        if resizes:  # a body of the wrong size lay at one of its ends, now at this one, now at that
-            known = [(frame.time, pose) for frame, pose in zip(about.frames, about.poses, strict=True)]
-            about = _roughly(body, known, frames, still)
-        learnt = _learnt(name, body, about)
-        outline = outline_seen(body, learnt.typical)
-    size = body.optics.focal / focal * outline.size
-    every = range(len(learnt.poses))
-    whole = [k for k in every if learnt.whole[k]]
-    seen = [
-        (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= FIRST_LOOK.whole_frames else every)
+        finder = resized(finder, off)
+        search = SealSearch(body.robot, finder.optics, body.bounds)
+        guesses = [next((one.pose for one in search.places(frame.image)), None) for frame in frames]
+    rivals = _rivals_of_seal([frames[k] for k in seen], [found[k] for k in seen])
+    about = _Learnt([frames[k] for k in seen], poses, float(best), [True] * len(seen))
+    return _Found(finder, about, clear, rivals, (), search)
+
+
+def _rivals_of_seal(frames: Sequence[Frame], found: Sequence[list[Candidate]]) -> list[tuple[np.ndarray, BodyPose]]:
+    """Frames on which a second block of colour is as clear as the seal, and where; empty unless they are frequent."""
+    rivals = [
+        (frame.image, some[1].pose)
+        for frame, some in zip(frames, found, strict=True)
+        if len(some) > 1 and some[1].score > VISIBILITY.second * some[0].score
     ]
-    path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
-    off = (outline.move.x, outline.move.y) if outline.fits(body.optics.length_per_pixel) else (0.0, 0.0)
-    return Start(body, size, off, seen, path, learnt.score, clearness(found), rivals, flags)
+    return rivals if len(rivals) > VISIBILITY.often * len(frames) else []
+
+
+def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _Learnt] | None:
+    """The body by its whole outline, which tells more; None unless it moves along with the seal, and has its size.
+
+    What stands still seems to move along where the robot hardly moves.
+    """
+    poses, pixel = np.array(learnt.poses), body.optics.length_per_pixel
+    if float(np.ptp(poses[:, 0])) < SEAL.far_enough * pixel or not body.outline_moves:
+        return None
+    images, times = [frame.image for frame in learnt.frames], np.array([frame.time for frame in learnt.frames])
+    size = body.size_by_seal(images, learnt.poses)
+    plain = BodyFinder(body.robot, body.optics, body.bounds, body.contour)
+    found, start = plain.learn(images, learnt.poses, times), learnt.poses
+    for _ in range(SEAL.moves):  # edges are learnt where the outline lies: compression shifts those of the seal
+        move = outline_seen(plain, found[len(found) // 2].pose).move
+        start = [BodyPose(*row) for row in (np.array(start) + np.array(move)).tolist()]
+        found = plain.learn(images, start, times)
+    if not all(one.known for one in found):
+        return None
+    other = learnt._replace(poses=[one.pose for one in found])
+    apart = np.array(other.poses)[:, 0] - poses[:, 0]
+    if (
+        float(np.std(apart)) > SEAL.apart * pixel
+        or abs(outline_seen(plain, other.typical).size - size) > SEAL.agreement
+    ):
+        return None
+    return plain, other._replace(whole=[one.inside >= VISIBILITY.full_view for one in found])
+
+
+def _outline_of(body: BodyFinder, learnt: _Learnt) -> OutlineFit:
+    """Size and place of the body by its outline; its size by its seal where that is what is followed."""
+    if not body.colours:
+        return outline_seen(body, learnt.typical)
+    size = body.size_by_seal([frame.image for frame in learnt.frames], learnt.poses)
+    return OutlineFit(1.0 if abs(size - 1.0) < SEAL.size_tolerance else size, BodyPose(0.0, 0.0, 0.0))
 
 
 def _places(body: Shape, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0) -> list[list[Candidate]]:

@@ -21,7 +21,7 @@ from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.standing import standing_bodies
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
-from spirillum.vision.track.warnings import EVERYTHING
+from spirillum.vision.track.warnings import EVERYTHING, nose_on_the_other_side
 from spirillum.vision.video.frames import Frame
 
 _SIZES = (1.0, 0.3, 3.3)
@@ -110,8 +110,8 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     """
     found: Identified | InputError
     try:
-        found = identified_at(name, setup, stated, frames, still, 1.0)
-        if found.robot and found.whole:
+        found, is_whole = _at_stated_size(name, setup, stated, frames, still)
+        if is_whole:
             return found
     except InputError as error:
         found = error
@@ -119,6 +119,34 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     standing = None if half else _standing(name, setup, stated, frames, still)
     if standing is not None and standing.robot:
         return standing
+    other = _at_another_size(name, setup, stated, frames, still, half=half)
+    if other is not None:
+        return other
+    if standing is not None:
+        return standing
+    if isinstance(found, InputError):
+        raise found
+    if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
+        return found
+    return found._replace(start=replace(found.start, flags=()))
+
+
+def _at_stated_size(
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples
+) -> tuple[Identified, bool]:
+    """What resembles the robot at its stated size, and whether seal or tail leave no doubt that it is the robot."""
+    found = identified_at(name, setup, stated, frames, still, 1.0, len(set(stripes_of(setup, stated.robot))))
+    if found.start.search is not None:
+        if found.robot:
+            return _with_nose(name, setup, stated, frames, still, found), True
+        found = identified_at(name, setup, stated, frames, still, 1.0)  # another coloured thing
+    return found, found.robot and found.whole
+
+
+def _at_another_size(
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, *, half: bool
+) -> Identified | None:
+    """The robot at a size that its file or the scale does not state; None where none fits."""
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
         least = FIRST_LOOK.clearness if half else SIZE.clearness
@@ -128,13 +156,7 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
                 other = identified_at(name, setup, resized(stated, about * size), frames, still, about * size)
                 if other.robot and (other.whole or not half):
                     return other
-    if standing is not None:
-        return standing
-    if isinstance(found, InputError):
-        raise found
-    if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
-        return found
-    return found._replace(start=replace(found.start, flags=()))
+    return None
 
 
 def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified | None:
@@ -156,6 +178,16 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
     return striped
 
 
+def _with_nose(
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, found: Identified
+) -> Identified:
+    """A robot that was found by its seal, with a flag where its whole tail is at the other end."""
+    if found.wire.readable > IDENTITY.sure_share or not _turned_round(name, setup, stated, frames, still):
+        return found
+    flags = (nose_on_the_other_side(stated.optics.direction),)
+    return found._replace(start=replace(found.start, flags=flags))
+
+
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
     """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
 
@@ -165,13 +197,13 @@ def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Fram
     turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})
     body = BodyFinder(stated.robot, replace(stated.optics, direction=side), stated.bounds)
     with suppress(InputError):
-        other = identified_at(name, turned, body, frames, still, 1.0)
+        other = identified_at(name, turned, body, frames, still, 1.0, len(set(stripes_of(setup, stated.robot))))
         return other.robot and other.whole
     return False
 
 
 def identified_at(
-    name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float
+    name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float, colours: int = 0
 ) -> Identified:
     """Find the robot at one size.
 
@@ -182,11 +214,12 @@ def identified_at(
         frames: frames spread over the video.
         still: static background of the frames, (h, w, 3).
         size: of this body over that at the stated scale.
+        colours: number of colours of its stripes, if it is looked for by these.
 
     Raises:
         InputError: if no object resembles the robot.
     """
-    start = first_look(name, body, frames, still)
+    start = first_look(name, body, frames, still, colours)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))

@@ -112,7 +112,7 @@ def resized(body: BodyFinder, size: float) -> BodyFinder:
         size: factor.
     """
     contour = body.contour if size == 1.0 else None
-    return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds, contour)
+    return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds, contour, colours=body.colours)
 
 
 def _magnified(optics: Optics, size: float) -> Optics:

@@ -18,7 +18,7 @@ from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.first_look import close_place, on_the_way
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.picture_change import PictureChange
-from spirillum.vision.track.search import candidates
+from spirillum.vision.track.search import Candidate, candidates
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["Follower", "Record", "Seen"]
@@ -145,7 +145,7 @@ class Follower:
 
     def _after_a_gap(self, frame: Frame, guess: BodyPose) -> Placed | None:
         """The body where most of its edges fit: at the predicted pose, near it, or where it was; None if nowhere."""
-        near = close_place(frame, self.still, self.known.start.body, guess).pose
+        near = self.known.start.close(frame, self.still, guess)
         tried = [self._near(frame, pose) for pose in (guess, near, self.record.placed[-1].pose)]
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
@@ -166,12 +166,20 @@ class Follower:
     def _found_again(self, frame: Frame, lost: Placed) -> Placed:
         """Search the whole picture for the body; `lost` if it is not found where more of its edges fit."""
         least = FOLLOWING.more_edges * lost.share if lost.known else 0.0
-        start, still = self.known.start, self.still
-        factor = frame.image.shape[1] // still.shape[1]
-        for candidate in candidates(frame.reduced(factor), still, start.body.shape(factor))[:2]:
-            better = close_place(frame, still, start.body, candidate.pose)
-            if start.as_clear(better.score):
-                found = start.body.place(frame.image, better.pose)
+        start = self.known.start
+        for candidate in self._candidates(frame):
+            if start.as_clear(candidate.score):
+                found = start.body.place(frame.image, candidate.pose)
                 if found.known and found.share > least:
                     return found
         return lost
+
+    def _candidates(self, frame: Frame) -> list[Candidate]:
+        """Where the body may be in the whole picture, to a pixel, best first."""
+        start, still = self.known.start, self.still
+        if start.search is not None:
+            rough = start.search.places(frame.image)[:2]
+            return [one._replace(pose=start.close(frame, still, one.pose)) for one in rough]
+        factor = frame.image.shape[1] // still.shape[1]
+        rough = candidates(frame.reduced(factor), still, start.body.shape(factor))[:2]
+        return [close_place(frame, still, start.body, one.pose) for one in rough]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
+from spirillum.vision.track.cues import Cue
 
 __all__ = ["Track"]
 
@@ -64,3 +66,7 @@ class Track:
     """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""
     elongation: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """By how much nose and rear lie farther apart than a level body's do, m, (n,); empty where no edges were fitted."""
+    cues: Mapping[str, Cue] = field(repr=False, default_factory=dict)
+    """Outline, seal, coupling and tail: how often each was used, and whether they agree; empty where unknown."""
+    cue_drift: float = 0.0
+    """Standard error of the way from the first frame to the last by cues that disagree, and by colours that lag, m."""

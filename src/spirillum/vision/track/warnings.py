@@ -17,7 +17,7 @@ from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import Candidate, close_places
 from spirillum.vision.track.shape import Shape
 
-__all__ = ["EVERYTHING", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
+__all__ = ["EVERYTHING", "cut_off", "gaps_of", "nose_on_the_other_side", "rivals_in", "sight_flags", "turned_flags"]
 
 _THREADS = 2
 EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
@@ -75,12 +75,21 @@ def turned_flags(
         turned = _turned(body, seen, still)
     if turned <= VISIBILITY.turned:
         return ()
-    side = body.optics.direction
+    return (nose_on_the_other_side(body.optics.direction, f"turned round, it fits {turned:.2g} times better"),)
+
+
+def nose_on_the_other_side(side: str, why: str = "turned round, it has the robot's tail") -> Flag:
+    """Flag a robot whose nose is at the other end.
+
+    Args:
+        side: where it should point.
+        why: what says so.
+    """
     sentence = (
-        f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits {turned:.2g} times "
-        "better; all signs would be wrong, so that nothing is given: give it the other way"
+        f"the nose is on the other side than robot.direction = '{side}' says: {why}; all signs would be wrong, so that "
+        "nothing is given: give it the other way"
     )
-    return (Flag("nose-on-the-other-side", sentence, EVERYTHING),)
+    return Flag("nose-on-the-other-side", sentence, EVERYTHING)
 
 
 def _turned(body: Shape, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:

@@ -1,0 +1,267 @@
+"""Edges of the seal: an opaque, coloured band of known size, whatever lies under the body.
+
+Along each edge, colours are projected onto the direction that separates a stripe best from its surroundings (Fisher's
+linear discriminant). What varies in the surroundings, such as the lines of a grid under the robot, is left out by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.extras import required
+from spirillum.kernels.edges import profiles_across
+from spirillum.vision.track.constants import OUTLINE, SEAL
+from spirillum.vision.track.contour import GROUPS, Contour
+
+__all__ = ["ColourPart", "SealEdges", "SealShifts", "colour_part"]
+
+_SIDES = tuple(GROUPS.index(name) for name in ("rear", "left", "right", "seal"))
+_FLANKS = False, True, True, False
+"""Which of the sides are silhouettes."""
+
+
+class ColourPart(NamedTuple):
+    """Blurred colours of a part of a picture."""
+
+    channels: tuple[Samples, Samples, Samples]
+    """Red, green and blue, (h, w) each."""
+    origin: Samples
+    """Pixel (u, v) of its upper left corner, (2,)."""
+
+
+class SealShifts(NamedTuple):
+    """Displacements of the seal's edges along their normals on a frame."""
+
+    shifts: Samples
+    """Displacements, pixels, (n,)."""
+    known: np.ndarray
+    """Whether the displacement is valid, (n,)."""
+    variance: Samples
+    """Variances by the misfit of the profiles, pixels^2, (n,)."""
+    kind: np.ndarray
+    """Class of the colour at each edge, (n,)."""
+
+
+class _Profiles(NamedTuple):
+    """Profiles across the seal's edges."""
+
+    share: Samples
+    """Share of the stripe's colour, 1 inside to 0 outside, (n, m)."""
+    distance: Samples
+    """Fisher's squared distance of the stripe from its surroundings, (n,); 0 where they look alike."""
+    kind: np.ndarray
+    """Class of the colour at each edge, (n,)."""
+
+
+class SealEdges:
+    """Finds the edges of the seal near expected places; learns its colours and the bias of each of them."""
+
+    def __init__(self, contour: Contour, classes: int) -> None:
+        """Begin.
+
+        Args:
+            contour: apparent contour of the body.
+            classes: number of different colours of the stripes.
+        """
+        every = np.flatnonzero(contour.seal)
+        self.chosen = every[:: max(1, round(every.size / SEAL.edges))]
+        groups = contour.group[self.chosen]
+        self._sides = [np.flatnonzero(groups == side) for side in _SIDES]
+        self._offsets = np.arange(-OUTLINE.half_profile, OUTLINE.half_profile + 1, dtype=float)
+        self._outside = self._offsets >= SEAL.beside
+        self._classes = classes + 1  # colours of thin stripes at the silhouette are mixed
+        from scipy.special import erf
+
+        self._palette: Samples | None = None
+        self._take(-0.5 * erf(self._offsets / (np.sqrt(2.0) * SEAL.edge_blur)))
+        self._bias = np.zeros((len(_SIDES), self._classes))
+
+    def shifts(self, part: ColourPart, pixels: Samples, normals: Samples, *, rough: bool = False) -> SealShifts:
+        """Displacement of each edge along its normal.
+
+        Args:
+            part: the surroundings of the robot.
+            pixels: expected places of the edges, (n, 2).
+            normals: their outward normals, (n, 2).
+            rough: displacements of several pixels, with the same variance at all edges.
+        """
+        found = self._profiles(part, pixels, normals)
+        shifts, strengths, misses = self._fitted(found.share)
+        known = found.distance > 0.0
+        if rough:
+            shifts, known = self._areas(found.share), known & np.isfinite(found.share[:, 0])
+            return SealShifts(shifts, known, np.ones(len(shifts)), found.kind)
+        known = known & np.isfinite(shifts) & (np.abs(shifts) < OUTLINE.largest_shift)
+        known &= (strengths > SEAL.strengths[0]) & (strengths < SEAL.strengths[1])
+        noise = OUTLINE.rounding_noise / np.sqrt(np.maximum(found.distance, 1e-9)) / SEAL.noise
+        with np.errstate(invalid="ignore"):
+            variance = (np.maximum(misses, noise) / np.maximum(np.abs(strengths) * self._steepness, 1e-9)) ** 2
+        for number, side in enumerate(self._sides):
+            shifts[side] -= self._bias[number, found.kind[side]]
+        return SealShifts(shifts, known, variance, found.kind)
+
+    def learn_colours(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
+        """Learn the colours at the silhouette, and the profile of an edge.
+
+        Args:
+            parts: surroundings of the robot on some frames.
+            places: pixels and normals of the edges on each of them.
+        """
+        cv2 = required("cv2", "measuring a video", "video")
+        flanks = np.concatenate(self._sides[1:3])
+        inside = self._offsets <= -1.0
+        colours = [
+            self._colours(part, *place)[:, flanks][:, :, inside] for part, place in zip(parts, places, strict=True)
+        ]
+        samples = np.concatenate([found.reshape(3, -1).T for found in colours])
+        samples = samples[np.isfinite(samples).all(axis=1)].astype(np.float32)
+        if len(samples) > 10 * self._classes:
+            criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 20, 1.0)
+            cv2.setRNGSeed(1)
+            _, _, centres = cv2.kmeans(samples, self._classes, None, criteria, 2, cv2.KMEANS_PP_CENTERS)
+            self._palette = np.asarray(centres, dtype=float)
+        shares = np.concatenate([self._profiles(part, *place).share for part, place in zip(parts, places, strict=True)])
+        if len(shares := shares[np.isfinite(shares).all(axis=1)]):
+            middle = np.median(shares, axis=0)
+            self._take(0.5 * (middle - middle[::-1]))
+
+    def learn_bias(self, residuals: Samples, kinds: np.ndarray) -> None:
+        """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently.
+
+        Args:
+            residuals: residual displacement of each edge on some frames, pixels, (f, n); NaN where unknown.
+            kinds: class of the colour at each edge, (f, n).
+        """
+        for number, side in enumerate(self._sides):
+            for kind in range(self._classes):
+                mine = residuals[:, side][kinds[:, side] == kind]
+                mine = mine[np.isfinite(mine)]
+                if mine.size > SEAL.fewest_of_kind:
+                    self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
+
+    def size(self, seen: SealShifts, pixels: Samples) -> float:
+        """Size of the seal over the expected one, by the distances of its ends and of its silhouettes; NaN if unseen.
+
+        Args:
+            seen: displacements of its edges at the body's pose.
+            pixels: expected places of the edges, (n, 2).
+        """
+        found, weights = [], []
+        for first, last in ((0, 3), (1, 2)):
+            sides = [self._sides[side] for side in (first, last)]
+            known = [side[seen.known[side]] for side in sides]
+            if min(len(side) for side in known) < SEAL.fewest_of_side:
+                continue
+            middles = [np.median(pixels[side], axis=0) for side in sides]
+            distance = float(np.hypot(*(middles[1] - middles[0])))
+            found.append(sum(float(np.median(seen.shifts[side])) for side in known) / distance)
+            weights.append(distance)
+        return 1.0 + float(np.average(found, weights=weights)) if found else np.nan
+
+    def _colours(self, part: ColourPart, pixels: Samples, normals: Samples) -> Samples:
+        """Colour profiles along the normals, (3, n, m)."""
+        colours = np.empty((3, len(pixels), self._offsets.size))
+        for channel, out in zip(part.channels, colours, strict=True):
+            profiles_across(channel, part.origin, pixels, normals, self._offsets, out)
+        return colours
+
+    def _profiles(self, part: ColourPart, pixels: Samples, normals: Samples) -> _Profiles:
+        """Share of the stripe's colour across each edge."""
+        colours = self._colours(part, pixels, normals)
+        share, distance = np.full(colours.shape[1:], np.nan), np.zeros(len(pixels))
+        kind = np.zeros(len(pixels), dtype=np.int64)
+        for flank, side in zip(_FLANKS, self._sides, strict=True):
+            here = colours[:, side]
+            outer = here[:, :, self._outside]
+            seen = np.isfinite(outer).all(axis=(0, 2))
+            if np.count_nonzero(seen) < SEAL.fewest_of_kind:
+                continue
+            means = outer.mean(axis=2)
+            means[:, ~seen] = means[:, seen].mean(axis=1, keepdims=True)
+            middle = _pooled(means)  # (3, n)
+            away = here - middle[:, :, None]
+            rest = away[:, :, self._outside].reshape(3, -1)
+            rest = rest[:, np.isfinite(rest).all(axis=0)]
+            spread = rest @ rest.T / rest.shape[1] + SEAL.noise**2 * np.eye(3)
+            low, high = (-SEAL.beside, -1.0) if flank else (-2.0 * SEAL.beside, -SEAL.beside)
+            inner = here[:, :, (self._offsets >= low) & (self._offsets <= high)].mean(axis=2)
+            step = inner - middle
+            towards = np.linalg.solve(spread, step)
+            apart = np.sum(towards * step, axis=0)
+            distance[side] = np.where(apart > SEAL.distinct**2, apart, 0.0)
+            if self._palette is not None:
+                kind[side] = np.argmin(np.sum((np.nan_to_num(inner).T[:, None] - self._palette) ** 2, axis=2), axis=1)
+            if flank and self._palette is not None:  # a thin stripe at the silhouette, another one beside it
+                share[side] = _most_of(self._palette.T[:, :, None] - middle[:, None], spread, away)
+            else:
+                share[side] = np.matmul(towards.T[:, None], away.transpose(1, 0, 2))[:, 0]
+                share[side] /= np.maximum(apart, 1e-9)[:, None]
+        return _Profiles(share, np.nan_to_num(distance), kind)
+
+    def _rows(self, flank: bool) -> slice:  # noqa: FBT001 - of `_FLANKS`
+        """Samples of a profile that are used: before the colours are known, the outermost stripe at a silhouette."""
+        first = int(OUTLINE.half_profile - SEAL.beside) if flank and self._palette is None else 0
+        return slice(first, None)
+
+    def _areas(self, share: Samples) -> Samples:
+        """Displacements of edges by several pixels: by how many samples lie inside."""
+        shifts = np.empty(len(share))
+        for flank, side in zip(_FLANKS, self._sides, strict=True):
+            rows = self._rows(flank)
+            shifts[side] = np.clip(share[side][:, rows], 0.0, 1.0).sum(axis=1) + self._offsets[rows][0] - 0.5
+        return shifts
+
+    def _fitted(self, share: Samples) -> tuple[Samples, Samples, Samples]:
+        """Displacement, contrast and root mean square residual of each profile, by least squares with the template."""
+        shifts, strengths, misses = np.full((3, len(share)), np.nan)
+        for flank, side in zip(_FLANKS, self._sides, strict=True):
+            values = share[side][:, self._rows(flank)]
+            design, inverse = self._designs[values.shape[1]]
+            numbers = values @ inverse.T
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shifts[side] = -numbers[:, 2] / numbers[:, 1]
+            strengths[side] = numbers[:, 1]
+            misses[side] = np.sqrt(np.sum((values - numbers @ design.T) ** 2, axis=1) / (len(design) - 3))
+        return shifts, strengths, misses
+
+    def _take(self, template: Samples) -> None:
+        """Take a profile of an edge, without displacement and of contrast 1, as the template."""
+        slope = np.gradient(template)
+        design = np.column_stack([np.ones(template.size), template, slope])
+        self._steepness = float(np.sqrt(np.sum(slope**2)))
+        rows = [design[self._rows(flank)] for flank in (False, True)]
+        self._designs = {len(some): (some, np.linalg.pinv(some)) for some in rows}
+
+
+def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> ColourPart:
+    """Blurred colours of a part (left, top, right, bottom) of a picture, 0 to 255."""
+    cv2 = required("cv2", "measuring a video", "video")
+    left, top, right, bottom = bounds
+    part = cv2.GaussianBlur(image[top:bottom, left:right].astype(np.float32), (0, 0), blur)
+    red, green, blue = (np.ascontiguousarray(part[..., channel], dtype=float) for channel in range(3))
+    return ColourPart((red, green, blue), np.array([left, top], dtype=float))
+
+
+def _most_of(steps: Samples, spread: Samples, away: Samples) -> Samples:
+    """Share of that colour of several of which there is most in each sample, (n, m).
+
+    Args:
+        steps: from the surroundings of each edge to each colour, (3, j, n).
+        spread: covariance of the surroundings, (3, 3).
+        away: from the surroundings to each sample, (3, n, m).
+    """
+    towards = np.linalg.solve(spread, steps.reshape(3, -1)).reshape(steps.shape)
+    towards /= np.sum(towards * steps, axis=0)
+    shares = np.matmul(towards.transpose(2, 1, 0), away.transpose(1, 0, 2))  # (n, j, m)
+    return np.asarray(np.clip(shares.max(axis=1), -0.2, 1.2))
+
+
+def _pooled(values: Samples) -> Samples:
+    """Means over neighbouring edges, (3, n)."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(values, 2 * SEAL.pooled + 1, axis=-1, mode="nearest"))

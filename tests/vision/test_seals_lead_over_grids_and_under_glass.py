@@ -1,0 +1,120 @@
+"""A robot on grid paper, its body of clear glass: its seal says where it is, and what stands still does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spirillum.vision.camera.optics import Optics
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.contour import EDGE_CUES
+from spirillum.vision.track.cues import agreement_of, cue_shifts
+from spirillum.vision.track.follow import follow
+from spirillum.vision.track.seal_search import SealSearch
+
+cv2 = pytest.importorskip("cv2")
+
+CAMERA = Optics((320, 240), 350.0, 0.2, 0.015)
+
+
+def on_paper(flat, time, *, clear):
+    """A drawn frame on paper with lines every 2 mm both ways; of the body a share is seen that the paper leaves."""
+    paper = replace(flat, start=(1.0, 0.0)).draw(time).astype(float)
+    lines = np.arange(-0.1, 0.1, flat.spacing)
+    for axis in (0, 1):
+        ends = np.zeros((lines.size, 3))
+        ends[:, axis] = lines
+        for at in flat.pixels(ends)[:, axis]:
+            there = np.clip(1.0 - np.abs(np.arange(paper.shape[1 - axis]) - at), 0.0, 1.0) * 0.5
+            shade = there[None, :, None] if axis == 0 else there[:, None, None]
+            paper += shade * (np.array([40.0, 60.0, 140.0]) - paper)
+    empty = replace(flat, start=(1.0, 0.0)).draw(time).astype(float)
+    dark, bright = (replace(flat, body=(level,) * 3).draw(time).astype(float) for level in (0, 255))
+    body = ((bright - dark) / 255.0).mean(axis=2, keepdims=True)
+    robot = np.clip(np.abs(dark - empty).sum(axis=2, keepdims=True) / 24.0, 0.0, 1.0)
+    under = robot * dark + (1.0 - robot) * paper
+    return np.clip(under + body * (clear * paper + (1.0 - clear) * np.array(flat.body)), 0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def film(flat_pictures):
+    return flat_pictures.Flat(velocity=2e-3, fps=8.0, frames=24, start=(0.012, 0.001), ruler=False, fine=4)
+
+
+def measured(film, folder, *, clear):
+    """The track of the frames on paper, without errors of the scale."""
+    (folder / "film").mkdir()
+    for index, time in enumerate(film.times):
+        cv2.imwrite(str(folder / "film" / f"{index:02d}.png"), on_paper(film, time, clear=clear)[:, :, ::-1])
+    path = folder / "setup.toml"
+    path.write_text(replace(film, ruler=False).setup_text())
+    setup, robot = load_setup(path)
+    return follow(folder / "film", setup, robot)
+
+
+@pytest.mark.parametrize("clear", [0.0, 0.9])
+def test_the_speed_over_a_grid_is_the_robots(film, tmp_path, clear):
+    track = measured(film, tmp_path, clear=clear)
+    true = film.truth(track.time)
+    pixel = track.scale.length_per_pixel
+    assert not [flag for flag in track.flags if "forward_velocity" in flag.spoils]
+    along = np.polyfit(track.time, track.position[:, 0] - true["x"], 1)[0] * np.ptp(track.time)
+    assert abs(along) < 0.3 * pixel  # of eleven that it moves
+    turned = np.polyfit(track.time, track.body_angle - true["body_angle"], 1)[0] * np.ptp(track.time)
+    assert abs(turned) < 0.1  # of two; a pixel across the seal is 0.06
+    assert track.cues["seal"].share == 1.0
+    assert track.cues["tail"].share > 0.9
+
+
+def test_a_seal_is_found_and_placed_whatever_lies_under_the_body(film, tmp_path):
+    path = tmp_path / "setup.toml"
+    path.write_text(film.setup_text())
+    _, robot = load_setup(path)
+    bounds = (0, 0, *film.size)
+    search, body = SealSearch(robot, CAMERA, bounds), BodyFinder(robot, CAMERA, bounds, colours=4)
+    for time in (0.0, 2.5):
+        image, true = on_paper(film, time, clear=1.0), film.truth(time)
+        best, *others = search.places(image)
+        assert best.score > 3.0 * max((one.score for one in others), default=0.0)
+        placed = body.place_by_seal(image, best.pose)
+        pixel = CAMERA.length_per_pixel
+        assert placed.known
+        assert placed.pose.x == pytest.approx(float(true["x"]), abs=0.5 * pixel)
+        assert placed.pose.y == pytest.approx(float(true["y"]), abs=1.5 * pixel)
+        assert body.size_by_seal([image], [placed.pose]) == pytest.approx(1.0, abs=0.04)
+
+
+def test_an_empty_grid_shows_no_seal(film, tmp_path):
+    path = tmp_path / "setup.toml"
+    path.write_text(film.setup_text())
+    _, robot = load_setup(path)
+    paper = on_paper(replace(film, start=(1.0, 0.0)), 0.0, clear=1.0)
+    places = SealSearch(robot, CAMERA, (0, 0, *film.size)).places(paper)
+    assert max((one.score for one in places), default=0.0) < 12.0
+
+
+def test_what_a_cue_alone_says_against_closed_forms():
+    """Edges with weights 1 that all lie off by 0.3 pixels of 4 per mm: 0.075 mm, and 1/(4 sqrt(n)) mm of error."""
+    count, slope = 25, 4e3
+    slopes = np.column_stack([np.full(count, slope), np.zeros(count), np.zeros(count)])
+    cue = np.full(count, EDGE_CUES.index("seal"))
+    found = cue_shifts(np.full(count, 0.3), slopes, np.ones(count), cue, 2.0)
+    assert found[EDGE_CUES.index("seal")] == pytest.approx([0.3 / slope, 2.0 / (slope * 5.0)])
+    assert np.isnan(found[EDGE_CUES.index("outline")]).all()
+
+
+def test_cues_that_move_apart_widen_the_speed_by_their_mixture():
+    time, pixel = np.linspace(0.0, 3.0, 31), 2.5e-4
+    shifts = []
+    for at in time / 3.0:
+        one = np.full((len(EDGE_CUES), 2), np.nan)
+        one[0], one[1] = (-0.5 * at * 2.0 * pixel, pixel), (0.5 * at * 2.0 * pixel, pixel)
+        shifts.append(one)
+    agreement = agreement_of(time, shifts, np.zeros(31), pixel)
+    assert agreement.drift == pytest.approx(pixel)  # half of 2 pixels, with equal weights
+    assert [flag.name for flag in agreement.flags] == ["cues-disagree"]
+    assert agreement.cues["coupling"].share == 0.0
+    assert agreement.cues["tail"].share == 1.0
+    alike = [one * np.array([0.0, 1.0]) for one in shifts]
+    assert agreement_of(time, alike, np.zeros(31), pixel).flags == ()
