@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import MOST_STATIONS
+from spirillum.fluid.wire.stokeslets import Accuracy
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.film_table import film_at
 from spirillum.robot.outline import Outline
@@ -101,8 +102,8 @@ def _wire_error(places: Places, workers: int = 1) -> float | None:
     if g.stations > MOST_STATIONS["high"]:
         return None
     seat = Seat.at_gap(g.body, places.radius, max(gap_of(Placement(), g.body_diameter, places.radius), places.thinnest))
-    tail, forms = (g, even_phases(_WIRE_PHASES)), ("standard", "high")
-    asked = [Solution((tail,), seat, Fineness(form, _WIRE_TOLERANCE)) for form in forms]
+    tail = g, even_phases(_WIRE_PHASES)
+    asked = [Solution((tail,), seat, Fineness(wire, _WIRE_TOLERANCE)) for wire in get_args(Accuracy)]
     speeds = [
         response_of(np.mean(found[0], axis=0))[0] for found in solutions(asked, "checking the wire", None, workers)
     ]
