@@ -1,17 +1,19 @@
 """The threads of the page: what one robot's numbers meet is told, and the next robot is answered for."""
 
+import io
 import json
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from spirillum.errors import InputError
 from spirillum.pages import theatre as module
+from spirillum.pages.job import Job, worker
 from spirillum.pages.lane import Lane
 from spirillum.pages.theatre import Theatre
-
-pytest.importorskip("aiohttp", reason="the page is an extra")
 
 
 @pytest.fixture
@@ -26,7 +28,7 @@ def lane_of(theatre: Theatre) -> dict[str, Any]:
     return found
 
 
-def until(true: Callable[[], Any], seconds: float = 60.0) -> None:
+def until(true: Callable[[], Any], seconds: float = 600.0) -> None:
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end
@@ -85,3 +87,38 @@ def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: The
     until(lambda: refused or lane_of(theatre)["trouble"])
     theatre.ask({"do": "preset", "value": "ecoli"}, refused.append)
     until(lambda: lane_of(theatre)["swims_by"] and lane_of(theatre)["numbers"])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (InputError("gap = 1 nm; allowed: more"), 2, "gap = 1 nm; allowed: more"),
+        (MemoryError(), 2, "the request does not fit into memory; allowed: a smaller one"),
+        (ZeroDivisionError("odd"), 1, "a fault of the program ended this request (ZeroDivisionError: odd)"),
+    ],
+)
+def test_a_process_beside_the_page_tells_why_it_failed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception, code: int, said: str
+) -> None:
+    def work(_request: dict[str, Any], progress: Callable[[str, int, int], None]) -> dict[str, Any]:
+        progress("half", 1, 2)
+        raise error
+
+    monkeypatch.setattr("sys.stdin", io.StringIO("{}"))
+    with pytest.raises(SystemExit) as left:
+        worker(work)
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert left.value.code == code
+    assert told[0]["what"] == "half"
+    assert said in told[-1]["failed"]
+
+
+def test_a_process_that_was_ended_says_so_and_what_it_prints_besides_is_no_progress(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ["import os, signal", "print('a library speaks')", "print('[1, 2]', flush=True)"]
+    (tmp_path / "ended_from_outside.py").write_text("\n".join([*lines, "os.kill(os.getpid(), signal.SIGKILL)"]))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    job = Job("ended_from_outside", {})
+    until(lambda: not job.running)
+    assert "ended from outside" in job.progress()["failed"]

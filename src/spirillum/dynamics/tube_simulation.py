@@ -27,6 +27,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.swimming.prediction import Prediction, free_in_tube
+from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
 from spirillum.units import show
 
@@ -164,6 +165,7 @@ def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: flo
     Raises:
         InputError: if there is something.
     """
+    check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
             f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"

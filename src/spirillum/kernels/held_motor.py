@@ -35,8 +35,9 @@ STATES = 5
 
 _BLOCK = 64
 """Robots of one block: their columns stay in the processor's cache."""
-_PIECES, _FEWEST, _MOST = 1.3, 16, 4_000_000
-"""Pieces of a step: for each time constant L/R of the motor at rest, and besides; errors below 1e-6 (tested)."""
+_PIECES, _FEWEST, _MOST = 2.0, 28, 4_000_000
+"""Pieces of a step: for each time constant L/R of the motor at rest, and besides; errors below 1e-6 (tested), also of
+drives that are switched at every step."""
 _GROWTH, _GROWTH_PER = 3.0, 0.25
 """How much longer the last piece is than the first, in lengths of the first: at most, and for each time constant."""
 _NOTHING = 1e-100

@@ -64,9 +64,9 @@ class Job:
             self._process.stdin.close()
         with self._process.stdout as told:
             for line in told:
-                with suppress(ValueError):  # what a library prints is no progress
+                with suppress(ValueError, TypeError):  # what a library prints is no progress
                     self._said = dict(json.loads(line))
-                    self._tell()
+                self._tell()
         if self._process.wait() != 0 and "failed" not in self._said:
             lost = "the process was ended from outside, as for want of memory; allowed: a smaller request"
             self._said = {"failed": "it was left off" if self._stopped else lost}

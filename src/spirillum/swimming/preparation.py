@@ -21,12 +21,13 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
+from spirillum.robot.options import ModelOptions
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
 from spirillum.swimming.loading import prepared
 from spirillum.units import show_apart
 
-__all__ = ["Prepared", "preparations_answer", "prepare", "prepare_all"]
+__all__ = ["Prepared", "check_usual_resolution", "preparations_answer", "prepare", "prepare_all"]
 
 
 _NOT_KEPT = (
@@ -174,6 +175,22 @@ def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
 _MOST_WORKERS = 64
 
 
+def check_usual_resolution(options: ModelOptions) -> None:
+    """Refuse a resolution of a robot whose table answers.
+
+    Args:
+        options: of the robot.
+
+    Raises:
+        InputError: if there is one.
+    """
+    if resolved := options.resolution:
+        raise InputError(
+            f"{resolved} of a robot whose table is asked for, which has its own resolution; allowed: only where the "
+            "flow is solved for (predict, or simulate with motion 'held')"
+        )
+
+
 def table_for(
     batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
@@ -192,9 +209,5 @@ def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:
     radius = tube_radius(batch)
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
-    if resolved := batch.options.resolution:
-        raise InputError(
-            f"{resolved} of a robot whose table is asked for, which has its own resolution; allowed: only where the "
-            "flow is solved for (predict, or simulate with motion 'held')"
-        )
+    check_usual_resolution(batch.options)
     return RobotGeometry.of(batch), radius
