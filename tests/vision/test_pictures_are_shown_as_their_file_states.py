@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
+from spirillum.vision.video.display import frame_display
 from spirillum.vision.video.frames import open_video
 
 av = pytest.importorskip("av")
@@ -125,6 +126,22 @@ def test_orientations_of_films(tmp_path, turn, ratio):
     assert np.abs(image - true).mean() < 4.0
     names = [*([] if ratio is None else ["pixels-not-square"]), *([] if turn == "upright" else ["pictures-turned"])]
     assert [flag.name for flag in video.flags] == names
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_an_unknown_kind_of_side_data_hides_no_rotation(quarters):
+    """PyAV raises where it has no name for a kind, and still gives the rotation, against the clock."""
+
+    class Frame:
+        rotation = 90 * quarters if quarters < 3 else -90
+
+        @property
+        def side_data(self):
+            raise ValueError("999 is not a valid Type")
+
+    picture = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    display, _ = frame_display(Frame(), 1.0)
+    assert np.array_equal(display.shown(picture), np.rot90(picture, quarters))
 
 
 def test_a_turn_that_is_no_quarter_is_mentioned(tmp_path):

@@ -248,16 +248,21 @@ def _lines_of(part: Samples) -> Lines | None:
 
 def _frequency(flat: Samples) -> float | None:
     """Spatial frequency of the clearest wave along the rows, lines per pixel; None without a clear peak."""
+    from scipy.fft import rfft  # several rows at a time
+
     width = flat.shape[1]
     length = 4 * 1 << int(np.ceil(np.log2(width)))
     rows = flat[:: max(2, len(flat) // _MOST_ROWS)]
-    spectrum = np.fft.rfft(rows * np.hanning(width).astype(flat.dtype), length, axis=1)
-    power = spectrum.real**2 + spectrum.imag**2
+    spectrum = rfft(rows * np.hanning(width).astype(flat.dtype), length, axis=1)
+    power = spectrum.real**2
+    power += spectrum.imag**2
     frequency = np.fft.rfftfreq(length)
+    level = np.sum(power, axis=0)
     # A ruler's wave spans the whole width, so that its peak holds a large share of a row's power.
     share = power / np.maximum(power[:, frequency > 1.0 / width].sum(axis=1, keepdims=True), 1e-9)
-    score = np.sum(share**2 * np.sqrt(power), axis=0)
-    level = np.sum(power, axis=0)
+    share *= share
+    share *= np.sqrt(power, out=power)
+    score = np.sum(share, axis=0)
     allowed = (frequency < 1.0 / _SHORTEST) & (frequency > _FEWEST / (2.0 * width))
     if not np.any(allowed):
         return None

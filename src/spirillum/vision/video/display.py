@@ -18,6 +18,8 @@ ASPECTS = (0.2, 5.0)
 """Least and largest width of a pixel over its height."""
 _SLANT = 0.02
 """Tangent of an angle to the next quarter turn from which on it is mentioned."""
+_QUARTERS = (False, False, False), (True, False, True), (False, True, True), (True, True, False)
+"""Transposed, mirrored across and mirrored down, for each number of quarter turns against the clock."""
 
 
 class Display(NamedTuple):
@@ -90,7 +92,10 @@ def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
         frame: decoded by PyAV.
         aspect: width of a stored pixel over its height.
     """
-    matrix = next((data for data in frame.side_data if data.type.name == "DISPLAYMATRIX"), None)
+    try:
+        matrix = next((data for data in frame.side_data if data.type.name == "DISPLAYMATRIX"), None)
+    except ValueError:  # side data of a kind that PyAV does not know hide all others
+        return Display(aspect, *_QUARTERS[round(frame.rotation / 90.0) % 4]), 0.0
     if matrix is None:
         return Display(aspect), 0.0
     a, b, _, c, d = np.frombuffer(matrix, dtype=np.int32)[:5].astype(float).tolist()
