@@ -145,7 +145,7 @@ class BodyFinder:
         if self.seal is not None:  # what does not move along with the seal is not the body's
             found = self._learn_seal(parts, poses)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
-        for turn in range(OUTLINE.learning_rounds):
+        for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
             stack = []
             for part, pose in zip(parts, poses, strict=True):
                 pixels, normals, _, _ = self.contour.places(pose, self.optics)
@@ -216,7 +216,7 @@ class BodyFinder:
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
     def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
-        """Apparent size of the seal over that of the robot's, by its length and its width; NaN where it is not seen.
+        """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides.
 
         Args:
             images: 8-bit RGB, (h, w, 3) each.
@@ -229,7 +229,7 @@ class BodyFinder:
             if part.colours is not None:
                 pixels, normals = self._seal_places(pose)
                 found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels))
-        return float(np.nanmedian(found)) if np.isfinite(found).any() else np.nan
+        return float(np.nanmedian(found)) if 2 * np.count_nonzero(np.isfinite(found)) > len(found) else np.nan
 
     @property
     def outline_moves(self) -> bool:

@@ -187,6 +187,8 @@ class SealConstants:
     """Fewest edges from which surroundings, and the bias of a colour, are learnt."""
     learning_rounds: int = 3
     """Rounds in which colours, biases and places of the frames are learnt in turn."""
+    joint_rounds: int = 3
+    """Rounds in which the edges that move with the seal are learnt with it."""
     follows_seal: tuple[float, float] = (0.5, 0.9)
     """Scatter of an edge about the motion of the seal alone, along and across the body, beyond which it does not move
     with the body, pixels: the seal tells the place across less well."""
@@ -194,6 +196,8 @@ class SealConstants:
     """The same about the motion of all edges that do."""
     fewest_of_side: int = 5
     """Fewest edges at each of two sides whose distance tells the seal's size."""
+    proportions: float = 0.15
+    """Relative difference of its length and its width from which on a block of colour is no whole seal."""
     size_tolerance: float = 0.02
     """Relative difference of its size up to which it is as expected: compression shifts edges of colours."""
     largest_difference: float = 0.1

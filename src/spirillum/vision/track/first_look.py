@@ -240,10 +240,8 @@ def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _L
         return None
     other = learnt._replace(poses=[one.pose for one in found])
     apart = np.array(other.poses)[:, 0] - poses[:, 0]
-    if (
-        float(np.std(apart)) > SEAL.apart * pixel
-        or abs(outline_seen(plain, other.typical).size - size) > SEAL.agreement
-    ):
+    alike = abs(outline_seen(plain, other.typical).size - size) < SEAL.agreement
+    if not alike or float(np.std(apart)) > SEAL.apart * pixel:
         return None
     return plain, other._replace(whole=[one.inside >= VISIBILITY.full_view for one in found])
 
@@ -253,7 +251,7 @@ def _outline_of(body: BodyFinder, learnt: _Learnt) -> OutlineFit:
     if not body.colours:
         return outline_seen(body, learnt.typical)
     size = body.size_by_seal([frame.image for frame in learnt.frames], learnt.poses)
-    return OutlineFit(1.0 if abs(size - 1.0) < SEAL.size_tolerance else size, BodyPose(0.0, 0.0, 0.0))
+    return OutlineFit(size if abs(size - 1.0) > SEAL.size_tolerance else 1.0, BodyPose(0.0, 0.0, 0.0))
 
 
 def _places(body: Shape, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0) -> list[list[Candidate]]:

@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across
-from spirillum.vision.track.constants import OUTLINE, SEAL
+from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
 
 __all__ = ["ColourPart", "SealEdges", "SealShifts", "colour_part"]
@@ -144,23 +144,24 @@ class SealEdges:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
     def size(self, seen: SealShifts, pixels: Samples) -> float:
-        """Size of the seal over the expected one, by the distances of its ends and of its silhouettes; NaN if unseen.
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
 
         Args:
             seen: displacements of its edges at the body's pose.
             pixels: expected places of the edges, (n, 2).
         """
-        found, weights = [], []
+        found, distances = [], []
         for first, last in ((0, 3), (1, 2)):
             sides = [self._sides[side] for side in (first, last)]
             known = [side[seen.known[side]] for side in sides]
             if min(len(side) for side in known) < SEAL.fewest_of_side:
-                continue
+                return np.nan
             middles = [np.median(pixels[side], axis=0) for side in sides]
-            distance = float(np.hypot(*(middles[1] - middles[0])))
-            found.append(sum(float(np.median(seen.shifts[side])) for side in known) / distance)
-            weights.append(distance)
-        return 1.0 + float(np.average(found, weights=weights)) if found else np.nan
+            distances.append(float(np.hypot(*(middles[1] - middles[0]))))
+            found.append(sum(float(np.median(seen.shifts[side])) for side in known) / distances[-1])
+        if abs(found[1] - found[0]) > SEAL.proportions:
+            return np.nan
+        return 1.0 + float(np.average(found, weights=distances))
 
     def _colours(self, part: ColourPart, pixels: Samples, normals: Samples) -> Samples:
         """Colour profiles along the normals, (3, n, m)."""
@@ -192,7 +193,9 @@ class SealEdges:
             step = inner - middle
             towards = np.linalg.solve(spread, step)
             apart = np.sum(towards * step, axis=0)
-            distance[side] = np.where(apart > SEAL.distinct**2, apart, 0.0)
+            glare = np.maximum(inner.min(axis=0), middle.min(axis=0)) > STRIPES.white  # it hides what it covers
+            clear = (apart > SEAL.distinct**2) & ~glare
+            distance[side] = np.where(clear, apart, 0.0)
             if self._palette is not None:
                 kind[side] = np.argmin(np.sum((np.nan_to_num(inner).T[:, None] - self._palette) ** 2, axis=2), axis=1)
             if flank and self._palette is not None:  # a thin stripe at the silhouette, another one beside it
