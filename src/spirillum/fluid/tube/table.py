@@ -22,7 +22,7 @@ from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.places import CHECKED_FROM
 from spirillum.fluid.tube.responses import RESPONSES
 from spirillum.fluid.tube.table_file import packed_from, to_bytes
-from spirillum.fluid.tube.wire_error import PLACES, SOLIDS_ERROR, wire_error
+from spirillum.fluid.tube.wire_error import SOLIDS_ERROR, at_any_place, wire_error
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.kernels import tube_table as kernel
@@ -86,8 +86,8 @@ class TubeTable:
         Args:
             yaw: nose to the side, rad.
         """
-        wire = wire_error(self.geometry, self.radius) if self.wire is None else PLACES * self.wire
-        return float(self.error_at(yaw)["forward_velocity"]) + wire + FINEST_WIRE_ERROR + SOLIDS_ERROR
+        known = wire_error(self.geometry, self.radius) if self.wire is None else at_any_place(self.wire)
+        return float(self.error_at(yaw)["forward_velocity"]) + known + FINEST_WIRE_ERROR + SOLIDS_ERROR
 
     def mirrored(self) -> TubeTable:
         """The table of the robot's mirror image, whose tail has the other hand."""

@@ -10,14 +10,14 @@ import math
 
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
-__all__ = ["LARGEST_WIRE_ERROR", "PLACES", "SOLIDS_ERROR", "wire_error"]
+__all__ = ["LARGEST_WIRE_ERROR", "SOLIDS_ERROR", "at_any_place", "wire_error"]
 
-PLACES = 1.1
+_PLACES = 1.1
 """Largest error at other places, pitched by up to 3 degrees and at gaps from 0.3 mm up to the axis, over that one."""
 SOLIDS_ERROR = 2e-4
 """Relative error of the drag of a body in a tube at the coarsest tolerance of a table; see `docs/accuracy.md`."""
-_LEAST = 0.5
-"""Least that is stated, percent: where thrust and drag err to the same side, their sum depends on the place more."""
+_LEAST = 0.005
+"""Least relative error there: where errors of thrust and drag nearly cancel, their sum depends on the place more."""
 _LENGTH, _WIRE = 60.0, 1.0  # of all that were measured, mm
 _MEASURED: dict[float, dict[tuple[float, float], float]] = {
     40.0: {
@@ -34,6 +34,7 @@ _MEASURED: dict[float, dict[tuple[float, float], float]] = {
         (15.0, 2.5): 0.35,
         (15.0, 3.5): -0.30,
         (10.0, 1.5): 0.47,
+        (10.0, 2.0): -0.87,
         (10.0, 2.5): -1.40,
         (10.0, 3.5): -1.37,
     },
@@ -57,7 +58,18 @@ _MEASURED: dict[float, dict[tuple[float, float], float]] = {
     },
 }
 """By how much `high` wires are faster, percent: by the tube's diameter, wavelength and amplitude of the tail, mm."""
-LARGEST_WIRE_ERROR = 0.01 * PLACES * max(abs(error) for tube in _MEASURED.values() for error in tube.values())
+
+
+def at_any_place(compared: float) -> float:
+    """Relative error that is stated of all places, from that at the one at which both wires were compared.
+
+    Args:
+        compared: relative difference there.
+    """
+    return _PLACES * max(abs(compared), _LEAST)
+
+
+LARGEST_WIRE_ERROR = at_any_place(max(abs(0.01 * error) for tube in _MEASURED.values() for error in tube.values()))
 """The largest of all that were measured."""
 
 
@@ -75,4 +87,4 @@ def wire_error(geometry: RobotGeometry, radius: float) -> float:
     like = math.isclose(of(geometry.tail_length), _LENGTH) and math.isclose(of(geometry.wire_diameter), _WIRE)
     known = _MEASURED.get(of(2.0 * radius), {}) if like else {}
     found = known.get((of(geometry.wavelength), of(geometry.amplitude)))
-    return LARGEST_WIRE_ERROR if found is None else 0.01 * PLACES * max(abs(found), _LEAST)
+    return LARGEST_WIRE_ERROR if found is None else at_any_place(0.01 * found)
