@@ -350,7 +350,7 @@ def test_a_robots_name_cannot_break_the_files(tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
     robot = sp.load(WIDE, name='a "robot" <--> & é')
     for ending in ("stl", "glb", "vtp", "urdf", "mjcf"):
-        sp.export(robot, tmp_path / f"my robot.{ending}", model="slender", sidecar=False, fineness=0.2)
+        sp.export(robot, tmp_path / f"my robot.{ending}", sidecar=False, fineness=0.2)
     assert ET.parse(tmp_path / "my robot.urdf").getroot().get("name") == robot.name
     comment = (tmp_path / "my robot.vtp").read_text("latin-1").split("<!-- ")[1].split(" -->")[0]
     assert json.loads(comment)["robot"] == robot.name

@@ -174,7 +174,7 @@ class LiveTracker:
             self._reason = str(error)
 
     def _begin(self, video: Video, samples: list[Frame]) -> None:
-        learnt = learnt_from(video, samples, self.setup, self.robot, self._folder)
+        learnt = learnt_from(video, samples, self.setup, self.robot, self._folder, by_seal=False)
         useless = [flag for flag in learnt.flags if set(EVERYTHING) <= set(flag.spoils)]
         if useless:
             raise InputError(useless[0].sentence)

@@ -95,7 +95,9 @@ class Identified(NamedTuple):
         return bool(np.isfinite(self.stripes.read(image, pose)[0])) or self.wire.reads(image, pose)
 
 
-def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified:
+def identify(
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, *, by_seal: bool = True
+) -> Identified:
     """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds.
 
     Args:
@@ -104,13 +106,14 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
         stated: the robot's body at the stated scale.
         frames: frames spread over the video.
         still: static background of the frames, (h, w, 3).
+        by_seal: whether it is looked for by its coloured seal first, else by its outline alone.
 
     Raises:
         InputError: if no object resembles the robot.
     """
     found: Identified | InputError
     try:
-        found, is_whole = _at_stated_size(name, setup, stated, frames, still)
+        found, is_whole = _at_stated_size(name, setup, stated, frames, still, by_seal=by_seal)
         if is_whole:
             return found
     except InputError as error:
@@ -132,10 +135,11 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
 
 
 def _at_stated_size(
-    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples
+    name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, *, by_seal: bool
 ) -> tuple[Identified, bool]:
     """What resembles the robot at its stated size, and whether seal or tail leave no doubt that it is the robot."""
-    found = identified_at(name, setup, stated, frames, still, 1.0, len(set(stripes_of(setup, stated.robot))))
+    colours = len(set(stripes_of(setup, stated.robot))) if by_seal else 0
+    found = identified_at(name, setup, stated, frames, still, 1.0, colours)
     if found.start.search is not None:
         if found.robot:
             return _with_nose(name, setup, stated, frames, still, found), True

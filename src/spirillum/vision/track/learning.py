@@ -44,7 +44,9 @@ class Learnt(NamedTuple):
         return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 
 
-def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None) -> Learnt:
+def learnt_from(
+    video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None, *, by_seal: bool = True
+) -> Learnt:
     """Learn from some frames.
 
     Args:
@@ -53,6 +55,7 @@ def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, f
         setup: its setup.
         robot: the robot in front of the camera.
         folder: folder of the setup file, to which the checkerboard's folder is relative.
+        by_seal: whether the robot is looked for by its coloured seal first, else by its outline alone.
 
     Raises:
         InputError: if neither ruler nor robot is found.
@@ -63,7 +66,7 @@ def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, f
     finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
     searched = searched_at(finder.shape().width, factor)
     still = still if searched == factor else background(frames, searched)
-    known = identify(video.name, setup, finder, frames, still)
+    known = identify(video.name, setup, finder, frames, still, by_seal=by_seal)
     poses = [known.start.expected(frame.time) for frame in frames]
     glare = standing_glare([frame.image for frame in frames], poses, known.start.body)
     known = known._replace(start=replace(known.start, seen=[]))  # what was learnt from is not needed any longer
