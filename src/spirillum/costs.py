@@ -1,4 +1,4 @@
-"""What a request may cost: sizes that follow from an input are estimated and bounded before anything is allocated."""
+"""Cost of a request: sizes that follow from an input are estimated and bounded before anything is allocated."""
 
 from __future__ import annotations
 

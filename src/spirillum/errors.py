@@ -10,7 +10,7 @@ __all__ = ["TOO_LARGE", "InputError", "clipped", "did_you_mean", "failure_senten
 
 _LONGEST = 800
 TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
-"""What is said of a MemoryError."""
+"""Message of a MemoryError."""
 
 
 class InputError(ValueError):

@@ -107,7 +107,7 @@ def is_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> Flags:
 
 
 def _refused(limits: Iterable[Limit]) -> list[Limit]:
-    """The same limits at `BEYOND_STOKES`; what has no Reynolds number, NaN, keeps them."""
+    """Limits on Reynolds numbers at `BEYOND_STOKES`; a limit without a Reynolds number, NaN, stays as it is."""
     return [
         replace(limit, bound=np.full(1, BEYOND_STOKES), holds=~(np.asarray(limit.value) > BEYOND_STOKES))
         for limit in limits

@@ -193,7 +193,8 @@ class SealConstants:
     """Scatter of an edge about the motion of the seal alone, along and across the body, beyond which it does not move
     with the body, pixels: the seal tells the place across less well."""
     follows: tuple[float, float] = (0.4, 0.4)
-    """The same about the motion of all edges that do."""
+    """Scatter about the motion of all edges that move with the body, along and across, beyond which an edge does not,
+    pixels."""
     fewest_of_side: int = 5
     """Fewest edges at each of two sides whose distance tells the seal's size."""
     proportions: float = 0.15
@@ -207,7 +208,7 @@ class SealConstants:
     outline_share: float = 0.6
     """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""
     nose_share: float = 0.8
-    """The same of the edges of the nose, which tell the way of the robot."""
+    """Share of the edges of the nose, which tell the way of the robot, that have to move with the seal, too."""
     apart: float = 0.3
     """Standard deviation between places by the outline alone and by the seal from which on they disagree, pixels."""
     moves: int = 1
@@ -286,7 +287,8 @@ class SizeConstants:
     largest_difference: float = 0.1
     """Relative difference beyond which no length is given."""
     unconfirmed: float = 0.05
-    """The same where the tail says nothing of the scale: another edge than the body's may be followed."""
+    """Relative difference beyond which no length is given where the tail says nothing of the scale: another edge than
+    the body's may be followed."""
     tail_agrees: float = 0.35
     """Difference of the tail's apparent size from the ruler's or the body's up to which it agrees with it, over the
     difference of these two."""
