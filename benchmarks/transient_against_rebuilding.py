@@ -15,7 +15,7 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.dynamics import held as transient
-from spirillum.fluid.closed.coefficients import local_coefficients
+from spirillum.fluid.closed.rft import local_coefficients
 from spirillum.robot.batch import RobotBatch
 from spirillum.swimming.prediction import predict
 

@@ -34,7 +34,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_resolution
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 from spirillum.swimming.steady import swim
 
 Row = dict[str, Any]

@@ -20,9 +20,17 @@ import spirillum as sp
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.film import FilmTable
+from spirillum.fluid.tube.outer_resistance import (
+    NodeSolution,
+    even_phases,
+    factor_of,
+    fourier,
+    matrices_at,
+    rest_at,
+    solutions,
+)
 from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
-from spirillum.fluid.tube.rest import Solution, even_phases, factor_of, fourier, matrices_at, rest_at, solutions
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.film_table import film_at
@@ -76,7 +84,7 @@ def main() -> None:
     table = FilmTable.of(places.geometry.body, places.radius, yaw=1.1 * LARGEST_YAW, pitch=1.1 * max(STEEPEST))
     film_at(table.packed, seat.offset, seat.pitch, seat.yaw, film)
     tails = tuple((RobotGeometry.of(batch), even_phases(_TRUE)) for batch in batches)
-    (solved,) = solutions([Solution(tails, seat, _FINENESS)], "phases", workers=1)
+    (solved,) = solutions([NodeSolution(tails, seat, _FINENESS)], "phases", workers=1)
     print(f"pitch {np.degrees(seat.pitch):.2f} deg, yaw {np.degrees(yaw):.2f} deg")
     print("\n".join(["| wavelength, phases | " + " | ".join(RESPONSES) + " |", "| --- |" + " ---: |" * len(RESPONSES)]))
     for (geometry, _), matrices in zip(tails, solved, strict=True):

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spirillum.fluid.wire.revolution import Panels, panels_of
-from spirillum.robot.outline import Line, Outline, body_outline, cylinder_outline
+from spirillum.robot.outline import Outline, Segment, body_outline, cylinder_outline
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -590,7 +590,7 @@ def _thick_wall(length: float, R: float, thickness: float, mesh: Mesh, half: flo
     """A tube cut square, of a wall with a thickness."""
     end, outer = 0.5 * length, R + thickness
     corners = [(0.0, R), (-end, R), (-end, outer), (0.0, outer), (end, outer), (end, R), (0.0, R)]
-    lines = tuple(Line(start, stop) for start, stop in pairwise(corners))
+    lines = tuple(Segment(start, stop) for start, stop in pairwise(corners))
     outline = Outline(lines, (True, True, False, True, True))
 
     def longest(_: int, x: Array, rho: Array) -> Array:

@@ -20,13 +20,13 @@ from typing import NamedTuple
 import numpy as np
 
 import spirillum as sp
+from spirillum.fluid.tube.outer_resistance import NodeSolution, solutions
 from spirillum.fluid.tube.places import CHECKED_FROM, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
-from spirillum.fluid.tube.rest import Solution, solutions
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels.tube_table import INSIDE
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 _PHASES = 3
 
@@ -98,7 +98,8 @@ def main() -> None:
     chosen = drawn(Places(tables[0].geometry, tables[0].radius), asked.places, asked.seed)
     fineness = Fineness("standard", asked.tolerance)
     questions = [
-        Solution(tuple((table.geometry, place.phases) for table in tables), place.seat, fineness) for place in chosen
+        NodeSolution(tuple((table.geometry, place.phases) for table in tables), place.seat, fineness)
+        for place in chosen
     ]
     answers = solutions(questions, "held out", _tell, asked.workers)
     yawed = np.array([place.seat.yaw != 0.0 for place in chosen])

@@ -15,7 +15,7 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.fluid.tube.tube import Tube
-from spirillum.swimming.loading import prepared
+from spirillum.swimming.robot_preparation import prepared
 from spirillum.swimming.steady import swim
 
 TUBES = ("biorob2012-wide", "biorob2012-narrow")

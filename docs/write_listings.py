@@ -179,7 +179,7 @@ def derived_quantities() -> str:
 
 def quantities() -> str:
     """The quantities of a prediction."""
-    from spirillum.swimming.answer import STEADY
+    from spirillum.swimming.steady_quantities import STEADY
 
     rows = [(f"`{item.name}`", item.unit, item.meaning, item.source) for item in STEADY]
     return table(("Quantity", "Unit", "Meaning", "Source"), rows)

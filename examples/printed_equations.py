@@ -7,8 +7,8 @@ resistance block and balances forces and torques. Both have to give the same spe
 import math
 
 import spirillum as sp
-from spirillum.fluid.closed.lighthill_integrals import lighthill_integrals
 from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.closed.sbt import lighthill_integrals
 
 robot = sp.load("biorob2012-wide")
 answer = sp.predict(robot, model="sbt", tail_rate="1.2 Hz", calibrated=False)

@@ -194,7 +194,7 @@ _PLUG = (0.2, 1e-5, 0.15, -2e-5)
 @pytest.fixture
 def walled(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A model with made-up walls and a made-up imposed flow, known by its name: its truth is linear algebra."""
-    from spirillum.answer import quantity
+    from spirillum.envelope import quantity
     from spirillum.fluid.closed.rft import Rft
     from spirillum.fluid.registry import MODELS, SWIMMER_MODELS
     from spirillum.robot.limits import Limit

@@ -4,7 +4,7 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.shown import Shown, html_of, text_of
+from spirillum.display import DisplayMixin, html_of, text_of
 
 ANSWER = {
     "schema": "spirillum.some-kind/1",
@@ -90,7 +90,7 @@ def test_every_public_answer_has_both_forms() -> None:
     public = [getattr(sp, name) for name in sp.__all__ if isinstance(getattr(sp, name), type)]
     answers = [kind for kind in public if hasattr(kind, "to_dict")]
     assert {"Control", "Flow", "LinearSystem", "Observation", "Swimming", "Tracked"} <= {a.__name__ for a in answers}
-    assert [kind.__name__ for kind in answers if not issubclass(kind, Shown)] == []
+    assert [kind.__name__ for kind in answers if not issubclass(kind, DisplayMixin)] == []
 
 
 def test_public_names_and_nothing_else() -> None:

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from spirillum.processes import as_they_come
+from spirillum.processes import imap_unordered
 
 
 def test_answers_of_several_processes_are_those_of_one() -> None:
     tasks = [1.0, 4.0, 9.0]
-    assert list(as_they_come(math.sqrt, tasks, 1)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
-    assert sorted(as_they_come(math.sqrt, tasks, 2)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
+    assert list(imap_unordered(math.sqrt, tasks, 1)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
+    assert sorted(imap_unordered(math.sqrt, tasks, 2)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="processes are looked up in /proc")

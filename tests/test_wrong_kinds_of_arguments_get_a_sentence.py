@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.argument_kinds import checked
+from spirillum.argument_validation import validate_arguments
 from spirillum.calibration.posterior import Sampling
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.turning_field import Field
 from spirillum.robot.arguments import Options
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.steady import swim
 from spirillum.virtual.degradation import Degradation
-from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
 WIDE = "biorob2012-wide"
 FUNCTIONS = [name for name in sp.__all__ if inspect.isfunction(getattr(sp, name)) and name != "citation"]
@@ -147,9 +147,9 @@ def test_numbers_and_lists_of_numpy_are_numbers_and_lists() -> None:
         return number, whole, names, flag
 
     names = np.array(["a", "b"])
-    assert checked(function)(np.float32(2.0), np.int64(3), names, np.True_)[:2] == (2.0, 3)
+    assert validate_arguments(function)(np.float32(2.0), np.int64(3), names, np.True_)[:2] == (2.0, 3)
     with pytest.raises(sp.InputError, match="whole = True; allowed: a whole number"):
-        checked(function)(2.0, True, names, False)
+        validate_arguments(function)(2.0, True, names, False)
 
 
 @pytest.mark.parametrize("time", [np.timedelta64(1, "s"), np.timedelta64(1, "ns")], ids=str)

@@ -27,7 +27,7 @@ from itertools import pairwise
 import numpy as np
 from mpmath import mp, mpf
 
-from spirillum.fluid.closed import lighthill_integrals as stored
+from spirillum.fluid.closed import sbt as stored
 
 DIGITS = 28
 SAMPLES = 64  # Chebyshev nodes: about twice the coefficients kept, so that aliasing stays below the last digit

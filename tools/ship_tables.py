@@ -17,7 +17,7 @@ from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
-from spirillum.studies.loading import load_study
+from spirillum.studies.study_loader import load_study
 
 _FOLDER = Path(spirillum.__file__).parent / "fluid" / "tube" / "tables"
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from spirillum.citations import citation as citation
     from spirillum.controllers.control import Control as Control
     from spirillum.controllers.control import control as control
-    from spirillum.designs.answer import Design as Design
     from spirillum.designs.design import design as design
+    from spirillum.designs.design_result import Design as Design
     from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
     from spirillum.dynamics.held_plants import HeldPlants as HeldPlants
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from spirillum.interfaces.serial_remote import SerialRemote as SerialRemote
     from spirillum.interfaces.serial_remote import VirtualRemote as VirtualRemote
     from spirillum.interfaces.serial_remote import remote as remote
-    from spirillum.live.answer import Tracked as Tracked
     from spirillum.live.observation import Observation as Observation
     from spirillum.live.session import track as track
     from spirillum.live.tracker import LiveTracker as LiveTracker
+    from spirillum.live.tracking_summary import Tracked as Tracked
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
     from spirillum.measurement.measure import Measurement as Measurement
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from spirillum.robot.batch import RobotBatch as RobotBatch
     from spirillum.robot.load import load as load
     from spirillum.robot.robot import Robot as Robot
-    from spirillum.swimming.answer import Swimming as Swimming
     from spirillum.swimming.comparison import ModelComparison as ModelComparison
     from spirillum.swimming.comparison import compare_models as compare_models
     from spirillum.swimming.prediction import Prediction as Prediction
@@ -68,6 +67,7 @@ if TYPE_CHECKING:
     from spirillum.swimming.preparation import prepare as prepare
     from spirillum.swimming.preparation import prepare_all as prepare_all
     from spirillum.swimming.steady import swim as swim
+    from spirillum.swimming.steady_quantities import Swimming as Swimming
     from spirillum.view.figures.plot import Plot as Plot
     from spirillum.view.figures.plot import plot as plot
     from spirillum.view.scene3d.film import Film as Film
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Calibrated": "spirillum.calibration.calibrated",
     "Control": "spirillum.controllers.control",
-    "Design": "spirillum.designs.answer",
+    "Design": "spirillum.designs.design_result",
     "Export": "spirillum.exports.write",
     "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.view.scene3d.film",
@@ -111,8 +111,8 @@ _HOME = {
     "SerialRemote": "spirillum.interfaces.serial_remote",
     "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",
-    "Swimming": "spirillum.swimming.answer",
-    "Tracked": "spirillum.live.answer",
+    "Swimming": "spirillum.swimming.steady_quantities",
+    "Tracked": "spirillum.live.tracking_summary",
     "VirtualCamera": "spirillum.virtual.live_camera",
     "VirtualRemote": "spirillum.interfaces.serial_remote",
     "calibrate": "spirillum.results.calibration",
@@ -163,9 +163,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)
     if not isinstance(value, type):
-        from spirillum.argument_kinds import checked
+        from spirillum.argument_validation import validate_arguments
 
-        value = checked(value)
+        value = validate_arguments(value)
         value.__module__ = __name__  # where it is found again, as processes that share work ask for
     globals()[name] = value
     return value

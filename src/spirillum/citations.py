@@ -8,8 +8,6 @@ from spirillum.errors import InputError
 from spirillum.fluid.registry import find_model
 from spirillum.version import own_version
 
-__all__ = ["REFERENCES", "citation"]
-
 REFERENCES: dict[str, str] = {
     "biorob2012": (
         "Experiments on In-Channel Swimming of an Untethered Biomimetic Robot with Different Helical Tails. "

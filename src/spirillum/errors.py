@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["TOO_LARGE", "InputError", "clipped", "did_you_mean", "failure_sentence"]
-
-
 _LONGEST = 800
 TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
 """Message of a MemoryError."""
@@ -35,11 +32,7 @@ def _one_line(text: str) -> str:
 
 
 def failure_sentence(error: BaseException) -> str:
-    """Return what a thread or process that goes on tells of an error that ended a piece of its work.
-
-    Args:
-        error: what was raised; what is neither bad input nor want of memory is a fault of the program.
-    """
+    """Return what a thread or process that goes on tells of an error that ended a piece of its work."""
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, MemoryError):

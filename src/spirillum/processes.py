@@ -19,8 +19,6 @@ from typing import TypeVar
 
 from spirillum.errors import InputError
 
-__all__ = ["AHEAD", "as_they_come", "memory_in_use"]
-
 AHEAD = 3
 """Tasks that wait or are answered for each process: what is sent ahead and what is not yet taken stays in memory."""
 
@@ -29,7 +27,7 @@ _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
 
 
-def as_they_come(
+def imap_unordered(
     work: Callable[[_Task], _Answer], tasks: Iterable[_Task], workers: int, *, besides: str = "", single: bool = False
 ) -> Iterator[tuple[_Task, _Answer]]:
     """Tasks with their answers: in order from this process, in any order from several.
@@ -40,9 +38,6 @@ def as_they_come(
         workers: number of processes; 1: this one.
         besides: what the sentence of an error says at its end, such as what is kept.
         single: whether every process keeps to one thread.
-
-    Raises:
-        InputError: if a process was ended from outside.
     """
     ahead = iter(tasks)
     first = list(islice(ahead, AHEAD * workers))

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 
 from spirillum.units import for_people
 
-__all__ = ["QUANTITIES", "Quantity", "attributes", "unit_of"]
-
 
 class Quantity(NamedTuple):
     """A quantity by its one definition."""

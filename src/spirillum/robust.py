@@ -8,24 +8,13 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = [
-    "MAD_TO_SIGMA",
-    "Line",
-    "least_squares_line",
-    "mad_scale",
-    "repeated_median_line",
-    "running_median",
-    "stretches_of",
-    "theil_sen_line",
-]
-
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4)."""
 _MOST_PIECES = 60
 """Points through which a repeated-median line goes at most: its work grows with their square."""
 
 
-class Line(NamedTuple):
+class LineFit(NamedTuple):
     """A straight line of one or several quantities over time."""
 
     time: float
@@ -71,7 +60,7 @@ def stretches_of(mask: np.ndarray) -> list[np.ndarray]:
     return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []
 
 
-def least_squares_line(time: Samples, values: Samples) -> Line:
+def least_squares_line(time: Samples, values: Samples) -> LineFit:
     """The least-squares line; its reference is the mean time.
 
     Args:
@@ -81,10 +70,10 @@ def least_squares_line(time: Samples, values: Samples) -> Line:
     middle, mean = float(time.mean()), values.mean(axis=0)
     spans = time - middle
     slope = spans @ (values - mean) / max(float(spans @ spans), 1e-300)
-    return Line(middle, np.asarray(mean), np.asarray(slope))
+    return LineFit(middle, np.asarray(mean), np.asarray(slope))
 
 
-def theil_sen_line(time: Samples, values: Samples) -> Line:
+def theil_sen_line(time: Samples, values: Samples) -> LineFit:
     """Theil and Sen's line: the median slope of all pairs of points, through the median of what remains.
 
     Args:
@@ -94,7 +83,7 @@ def theil_sen_line(time: Samples, values: Samples) -> Line:
     earlier, later = np.triu_indices(len(time), 1)
     span = time[later] - time[earlier]
     slope = np.median((values[later] - values[earlier]) / span[:, None], axis=0)
-    return Line(0.0, np.median(values - slope * time[:, None], axis=0), slope)
+    return LineFit(0.0, np.median(values - slope * time[:, None], axis=0), slope)
 
 
 def _medians_of_stretches(values: Samples) -> Samples:
@@ -106,7 +95,7 @@ def _medians_of_stretches(values: Samples) -> Samples:
     return np.concatenate([np.median(part, axis=1) for part in parts if part.size])
 
 
-def repeated_median_line(time: Samples, values: Samples) -> Line:
+def repeated_median_line(time: Samples, values: Samples) -> LineFit:
     """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
 
     It goes through the medians of at most 60 stretches of the series.
@@ -120,4 +109,4 @@ def repeated_median_line(time: Samples, values: Samples) -> Line:
     with np.errstate(invalid="ignore"):
         slopes = (y[:, None] - y) / (t[:, None] - t)
     slope = np.median(np.median(slopes[apart].reshape(t.size, -1), axis=1))
-    return Line(0.0, np.asarray(np.median(y - slope * t)), np.asarray(slope))
+    return LineFit(0.0, np.asarray(np.median(y - slope * t)), np.asarray(slope))

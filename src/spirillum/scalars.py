@@ -5,8 +5,6 @@ from __future__ import annotations
 from numbers import Integral, Real
 from typing import Any, TypeGuard
 
-__all__ = ["is_number", "is_true_or_false", "is_whole", "plain_minus"]
-
 _MINUS_SIGNS = dict.fromkeys(map(ord, "\u2212\u2010\u2011\u2012\u2013\u2014\ufe63\uff0d"), "-")
 """Minus sign, hyphens, dashes and wide forms, which word processors and PDF files put for `-`."""
 

@@ -9,15 +9,9 @@ from pydantic import BaseModel
 
 from spirillum.errors import InputError, did_you_mean
 
-__all__ = ["schema_of"]
-
 
 def schema_of(name: str) -> dict[str, Any]:
-    """JSON schema of a file.
-
-    Raises:
-        InputError: for an unknown name.
-    """
+    """JSON schema of a file."""
     from spirillum.fitted.calibration_file import CalibrationFile
     from spirillum.robot.fields import Section
     from spirillum.robot.meanings import meanings

@@ -34,12 +34,7 @@ def plain_unit(text: str) -> str:
 
 
 def spelled_names(units: Iterable[str], prefixes: Iterable[str]) -> Mapping[str, frozenset[str]]:
-    """Names of units with and without prefixes, by their lower-case form.
-
-    Args:
-        units: names, symbols and aliases.
-        prefixes: names and symbols.
-    """
+    """Names of units with and without prefixes, by their lower-case form."""
     found: dict[str, set[str]] = {}
     listed, before = list(units), list(prefixes)
     combined = [p + u for u in listed for p in before if len(p) > 1 or len(u) <= _LONGEST_SYMBOL]
@@ -49,13 +44,7 @@ def spelled_names(units: Iterable[str], prefixes: Iterable[str]) -> Mapping[str,
 
 
 def other_spellings(text: str, names: Mapping[str, frozenset[str]], *, loose: bool) -> Iterator[str]:
-    """Texts that may be meant by a unit's text: unknown words in other capitals, or as products of symbols.
-
-    Args:
-        text: a unit in plain signs.
-        names: see `spelled_names`.
-        loose: whether the first letter of a word, which is often a prefix, may be in other capitals too.
-    """
+    """Texts that may be meant by a unit's text: unknown words in other capitals, or as products of symbols."""
     found = _WORD.findall(text)
     pattern = _WORD.sub("{}", text)
     choices = [list(dict.fromkeys(_meanings(word, power, names, loose=loose))) for word, power in found]

@@ -21,22 +21,6 @@ from spirillum.unit_spelling import other_spellings, plain_unit, spelled_names
 if TYPE_CHECKING:
     import pint
 
-__all__ = [
-    "KINDS",
-    "USUAL",
-    "Kind",
-    "among",
-    "display_unit",
-    "float_note",
-    "for_people",
-    "in_unit",
-    "parse_option",
-    "parse_quantity",
-    "show",
-    "show_apart",
-    "shown_in",
-]
-
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
 )
@@ -189,11 +173,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 @lru_cache(maxsize=512)
 def _factor(unit: str, kind: Kind) -> float:
-    """SI value of one `unit` as a quantity of `kind`.
-
-    Raises:
-        InputError: if `unit` is unknown or measures something else.
-    """
+    """SI value of one `unit` as a quantity of `kind`."""
     if unit == kind.unit:
         return 1.0
     return _SI[unit] if unit in USUAL.get(kind.unit, ()) else _factor_by_pint(unit, kind)
@@ -289,16 +269,7 @@ class _NoUnitError(InputError):
 
 
 def parse_quantity(value: object, kind: Kind) -> float:
-    """Read a quantity such as ``"18 mm"`` or a pint quantity into an SI float.
-
-    Args:
-        value: text with number and unit, or an object with `magnitude` and `units` (pint).
-        kind: what is expected.
-
-    Raises:
-        InputError: if there is no unit, the unit is of another kind, or the number is not finite or out
-            of the allowed range. The sentence starts with the value; the caller puts the field before it.
-    """
+    """Read a quantity such as ``"18 mm"`` or a pint quantity into an SI float."""
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         value = f"{value.magnitude} {value.units}"
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
@@ -334,12 +305,7 @@ def parse_quantity(value: object, kind: Kind) -> float:
 
 
 def parse_option(name: str, value: str | float, kind: Kind) -> float:
-    """Read an option of a function or command: text with its unit, or a float in SI.
-
-    Raises:
-        InputError: if there is no unit, one of another kind, or a number out of range; the sentence starts with the
-            option's name.
-    """
+    """Read an option of a function or command: text with its unit, or a float in SI."""
     if is_number(value):
         try:
             value = f"{float(value)!r} {kind.unit}"
@@ -354,11 +320,7 @@ def parse_option(name: str, value: str | float, kind: Kind) -> float:
 
 
 def float_note(unit: str) -> str:
-    """Return the end of a refusal of a text without unit: what a float means there.
-
-    Args:
-        unit: SI unit of the quantity.
-    """
+    """Return the end of a refusal of a text without unit: what a float means there."""
     return f"; in Python a float is in {unit}"
 
 

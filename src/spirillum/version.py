@@ -6,8 +6,6 @@ import platform
 from functools import lru_cache
 from importlib.metadata import version
 
-__all__ = ["own_version", "versions"]
-
 
 @lru_cache(maxsize=1)
 def own_version() -> str:

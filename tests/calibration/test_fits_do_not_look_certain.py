@@ -167,7 +167,7 @@ def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None
 
 @pytest.mark.parametrize(("share", "words"), [(0.0372, "3.7 %"), (1.0, "100 %"), (0.123, "12 %"), (-0.5, "-50 %")])
 def test_shares_are_written_without_powers_of_ten(share: float, words: str) -> None:
-    from spirillum.shown import percent
+    from spirillum.display import percent
 
     assert percent(share) == words
 

@@ -10,8 +10,8 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.parameters import check_not_set
-from spirillum.swimming.answer import Intervals
 from spirillum.swimming.intervals import OF_TORQUE, knows_torque, without_torque
+from spirillum.swimming.steady_quantities import Intervals
 
 PLANTED = 8e-6
 MINE: Mapping[str, Any] = {

@@ -193,7 +193,7 @@ def test_steady_means_of_runs_have_the_intervals_of_predictions(fitted: Any, tmp
     """Of the same draws, few enough that a run takes all of them as a prediction does."""
     import xarray as xr
 
-    from spirillum.dynamics.answer import run_answer
+    from spirillum.dynamics.run_summary import run_answer
 
     path = tmp_path / "posterior.nc"
     with xr.open_datatree(fitted[1] / "posterior.nc") as whole:

@@ -154,12 +154,12 @@ def test_names_of_all_models_are_looked_at_before_the_first_is_fitted(monkeypatc
 
 
 def test_fitted_numbers_have_their_units(made: Callable[..., Path]) -> None:
-    from spirillum.calibration.ranking import Ranked, Ranking
+    from spirillum.calibration.ranking import ModelRank, Ranking
 
     path = made(presets=(WIDE,), wavelengths=(10.0, 15.0, 25.0))
     fit = sp.calibrate(path, WIDE, free="body_drag,wire_diameter", method="least-squares")
     one = np.zeros(fit.experiment.size)
-    ranked = Ranked("sbt", 0.0, 0.0, 0.0, 0.0, pareto=one, pointwise=one, fit=fit)
+    ranked = ModelRank("sbt", 0.0, 0.0, 0.0, 0.0, pareto=one, pointwise=one, fit=fit)
     said = Ranking((ranked,), ()).to_dict()["models"][0]["parameters"]
     assert {name: item["unit"] for name, item in said.items()} == {"body_drag": "1", "wire_diameter": "m"}
     for name, item in said.items():

@@ -188,11 +188,11 @@ def test_calibration_files_replace_the_robots_factors(run: Callable[..., Any], t
 
 
 def test_completion_offers_presets(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
-    from spirillum.cli import options
+    from spirillum.cli import shared_options
     from spirillum.fluid.registry import SWIMMER_MODELS
 
-    assert options.complete_presets("") == list(preset_names())
-    assert options.complete_presets("bio") == ["biorob2012-narrow", "biorob2012-wide"]
-    assert options.complete_parts("ro") == ["robot", "rotor"]
-    assert options.complete_auto_models("") == ["auto", *sorted(SWIMMER_MODELS)]
-    assert options.complete_resistance_models("p") == ["perrin"]
+    assert shared_options.complete_presets("") == list(preset_names())
+    assert shared_options.complete_presets("bio") == ["biorob2012-narrow", "biorob2012-wide"]
+    assert shared_options.complete_parts("ro") == ["robot", "rotor"]
+    assert shared_options.complete_auto_models("") == ["auto", *sorted(SWIMMER_MODELS)]
+    assert shared_options.complete_resistance_models("p") == ["perrin"]

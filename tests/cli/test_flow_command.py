@@ -24,8 +24,8 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model in closed form for the motion, and a sphere for the flow."""
     import spirillum.fields.flow as module
     from spirillum.fluid.tube.tube import Tube
-    from spirillum.swimming.loading import prepared
     from spirillum.swimming.prediction import predict
+    from spirillum.swimming.robot_preparation import prepared
 
     def quick(robot: Any, **options: Any) -> Any:
         known = {"model": "sbt", "resolution": None}

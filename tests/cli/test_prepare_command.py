@@ -9,7 +9,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.renderer import progress_bar
-from spirillum.fluid.tube.announced import announcement
+from spirillum.fluid.tube.progress_messages import progress_message
 from spirillum.swimming.preparation import Prepared
 
 
@@ -71,7 +71,7 @@ def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
 def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[str], quiet: bool) -> None:
     """A line on standard error, also where no progress bar is shown."""
     with progress_bar(quiet=quiet) as progress:
-        progress(announcement(60, 2, kept=0), 0, 60)
+        progress(progress_message(60, 2, kept=0), 0, 60)
         progress("table of the tube", 1, 60)
     shown = capsys.readouterr()
     assert shown.out == ""
@@ -82,5 +82,5 @@ def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[
 
 def test_what_an_interrupted_preparation_has_kept_is_announced() -> None:
     """The time is that of the rest."""
-    said = announcement(60, 2, kept=48)
+    said = progress_message(60, 2, kept=48)
     assert "from 60 places, 48 of them kept from before, 12 still to solve for, in 1 to 2 min" in said

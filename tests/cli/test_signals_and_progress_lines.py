@@ -14,7 +14,7 @@ import pytest
 
 from spirillum.cli import renderer
 from spirillum.cli.progress_lines import ProgressLines
-from spirillum.fluid.tube.announced import kept_after
+from spirillum.fluid.tube.progress_messages import kept_after
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 

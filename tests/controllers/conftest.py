@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.plant import Moment
-from spirillum.dynamics.poses import Pose
+from spirillum.dynamics.plant import Snapshot
+from spirillum.dynamics.poses import RobotPose
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Toy:
     steps: list[tuple[float, float]] = field(default_factory=list)
     duty: float = 0.0
 
-    def step(self, dt: float, *, duty: float, field: None = None) -> Moment:
+    def step(self, dt: float, *, duty: float, field: None = None) -> Snapshot:
         if self.state.ended:
             raise sp.InputError("the run has ended")
         self.duty = duty
@@ -45,16 +45,16 @@ class Toy:
         self.state = replace(self.state, time=self.state.time + dt, x=x, ended=ended)
         return self.observe()
 
-    def observe(self) -> Moment:
+    def observe(self) -> Snapshot:
         values = dict.fromkeys(("yaw", "body_angle", "electrical_energy", "drive_energy"), 0.0)
         values |= {"duty": self.duty, "forward_velocity": self.duty * self.speed, "motor_current": 0.3 * self.duty}
-        pose = Pose(np.array([self.state.x, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]), 0.0)
-        return Moment(self.state.time, pose, {**values, "battery_voltage": 3.7}, self.state.ended)
+        pose = RobotPose(np.array([self.state.x, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]), 0.0)
+        return Snapshot(self.state.time, pose, {**values, "battery_voltage": 3.7}, self.state.ended)
 
     def impose_flow(self, velocity: float | None) -> None:
         self.state = replace(self.state, flow=velocity)
 
-    def reset(self, state: ToyState) -> Moment:
+    def reset(self, state: ToyState) -> Snapshot:
         self.state = state
         return self.observe()
 

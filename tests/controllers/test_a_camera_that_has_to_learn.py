@@ -9,8 +9,8 @@ import pytest
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
+from spirillum.controllers.registry import StopController
 from spirillum.controllers.sensors import Senses
-from spirillum.controllers.stopping import StopAt
 
 
 class Learning(Senses):
@@ -28,15 +28,15 @@ class Learning(Senses):
 
 def test_the_robot_swims_while_its_look_is_learnt_and_not_when_the_camera_has_stopped(toy: Any) -> None:
     lab = Lab.exact()
-    run = run_loop(toy(), StopAt(lab, 1e-3, 1.0, 6e-3, 5e-4), lab, 10.0, senses=Learning(lab, 0))
+    run = run_loop(toy(), StopController(lab, 1e-3, 1.0, 6e-3, 5e-4), lab, 10.0, senses=Learning(lab, 0))
     assert run.silent is None
     assert run.moments[-1].pose.position[0] == pytest.approx(6e-3, abs=5e-4)
     failing = lab.model_copy(update={"camera": lab.camera.model_copy(update={"fails_at": 1.0})})
-    run = run_loop(toy(), StopAt(failing, 1e-3, 1.0, 6e-3, 5e-4), failing, 10.0, senses=Learning(failing, 0))
+    run = run_loop(toy(), StopController(failing, 1e-3, 1.0, 6e-3, 5e-4), failing, 10.0, senses=Learning(failing, 0))
     assert run.silent is not None
     assert run.moments[-1].pose.position[0] < 1e-3 * (1.0 + SILENCE + 0.05)
     slow = Learning(lab, 0)
     slow.ready = np.inf
-    run = run_loop(toy(), StopAt(lab, 1e-3, 1.0, 6e-3, 5e-4), lab, 30.0, senses=slow)
+    run = run_loop(toy(), StopController(lab, 1e-3, 1.0, 6e-3, 5e-4), lab, 30.0, senses=slow)
     assert run.ended.startswith("nothing is seen after 12")
     assert run.moments[-1].values["duty"] == 0.0

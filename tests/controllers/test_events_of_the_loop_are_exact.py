@@ -13,7 +13,7 @@ import spirillum as sp
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
 from spirillum.controllers.sensors import FlowPulse, draw
-from spirillum.controllers.signals import News
+from spirillum.controllers.signals import Message
 from spirillum.errors import InputError
 
 SPEED = 1e-3
@@ -28,7 +28,7 @@ class Always:
     def __init__(self, duty: float = 1.0) -> None:
         self.duty, self.told = duty, []
 
-    def decide(self, news: News) -> float:
+    def decide(self, news: Message) -> float:
         self.told.append(news)
         return self.duty
 
@@ -150,7 +150,7 @@ class Broken(Always):
         super().__init__()
         self.how = how
 
-    def decide(self, news: News) -> float:
+    def decide(self, news: Message) -> float:
         if news.time > 1.0:
             raise self.how
         return 1.0

@@ -11,9 +11,9 @@ import pytest
 from spirillum.controllers.bank import Paths, interpolation, points
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learner import Learner, Learning
-from spirillum.controllers.learning import Stretch, learnt
+from spirillum.controllers.learning import DriveInterval, learnt
 from spirillum.controllers.loop import run_loop
-from spirillum.controllers.signals import News, Reading, Sight
+from spirillum.controllers.signals import Detection, Message, MeterReading
 
 LAB = {"unknown": {"friction_factor": 3.0, "gap_factor": 2.0, "voltage_error": 0.01, "viscosity_error": 0.02}}
 END = 8.0
@@ -44,7 +44,7 @@ def paths(*, gap: float = 1.0) -> Paths:
     return Paths(time, members, sensitivity)
 
 
-def trial(lab: Lab, seed: int, *, gap: float = 1.0) -> tuple[tuple[float, float], list[Sight], list[Reading]]:
+def trial(lab: Lab, seed: int, *, gap: float = 1.0) -> tuple[tuple[float, float], list[Detection], list[MeterReading]]:
     """What camera and meter tell of a robot that was drawn as the lab says."""
     rng = np.random.default_rng(seed)
     u, v = rng.uniform(-1.0, 1.0, 2)
@@ -59,13 +59,13 @@ def trial(lab: Lab, seed: int, *, gap: float = 1.0) -> tuple[tuple[float, float]
         tail, body, *_ = done(u, v, time, *errors, gap=gap)
         tail += camera.tail_phase_noise * rng.standard_normal() + camera.tail_phase_wander * slow[0]
         body += camera.body_angle_noise * rng.standard_normal() + camera.body_angle_wander * slow[1]
-        sights.append(Sight(time, 0.0, 0.0, float(body) + 0.3, float(tail) - 2.0))
+        sights.append(Detection(time, 0.0, 0.0, float(body) + 0.3, float(tail) - 2.0))
     readings = []
     for number in range(int(END * meter.rate)):
         *_, current, voltage = done(u, v, number / meter.rate, *errors, gap=gap)
         current = gains[0] * current + meter.current_noise * rng.standard_normal()
         voltage *= gains[1] * (1.0 + meter.voltage_noise * rng.standard_normal())
-        readings.append(Reading(number / meter.rate, float(current), float(voltage)))
+        readings.append(MeterReading(number / meter.rate, float(current), float(voltage)))
     return (float(3.0**u), float(2.0**v)), sights, readings
 
 
@@ -75,7 +75,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(trials: int) -> None:
     held, widths = [], []
     for seed in range(trials):
         truth, sights, readings = trial(lab, seed)
-        found = learnt(bank, lab, [Stretch(0.0, END)], sights, readings)
+        found = learnt(bank, lab, [DriveInterval(0.0, END)], sights, readings)
         assert found is not None
         factors = (found.friction, found.gap)
         held.append([one.low <= true <= one.high for one, true in zip(factors, truth, strict=True)])
@@ -88,7 +88,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(trials: int) -> None:
 def test_a_gap_that_changes_nothing_is_not_told() -> None:
     lab = Lab.of(LAB)
     _, sights, readings = trial(lab, 3, gap=0.0)
-    found = learnt(paths(gap=0.0), lab, [Stretch(0.0, END)], sights, readings)
+    found = learnt(paths(gap=0.0), lab, [DriveInterval(0.0, END)], sights, readings)
     assert found is not None
     assert found.friction.told
     assert not found.gap.told
@@ -97,13 +97,13 @@ def test_a_gap_that_changes_nothing_is_not_told() -> None:
 def test_nothing_is_said_before_there_is_enough_to_see() -> None:
     lab = Lab.of(LAB)
     _, sights, readings = trial(lab, 3)
-    assert learnt(paths(), lab, [Stretch(0.0, 1.0)], sights, readings) is None
+    assert learnt(paths(), lab, [DriveInterval(0.0, 1.0)], sights, readings) is None
 
 
 def test_without_a_meter_the_interval_is_wider() -> None:
     lab, bank = Lab.of(LAB), paths()
     _, sights, readings = trial(lab, 5)
-    wide, narrow = (learnt(bank, lab, [Stretch(0.0, END)], sights, told) for told in ([], readings))
+    wide, narrow = (learnt(bank, lab, [DriveInterval(0.0, END)], sights, told) for told in ([], readings))
     assert wide is not None
     assert narrow is not None
     assert wide.friction.high / wide.friction.low > narrow.friction.high / narrow.friction.low
@@ -136,7 +136,7 @@ class Late:
 
     blind, knowing = True, False
 
-    def decide(self, news: News) -> float:
+    def decide(self, news: Message) -> float:
         return float(news.time > 3.0)
 
     def estimate(self) -> Mapping[str, float]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.controllers.course import LEASH, KeepCourse, SaveBattery, Steady
+from spirillum.controllers.course_tasks import LEASH, KeepCourse, SaveBattery, Steady
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun, run_loop
 from spirillum.controllers.sensors import FlowPulse

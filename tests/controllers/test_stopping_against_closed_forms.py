@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.controllers.follower import Follower
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import run_loop
+from spirillum.controllers.position_filter import PositionFilter
+from spirillum.controllers.registry import KnowingStop, StopController, Timed
 from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import Sight
-from spirillum.controllers.stopping import KnowingStop, StopAt, Timed
+from spirillum.controllers.signals import Detection
 
 SPEED, GOAL, TOLERANCE = 1e-3, 5e-3, 1e-3
 
@@ -26,7 +26,7 @@ def test_with_exact_sensors_the_rest_is_what_it_moves_in_a_period(toy: Any) -> N
             "remote": lab.remote.model_copy(update={"delay": 0.2}),
         }
     )
-    run = run_loop(toy(SPEED), StopAt(lab, SPEED, 1.0, GOAL, TOLERANCE), lab, 12.0)
+    run = run_loop(toy(SPEED), StopController(lab, SPEED, 1.0, GOAL, TOLERANCE), lab, 12.0)
     rest = run.moments[-1].pose.position[0] - (GOAL - 0.5 * TOLERANCE)
     assert 0.0 <= rest <= SPEED * lab.remote.period + 2e-5
 
@@ -37,7 +37,7 @@ def test_pulses_before_and_after_the_stop_leave_it_within_the_tolerance(
     toy: Any, velocity: float, start: float
 ) -> None:
     lab = Lab.of({"camera": {"dropped": 0.1}, "remote": {"lost": 0.1}})
-    controller = StopAt(lab, 0.5 * SPEED, 1.0, GOAL, TOLERANCE)  # it expects half the speed
+    controller = StopController(lab, 0.5 * SPEED, 1.0, GOAL, TOLERANCE)  # it expects half the speed
     run = run_loop(toy(SPEED), controller, lab, 20.0, flow=FlowPulse(start, start + 2.0, velocity), seed=2)
     assert abs(run.moments[-1].pose.position[0] - GOAL) < TOLERANCE
 
@@ -59,7 +59,7 @@ def test_who_knows_a_coming_pulse_lets_it_carry(toy: Any) -> None:
 
 def test_a_robot_that_swims_backwards_stops_alike(toy: Any) -> None:
     lab = Lab.exact()
-    run = run_loop(toy(-SPEED), StopAt(lab, -SPEED, 1.0, -GOAL, TOLERANCE), lab, 12.0)
+    run = run_loop(toy(-SPEED), StopController(lab, -SPEED, 1.0, -GOAL, TOLERANCE), lab, 12.0)
     assert 0.0 <= -run.moments[-1].pose.position[0] - (GOAL - 0.5 * TOLERANCE) <= SPEED * lab.remote.period + 2e-5
 
 
@@ -69,7 +69,7 @@ def test_the_followers_error_is_what_it_says() -> None:
     found = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        follower = Follower(lab, SPEED)
+        follower = PositionFilter(lab, SPEED)
         follower.send(0.0, 1.0)
         x, speed, drift = 0.0, SPEED * (1.0 + 0.3 * rng.standard_normal()), 0.0
         slow, kept = 3e-5 * rng.standard_normal(), np.exp(-dt)
@@ -80,7 +80,7 @@ def test_the_followers_error_is_what_it_says() -> None:
             left = np.exp(-dt / 2.0)
             drift = left * drift + 3e-4 * np.sqrt(1 - left**2) * rng.standard_normal()
             slow = kept * slow + 3e-5 * np.sqrt(1 - kept**2) * rng.standard_normal()
-            follower.see(Sight(time, x + slow + 1e-5 * rng.standard_normal(), 0.0, 0.0, 0.0))
+            follower.see(Detection(time, x + slow + 1e-5 * rng.standard_normal(), 0.0, 0.0, 0.0))
         mean, spread = follower.ahead(10.0)
         found.append((mean - (x, speed, drift, slow)) / np.sqrt(np.diag(spread)))
     assert np.abs(np.mean(found, axis=0)).max() < 0.5
@@ -88,7 +88,7 @@ def test_the_followers_error_is_what_it_says() -> None:
 
 
 def test_a_stray_sight_is_left_out() -> None:
-    follower = Follower(Lab.of(None), SPEED)
+    follower = PositionFilter(Lab.of(None), SPEED)
     for number in range(1, 60):
-        follower.see(Sight(number / 30.0, 0.0 if number != 40 else 5e-3, 0.0, 0.0, 0.0))
+        follower.see(Detection(number / 30.0, 0.0 if number != 40 else 5e-3, 0.0, 0.0, 0.0))
     assert abs(follower.ahead(2.0)[0][0]) < 1e-4

@@ -9,10 +9,10 @@ from scipy.optimize import minimize_scalar
 
 import posteriors
 import spirillum as sp
-from spirillum.designs.answer import Learned
-from spirillum.designs.bench import Bench
+from spirillum.designs.design_result import Learned
 from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.leads import lead_warnings
+from spirillum.designs.improvement import lead_warnings
+from spirillum.designs.manufacturability import Manufacturability
 from spirillum.designs.reading import condition_of, quantity_of
 from spirillum.designs.search import Archive, best_design
 from spirillum.designs.space import space_of
@@ -76,7 +76,7 @@ def best_angle(model: ConstantCoefficients, quantity: str) -> tuple[float, float
     space = space_of(robot, {"tail.wavelength": "3 mm:60 mm"})
     objective = Objective(quantity_of(quantity, "maximise"), 1.0)
     drawn = Unknowns(robot).draws(1, 1)
-    evaluation = Evaluation(space, model, (objective,), (), Bench(mandrel=0.0), drawn, 0.95)
+    evaluation = Evaluation(space, model, (objective,), (), Manufacturability(mandrel=0.0), drawn, 0.95)
     found = best_design(evaluation, Archive(), seed=1)
     wavelength = float(space.values(found.shares[None])[0, 0])
     swum = evaluation.swum(found.shares[None])
@@ -386,7 +386,7 @@ def test_what_is_wrong_is_said(change: dict, words: str) -> None:
 
 def test_bench_refuses_what_cannot_be_wound() -> None:
     batch = RobotBatch.of(sp.load("biorob2012-wide")).with_values({"tail.wavelength": [2e-3, 25e-3]})
-    assert [bool(limit.holds.all()) for limit in Bench().limits(batch)] == [True, True]
-    tight = Bench(mandrel=100.0).limits(batch)[1]
+    assert [bool(limit.holds.all()) for limit in Manufacturability().limits(batch)] == [True, True]
+    tight = Manufacturability(mandrel=100.0).limits(batch)[1]
     assert not tight.holds.any()
     assert find_swimmer_model("sbt").closed_form

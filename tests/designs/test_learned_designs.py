@@ -8,10 +8,10 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.learned import Points, chosen_model, corrected, points_of, solved_at
 from spirillum.designs.learning import learned_best
+from spirillum.designs.manufacturability import Manufacturability
 from spirillum.designs.reading import quantity_of
 from spirillum.designs.space import Variable, space_of
 from spirillum.designs.unknowns import Unknowns, unknowns_of
@@ -46,7 +46,7 @@ def test_learned_optimum_is_that_of_the_truth(robot: Robot, monkeypatch: pytest.
     unknowns = unknowns_of(robot, FRICTION, None, "slender")
     space = space_of(robot, TAIL)
     objective = Objective(quantity_of("forward_velocity", "maximise"), 1.0)
-    blank = Evaluation(space, Rft(), (objective,), (), Bench(), unknowns.draws(32, 1), 0.95)
+    blank = Evaluation(space, Rft(), (objective,), (), Manufacturability(), unknowns.draws(32, 1), 0.95)
     learned, _, best, known = learned_best(blank, unknowns, "slender", 1, lambda *_: None, truth)
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 31)] * 2), axis=-1).reshape(-1, 2)
     most = np.nanmax(blank.scores(grid).values)

@@ -137,11 +137,11 @@ def _modules() -> dict[str, ModuleType]:
 @pytest.fixture(scope="module")
 def stand_in() -> Iterator[StandIn]:
     """Let the engine run on the stand-in."""
-    from spirillum.dynamics import tube_integration, turn_map
+    from spirillum.dynamics import return_map, tube_integration
 
     modules = _modules()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tube_integration, "tube_motion", modules["motion"])
         patch.setattr(tube_integration, "tube_steps", modules["steps"])
-        patch.setattr(turn_map, "tube_steps", modules["steps"])
+        patch.setattr(return_map, "tube_steps", modules["steps"])
         yield StandIn(modules["motion"])

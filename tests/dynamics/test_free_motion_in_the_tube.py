@@ -11,10 +11,10 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics import table_check
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
-from spirillum.dynamics.resting_film import lubrication_resistance
+from spirillum.dynamics.return_map import STEPS, ReturnMap
+from spirillum.dynamics.settling import lubrication_resistance
 from spirillum.dynamics.table_check import held_against_check
 from spirillum.dynamics.tube_integration import observed_at
-from spirillum.dynamics.turn_map import STEPS, TurnMap
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -67,7 +67,7 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     """From a tenth of a degree beside it: by e in the approach time, once the faster ways have died out."""
     motion = found()
     lying = motion.run.lying
-    turns = TurnMap(motion.robot, 1.0)
+    turns = ReturnMap(motion.robot, 1.0)
     state = motion.run.start.copy()
     rest = float(observed_at(motion.robot, state)[kernel.AZIMUTH])
     cos, sin = np.cos(0.002), np.sin(0.002)

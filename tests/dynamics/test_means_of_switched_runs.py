@@ -68,7 +68,7 @@ def test_a_motion_that_still_starts_is_not_steady(motion: str, decay: float) -> 
     assert np.isnan(run["mean_forward_velocity_steady"])
     assert float(run["time_steady"]) == 0.0
     assert float(run["mean_forward_velocity_on"]) > 0
-    from spirillum.dynamics.answer import run_answer
+    from spirillum.dynamics.run_summary import run_answer
 
     assert run_answer(run)["mean_forward_velocity_steady"]["value"] is None
 

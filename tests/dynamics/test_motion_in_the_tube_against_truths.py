@@ -12,7 +12,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics import table_check
-from spirillum.dynamics.answer import run_answer
+from spirillum.dynamics.run_summary import run_answer
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, read_flow

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 
-from spirillum.dynamics.long_run import Path, _around
-from spirillum.dynamics.turn_map import STEPS, Turn
+from spirillum.dynamics.return_map import STEPS, Turn
+from spirillum.dynamics.steady_state_search import Path, _around
 from spirillum.kernels import tube_motion as kernel
-from spirillum.swimming.lying import Lying, State
+from spirillum.swimming.steady_state import State, SteadyState
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ from spirillum.swimming.lying import Lying, State
     ],
 )
 def test_statement_says_whether_and_why(state: State, rate: float, words: str) -> None:
-    lying = Lying(state, 0.0, 1e-3, (1e-3, 1e-3), 0.0, 0.0, rate, 0.0, 10.0, np.nan, "the battery")
+    lying = SteadyState(state, 0.0, 1e-3, (1e-3, 1e-3), 0.0, 0.0, rate, 0.0, 10.0, np.nan, "the battery")
     assert re.match(words, lying.statement)
     assert lying.to_dict()["gap"]["over"] == ("a circuit" if state == "goes around" else "a turn of the tail")
 

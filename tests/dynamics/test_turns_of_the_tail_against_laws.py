@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.long_run import long_run
+from spirillum.dynamics.return_map import ReturnMap, fixed_place
+from spirillum.dynamics.steady_state_search import long_run
 from spirillum.dynamics.tube_robot import Surroundings, tube_robot
 from spirillum.dynamics.tube_start import StartPlace, laid_down
-from spirillum.dynamics.turn_map import TurnMap, fixed_place
 from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.prediction import predict
 from spirillum.swimming.steady import calibrated_resistance
@@ -50,7 +50,7 @@ def test_mirrored_robot_comes_to_lie_on_the_other_side(stand_in: Any) -> None:
     places = []
     for hand, rate in (("right", 2.0), ("left", -2.0)):
         one, links = of_long_capsule(stand_in, rate, hand, weight=True, rest=1.0)
-        turns, state = TurnMap(links, np.sign(rate)), laid_down(one, links, StartPlace(gap=3e-4))
+        turns, state = ReturnMap(links, np.sign(rate)), laid_down(one, links, StartPlace(gap=3e-4))
         for _ in range(20):
             state = turns.after(state).state
         place = fixed_place(turns, state, heavy=True)

@@ -13,7 +13,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.exports.fmu import build
-from spirillum.exports.fmu.units import base_units
+from spirillum.exports.fmu.build import base_units
 from spirillum.quantities import QUANTITIES, unit_of
 
 fmpy: Any = pytest.importorskip("fmpy")

@@ -153,8 +153,8 @@ def test_compressed_parts_of_a_study_are_not_inflated(tmp_path: Path) -> None:
     with zipfile.ZipFile(parts / "part-00000.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("outside.npy", b"\0" * (64 << 20))
     assert (parts / "part-00000.npz").stat().st_size < 1 << 20
-    from spirillum.studies.kept_parts import kept
-    from spirillum.studies.loading import load_study
+    from spirillum.studies.run import kept
+    from spirillum.studies.study_loader import load_study
     from spirillum.studies.work import tasks
 
     task = next(iter(tasks(load_study(study))))

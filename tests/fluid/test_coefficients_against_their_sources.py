@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.fluid.closed.coefficients import coefficient_domain, local_coefficients
+from spirillum.fluid.closed.rft import coefficient_domain, local_coefficients
 from spirillum.robot.limits import all_hold
 
 MU = 3.5

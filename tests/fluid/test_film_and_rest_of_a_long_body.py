@@ -11,7 +11,7 @@ from spirillum.fluid.tube.confined import held_in_tube
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 A = 9.0
 LENGTHS = (75.0, 95.0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from spirillum.fluid.closed.lighthill_integrals import ALPHA_MIN, COEFFICIENTS, lighthill_integrals
+from spirillum.fluid.closed.sbt import ALPHA_MIN, COEFFICIENTS, lighthill_integrals
 
 
 def integrals_at(alpha: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from scipy.special import ellipe, ellipkm1
 
 from spirillum.fluid.algebra import about_point
 from spirillum.fluid.closed.perrin import spheroid_drag
-from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
+from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
 from spirillum.fluid.wire.revolution import panels_of
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline
 
@@ -16,7 +16,7 @@ DIAGONAL = [0, 1, 3, 4]
 """Axial and transverse drag, axial and transverse rotation."""
 
 
-def alone(outline: Outline, order: int = 12) -> Solution:
+def alone(outline: Outline, order: int = 12) -> UnitTwistSolution:
     return solve([(outline, 0)], [], Discretisation(order=order))
 
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
+from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
 from spirillum.robot.outline import Arc, Outline
 
 
@@ -15,7 +15,7 @@ def sphere(centre: float, radius: float = 1.0) -> Outline:
 
 
 @lru_cache
-def pair(half: float, order: int = 12) -> Solution:
+def pair(half: float, order: int = 12) -> UnitTwistSolution:
     """Two unit spheres with their centres at +-half; the one in front is the body."""
     return solve([(sphere(half), 0), (sphere(-half), 1)], [], Discretisation(order=order))
 

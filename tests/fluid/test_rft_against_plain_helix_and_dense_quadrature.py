@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.algebra import axial_entries
-from spirillum.fluid.closed.coefficients import local_coefficients
-from spirillum.fluid.closed.rft import Rft, tail_axial, tail_matrix
+from spirillum.fluid.closed.rft import Rft, local_coefficients, tail_axial, tail_matrix
 
 SETS = ["printed", "gray-hancock", "lighthill", "brennen-winet"]
 TAPERS = ["none", 0.1, 1.0, 3.7, 100.0, 1e4]

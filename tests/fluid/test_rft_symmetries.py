@@ -9,8 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from spirillum.fluid.algebra import about_point, axis_rotation, rotated
-from spirillum.fluid.closed.coefficients import coefficient_domain
-from spirillum.fluid.closed.rft import Rft, tail_axial, tail_matrix
+from spirillum.fluid.closed.rft import Rft, coefficient_domain, tail_axial, tail_matrix
 from spirillum.robot.limits import all_hold, assembly_limits
 
 SETS = ["printed", "gray-hancock", "lighthill", "brennen-winet"]

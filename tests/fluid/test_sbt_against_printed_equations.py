@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from spirillum.fluid.closed.lighthill_integrals import lighthill_integrals
-from spirillum.fluid.closed.sbt import helix_functions
+from spirillum.fluid.closed.sbt import helix_functions, lighthill_integrals
 from spirillum.swimming.steady import swim
 
 MU, BODY_DIAMETER, BODY_LENGTH, TAIL_LENGTH = 3.5, 18e-3, 35e-3, 60e-3  # Table I

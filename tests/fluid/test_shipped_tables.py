@@ -12,9 +12,9 @@ import spirillum as sp
 from spirillum.fluid.tube import library
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.outer_resistance import even_phases, matrix_of
 from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
-from spirillum.fluid.tube.rest import even_phases, matrix_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
@@ -23,8 +23,8 @@ from spirillum.kernels.tube_places import PHASES
 from spirillum.kernels.tube_table import INSIDE, MIRROR, TOO_FAR_PITCHED, YAW_SLACK, largest_yaw, mean_resistance_at
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.seat import Seat
-from spirillum.studies.loading import load_study
+from spirillum.robot.tube_pose import Seat
+from spirillum.studies.study_loader import load_study
 
 LARGEST = {
     "forward_velocity": 0.011,

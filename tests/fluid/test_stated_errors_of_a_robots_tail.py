@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.fluid.reference_errors import CHECKED, SPEED_ERRORS, WITHOUT_INTERACTION, validation_note
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.stated import CHECKED, SPEED_ERRORS, WITHOUT_INTERACTION, said_of_tail
 
 PAGE = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text(encoding="utf-8")
 NAMES = {"rft": "RFT, printed coefficients", "sbt": "SBT, eqs (1) to (7)", "slender": "slender, standard"}
@@ -81,7 +81,7 @@ def test_what_is_stated_is_continuous() -> None:
             wavelength, amplitude, wire = (1.0 - share) * np.array(ends[0]) + share * np.array(ends[1])
             robot = sp.load("biorob2012-wide", **_tail(wavelength=f"{wavelength} mm", amplitude=f"{amplitude} mm"))
             tail = robot.tail.model_copy(update={"wire_diameter": 1e-3 * wire})
-            said = said_of_tail(sp.RobotBatch.of(robot.model_copy(update={"tail": tail})), CHECKED["sbt"])
+            said = validation_note(sp.RobotBatch.of(robot.model_copy(update={"tail": tail})), CHECKED["sbt"])
             found.append(_numbers(said))
         steps = np.abs(np.diff(found, axis=0))
         assert steps.max() <= 1.0 + 1e-9  # a torque is stated to one per cent
@@ -101,7 +101,7 @@ def test_interpolated_errors_are_those_of_tails_in_between(
         sp.resistance(one, part="tail", model=name).matrix[[0, 0, 3], [0, 3, 3]]
         for one, name in ((fine, "slender"), (robot, model))
     )
-    stated = _numbers(said_of_tail(sp.RobotBatch.of(robot), CHECKED[model]))
+    stated = _numbers(validation_note(sp.RobotBatch.of(robot), CHECKED[model]))
     np.testing.assert_allclose(stated, 100.0 * (found / true - 1.0), atol=margin)
 
 

@@ -6,7 +6,7 @@ import pytest
 from spirillum.fluid.tube.confined import held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 
 def rotation_in_a_tube(a: float, R: float, e: float) -> tuple[float, float]:

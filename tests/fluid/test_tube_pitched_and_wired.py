@@ -16,7 +16,7 @@ from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
 from spirillum.kernels.blobs import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 
 def ball(x: float, radius: float) -> Outline:

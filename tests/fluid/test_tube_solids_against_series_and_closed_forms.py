@@ -13,7 +13,7 @@ from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.outline import Outline, body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 REFERENCE = json.loads((BENCHMARKS / "tube_reference.json").read_text(encoding="utf-8"))

@@ -16,14 +16,11 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.fluid.tube import library, tube
-from spirillum.fluid.tube.building import _powers
-from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import Places, rings_of
-from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
-from spirillum.fluid.tube.rest import (
+from spirillum.fluid.tube.building import OnAxis, _powers
+from spirillum.fluid.tube.outer_resistance import (
     HARMONICS,
     PHASES,
-    Solution,
+    NodeSolution,
     all_kept,
     even_phases,
     factor_of,
@@ -35,14 +32,15 @@ from spirillum.fluid.tube.rest import (
     seen_in_mirror,
     solutions,
 )
+from spirillum.fluid.tube.places import Places, rings_of
+from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.solids import Fineness
-from spirillum.fluid.tube.table import TubeTable, key_of
-from spirillum.fluid.tube.table_file import packed_from, to_bytes
+from spirillum.fluid.tube.table import TubeTable, key_of, packed_from, to_bytes
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 R = 0.02
 
@@ -433,10 +431,10 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
     short = geometry._replace(coupling_diameter=0.0, tail_length=0.02)
     tails = [short._replace(wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
     seat, elsewhere = Seat(R, 0.0), Seat(R, 0.002)
-    want = [Solution(((tail, (0.4,)),), seat, coarse) for tail in tails]
+    want = [NodeSolution(((tail, (0.4,)),), seat, coarse) for tail in tails]
     told: list[int] = []
     together = solutions(
-        [want[0], Solution(((tails[0], (0.1,)),), elsewhere, coarse), want[1]],
+        [want[0], NodeSolution(((tails[0], (0.1,)),), elsewhere, coarse), want[1]],
         "places",
         lambda _what, _done, total: told.append(total),
         workers=1,
@@ -455,7 +453,7 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
     coarse = Fineness("standard", 0.05, order=4)
     tail = geometry._replace(coupling_diameter=0.0, tail_length=0.02, wavelength=0.02)
-    one, more = (Solution(((tail, phases),), Seat(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
+    one, more = (NodeSolution(((tail, phases),), Seat(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
     assert not all_kept([one])
     tube._answer.cache_clear()
     solutions([one], "a place", workers=1)

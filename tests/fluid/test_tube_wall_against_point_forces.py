@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.special import exp1
 
 from spirillum.fluid.tube.wall import point_reflection, point_waves, waves_between
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 EULER = 0.5772156649015329
 

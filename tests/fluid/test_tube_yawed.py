@@ -10,7 +10,7 @@ from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.robot.outline import Arc, Outline, body_outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 
 BODIES = {
     "ball": Outline((Arc((0.0, 0.0), (0.4, 0.4), (0.0, np.pi)),), ()),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.interfaces.remote_protocol import WATCHDOG, Receiver, framed, unframed
+from spirillum.interfaces.serial_remote import WATCHDOG, Receiver, framed, unframed
 
 pytest.importorskip("serial")
 pty = pytest.mark.skipif(not hasattr(__import__("os"), "openpty"), reason="no pseudo-terminals")

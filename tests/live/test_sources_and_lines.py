@@ -12,9 +12,8 @@ import pytest
 from spirillum.cli import main
 from spirillum.errors import InputError
 from spirillum.live import session, sources
-from spirillum.live.handover import at_own_pace, newest
 from spirillum.live.sending import Datagrams
-from spirillum.live.session import track
+from spirillum.live.session import at_own_pace, newest, track
 from spirillum.live.sources import Arrived, source_of
 
 av = pytest.importorskip("av")

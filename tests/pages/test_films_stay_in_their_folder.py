@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.pages import films as films_module
-from spirillum.pages.bench import Bench
+from spirillum.pages import video_store as films_module
+from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.setup_form import form_fields
 from spirillum.pages.uploads import TooLargeError
 from spirillum.robot.load import load
@@ -27,13 +27,13 @@ WHOLE = {
 def bench() -> Any:
     pytest.importorskip("av")
     pytest.importorskip("cv2")
-    made = Bench()
+    made = MeasurementSession()
     yield made
     made.close()
     assert not made._folder.exists()
 
 
-def test_a_file_that_is_no_film_is_refused_and_removed(bench: Bench) -> None:
+def test_a_file_that_is_no_film_is_refused_and_removed(bench: MeasurementSession) -> None:
     for kind in ("exe", "mp4/../../x", "m3u8", ""):
         with pytest.raises(InputError, match=r"allowed: \.mp4"):
             bench.films.room_for(kind, 1)
@@ -46,7 +46,9 @@ def test_a_file_that_is_no_film_is_refused_and_removed(bench: Bench) -> None:
     assert bench.films.told() == []
 
 
-def test_films_on_their_way_count_with_all_their_bytes(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_films_on_their_way_count_with_all_their_bytes(
+    bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(films_module, "_LARGEST_ALL", 1000)
     coming = bench.films.room_for("mp4", 400)
     bench.films.room_for("mp4", 600).write_bytes(bytes(600))
@@ -59,7 +61,7 @@ def test_films_on_their_way_count_with_all_their_bytes(bench: Bench, monkeypatch
         bench.films.room_for("mp4", 101)
 
 
-def test_the_disk_has_room_for_films_on_their_way(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_disk_has_room_for_films_on_their_way(bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
     free = films_module._SPARE + 1000
     monkeypatch.setattr(films_module.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     bench.films.room_for("mp4", 700).write_bytes(bytes(200))  # 500 of the free bytes are still to come
@@ -81,12 +83,12 @@ def test_the_disk_has_room_for_films_on_their_way(bench: Bench, monkeypatch: pyt
         {"robot.stripes": "red\0"},
     ],
 )
-def test_no_field_names_a_file(bench: Bench, fields: dict[str, Any]) -> None:
+def test_no_field_names_a_file(bench: MeasurementSession, fields: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="allowed"):
         bench.desk.set_fields(fields)
 
 
-def test_a_dropped_robot_may_not_rest_on_another_file(bench: Bench, tmp_path: Path) -> None:
+def test_a_dropped_robot_may_not_rest_on_another_file(bench: MeasurementSession, tmp_path: Path) -> None:
     (tmp_path / "secret.toml").write_text("secret = 1\n")
     with pytest.raises(InputError, match="allowed on the page") as refused:
         bench.desk.add_text(f'extends = "{tmp_path / "secret.toml"}"\n')
@@ -97,7 +99,7 @@ def test_a_dropped_robot_may_not_rest_on_another_file(bench: Bench, tmp_path: Pa
     assert 'wavelength = "20 mm"' in bench.desk.robot_text()
 
 
-def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(bench: Bench, tmp_path: Path) -> None:
+def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(bench: MeasurementSession, tmp_path: Path) -> None:
     from spirillum.vision.setup import load_setup
 
     bench.desk.set_fields(WHOLE)
@@ -113,7 +115,7 @@ def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(bench: Bench,
     assert robot == load("biorob2012-wide")
 
 
-def test_wrong_numbers_get_a_sentence_with_their_field(bench: Bench) -> None:
+def test_wrong_numbers_get_a_sentence_with_their_field(bench: MeasurementSession) -> None:
     bench.desk.set_fields({**WHOLE, "tank.index": "oil", "robot.axis_height": "3 km"})
     problems = bench.desk.checked()["problems"]
     assert any(one.startswith("tank.index") for one in problems)
@@ -124,13 +126,13 @@ def test_wrong_numbers_get_a_sentence_with_their_field(bench: Bench) -> None:
 
 @pytest.mark.parametrize("value", ["nan", "-inf", "1e400", float("nan")])
 @pytest.mark.parametrize("field", ["tank.index", "tank.index_uncertainty", "camera.frames_per_second"])
-def test_numbers_that_json_has_not_are_told_by_their_field(bench: Bench, field: str, value: Any) -> None:
+def test_numbers_that_json_has_not_are_told_by_their_field(bench: MeasurementSession, field: str, value: Any) -> None:
     bench.desk.set_fields({**WHOLE, "tank.surface": "60 mm", field: value})
     assert [one for one in bench.desk.checked()["problems"] if one.startswith(field)]
     json.dumps(bench.state(), allow_nan=False)
 
 
-def test_places_are_counted_when_they_are_given(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_are_counted_when_they_are_given(bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(films_module, "_MOST_FILMS", 2)
     bench.films.room_for("mp4", 1).unlink()
     bench.films.room_for("mp4", 1)

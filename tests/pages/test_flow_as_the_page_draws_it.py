@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spirillum.pages.flowing import plane_shown
+from spirillum.pages.page_robot import plane_shown
 
 
 def test_plane_is_the_datasets_own() -> None:

@@ -26,10 +26,10 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages import server
-from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
-from spirillum.pages.job import Job
+from spirillum.pages.job import BackgroundJob
 from spirillum.pages.knobs import Settings
+from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.pages.uploads import TooLargeError, Uploads
@@ -314,7 +314,7 @@ def test_what_the_bench_cannot_take_gets_a_sentence(served: Any, home: str, path
 def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("av")
     pytest.importorskip("cv2")
-    bench = Bench()
+    bench = MeasurementSession()
     monkeypatch.setattr(server, "Bench", lambda: bench)
     guard = Guard("127.0.0.1", 1)
     where, _, query = path.partition("?")
@@ -389,7 +389,7 @@ def test_files_are_read_one_at_a_time() -> None:
 
 
 def test_interrupt_of_the_terminal_is_for_the_page_and_not_for_what_it_started() -> None:
-    job = Job("spirillum.pages.preparing", {})
+    job = BackgroundJob("spirillum.pages.simulation_thread", {})
     assert os.getsid(job._process.pid) == job._process.pid
     job.stop()
     job._thread.join()

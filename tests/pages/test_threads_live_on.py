@@ -10,20 +10,20 @@ from typing import Any
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.pages import theatre as module
-from spirillum.pages.job import Job, worker
-from spirillum.pages.lane import Lane
-from spirillum.pages.theatre import Theatre
+from spirillum.pages import simulation_thread as module
+from spirillum.pages.job import BackgroundJob, worker
+from spirillum.pages.page_robot import PageRobot
+from spirillum.pages.simulation_thread import SimulationThread
 
 
 @pytest.fixture
-def theatre() -> Iterator[Theatre]:
-    found = Theatre("ecoli", lambda: None)
+def theatre() -> Iterator[SimulationThread]:
+    found = SimulationThread("ecoli", lambda: None)
     yield found
     found.stop()
 
 
-def lane_of(theatre: Theatre) -> dict[str, Any]:
+def lane_of(theatre: SimulationThread) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(theatre.scene)["lanes"][0]
     return found
 
@@ -41,7 +41,7 @@ def until(true: Callable[[], Any], seconds: float = 600.0) -> None:
     [(MemoryError(), "does not fit into memory; allowed: a smaller one"), (RuntimeError("odd"), "RuntimeError: odd")],
 )
 def test_numbers_go_on_after_any_exception(
-    theatre: Theatre, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+    theatre: SimulationThread, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
 ) -> None:
     honest = module.build
 
@@ -57,14 +57,14 @@ def test_numbers_go_on_after_any_exception(
     assert lane_of(theatre)["swims_by"] == "slender"
 
 
-def test_motion_goes_on_after_any_exception(theatre: Theatre, monkeypatch: pytest.MonkeyPatch) -> None:
-    honest, refused = Lane.set, list[str]()
+def test_motion_goes_on_after_any_exception(theatre: SimulationThread, monkeypatch: pytest.MonkeyPatch) -> None:
+    honest, refused = PageRobot.set, list[str]()
 
-    def failing(self: Lane, name: str, value: str) -> None:
-        monkeypatch.setattr(Lane, "set", honest)
+    def failing(self: PageRobot, name: str, value: str) -> None:
+        monkeypatch.setattr(PageRobot, "set", honest)
         raise MemoryError
 
-    monkeypatch.setattr(Lane, "set", failing)
+    monkeypatch.setattr(PageRobot, "set", failing)
     theatre.start()
     theatre.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
     until(lambda: refused)
@@ -74,7 +74,7 @@ def test_motion_goes_on_after_any_exception(theatre: Theatre, monkeypatch: pytes
     assert len(refused) == 1
 
 
-def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: Theatre) -> None:
+def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: SimulationThread) -> None:
     """One message each; the first once took gigabytes, and the page's numbers for good."""
     refused = list[str]()
     theatre.start()
@@ -119,6 +119,6 @@ def test_a_process_that_was_ended_says_so_and_what_it_prints_besides_is_no_progr
     lines = ["import os, signal", "print('a library speaks')", "print('[1, 2]', flush=True)"]
     (tmp_path / "ended_from_outside.py").write_text("\n".join([*lines, "os.kill(os.getpid(), signal.SIGKILL)"]))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    job = Job("ended_from_outside", {})
+    job = BackgroundJob("ended_from_outside", {})
     until(lambda: not job.running)
     assert "ended from outside" in job.progress()["failed"]

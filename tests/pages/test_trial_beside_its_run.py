@@ -8,9 +8,9 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.errors import InputError
-from spirillum.pages.beside import compared_series
-from spirillum.pages.lane import Lane
+from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.study_picture import StudyPicture, sent_study
+from spirillum.pages.trial_comparison import compared_series
 
 
 def _series(time: np.ndarray, speed: float, tail: float, body: float, tail_name: str, offset: float) -> xr.Dataset:
@@ -52,7 +52,7 @@ def test_picture_of_a_study_holds_its_speeds(study: xr.Dataset) -> None:
 
 
 def test_a_tail_that_is_pointed_at_swims_as_in_the_study(study: xr.Dataset) -> None:
-    picture, lane = StudyPicture(study), Lane.of("biorob2012-wide")
+    picture, lane = StudyPicture(study), PageRobot.of("biorob2012-wide")
     lane.swap(*picture.tail({"channel": 1, "wavelength": 3, "amplitude": 0}))
     found = sp.predict(lane.robot, model="rft", friction="rotor").forward_velocity
     assert found == pytest.approx(picture.told()["speeds"][1][0][0][3], rel=1e-9)

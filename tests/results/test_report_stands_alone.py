@@ -12,8 +12,8 @@ import pytest
 import spirillum as sp
 from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
+from spirillum.results.study import write_report
 from spirillum.results.study_content import FRICTION_MEANINGS
-from spirillum.results.study_report import write_report
 from spirillum.robot.actuation import FrictionReading
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import new_figure
@@ -163,7 +163,7 @@ def test_page_and_file_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_pat
         Claim("second", "p", "c", "disagrees", "because"),
         Claim(HOSTILE, "p", "c", "undecidable", "no rates"),
     ]
-    monkeypatch.setattr("spirillum.results.study_report.claims_of", lambda _dataset: stated)
+    monkeypatch.setattr("spirillum.results.study.claims_of", lambda _dataset: stated)
     page = written(small_study(), tmp_path)
     for claim in stated:
         for value in claim.to_dict().values():

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spirillum.robot import geometry
-from spirillum.robot.outline import Arc, Line, Outline, body_outline, cylinder_outline
+from spirillum.robot.outline import Arc, Outline, Segment, body_outline, cylinder_outline
 
 ENDS = ["hemisphere", "flat", "fillet"]
 DIAMETER, LENGTH, FILLET = 0.018, 0.035, 0.0037
@@ -103,7 +103,7 @@ def test_corners_are_where_the_tangent_turns(name: str) -> None:
     outline = CASES[name]
     assert len(outline.corners) == len(outline.pieces) - 1
 
-    def direction(piece: Line | Arc, t: float) -> np.ndarray:
+    def direction(piece: Segment | Arc, t: float) -> np.ndarray:
         (x, rho) = piece.points(np.array([t, t + 1e-7]))
         step = np.array([x[1] - x[0], rho[1] - rho[0]])
         return step / np.linalg.norm(step)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
-from spirillum.robot.seat import (
+from spirillum.robot.tube_pose import (
     STEEPEST_PITCH,
     Seat,
     contact_pitch,

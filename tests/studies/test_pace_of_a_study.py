@@ -7,7 +7,7 @@ import pytest
 
 from spirillum.results.study_store import _spread
 from spirillum.studies.estimate import Pace
-from spirillum.studies.regions import Region
+from spirillum.studies.regions import RobotBlock
 
 
 def _said(workers: int, regions: int, seconds: float, loading: float, change: float = 0.0) -> tuple[float, float]:
@@ -21,7 +21,7 @@ def _said(workers: int, regions: int, seconds: float, loading: float, change: fl
         change: relative change of a region's time from the first to the last.
     """
     now = [0.0]
-    places = [Region(number, (10 * number,), (10 * number + 10,)) for number in range(regions)]
+    places = [RobotBlock(number, (10 * number,), (10 * number + 10,)) for number in range(regions)]
     pace = Pace(10 * regions, workers, lambda: now[0])
     free = np.full(workers, loading)
     ends = []
@@ -47,7 +47,7 @@ def test_estimate_holds_within_30_percent(workers: int, seconds: float, change: 
 
 def test_regions_are_spread_and_none_is_lost() -> None:
     for count in (1, 2, 3, 7, 10, 64, 999):
-        places = [Region(number, (number,), (number + 1,)) for number in range(count)]
+        places = [RobotBlock(number, (number,), (number + 1,)) for number in range(count)]
         order = [region.number for region in _spread(places)]
         assert sorted(order) == list(range(count))
     assert 400.0 < np.mean(order[:20]) < 600.0

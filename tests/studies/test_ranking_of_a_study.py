@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.results.study_report import write_report
-from spirillum.results.study_robot import robot_picture
+from spirillum.results.study import robot_picture, write_report
 from spirillum.studies.ranking import best_in_words, ranking_of
 
 GRID = {
@@ -64,8 +63,8 @@ def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
 @pytest.mark.usefixtures("unplaced")
 def test_report_starts_with_the_ranking(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its other figures have tests of their own."""
-    monkeypatch.setattr("spirillum.results.study_report.figures_of", lambda _: {})
-    monkeypatch.setattr("spirillum.results.study_report.robot_picture", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.figures_of", lambda _: {})
+    monkeypatch.setattr("spirillum.results.study.robot_picture", lambda *_: None)
     dataset = sp.study(GRID)
     found = ranking_of(dataset)
     write_report(dataset, tmp_path, lambda *_: None)

@@ -5,9 +5,10 @@ import pytest
 
 import spirillum as sp
 from spirillum.papers.biorob2012.evidence import Evidence
-from spirillum.papers.biorob2012.readings import Readings
+from spirillum.papers.biorob2012.readings import FrictionModelRuns
 from spirillum.papers.registry import claims_of, predictions_of
-from spirillum.studies.laid_down import (
+from spirillum.studies.ranking import ranking_of
+from spirillum.studies.released_robots import (
     FACTORS,
     INFERRED_BY,
     READ,
@@ -16,7 +17,6 @@ from spirillum.studies.laid_down import (
     levels_of_readings,
     without_answer,
 )
-from spirillum.studies.ranking import ranking_of
 from spirillum.studies.spec import LaidDown
 from spirillum.view.figures.laid_down import laid_down_picture
 
@@ -42,9 +42,9 @@ def short():
 
 
 @pytest.fixture(scope="module")
-def readings(short) -> Readings:
+def readings(short) -> FrictionModelRuns:
     """Its readings."""
-    return Readings(Evidence(short))
+    return FrictionModelRuns(Evidence(short))
 
 
 def test_a_reading_is_that_of_the_run_itself(short) -> None:
@@ -127,7 +127,7 @@ def test_verdicts_of_the_third_kind_never_mix_with_the_others(short) -> None:
         assert all(claim.to_dict().values()), claim
 
 
-def test_a_verdict_names_the_factor_that_decides(readings: Readings) -> None:
+def test_a_verdict_names_the_factor_that_decides(readings: FrictionModelRuns) -> None:
     column = levels_of_readings()[:, READ.index("wait")]
     found = readings.judged((column > 0).astype(float), of_all=False)
     assert found.verdict == "depends"
@@ -137,7 +137,7 @@ def test_a_verdict_names_the_factor_that_decides(readings: Readings) -> None:
     assert readings.judged(np.ones(32)).verdict == "depends"  # robots without a table keep it open
 
 
-def test_a_stated_number_is_met_missed_or_straddled(readings: Readings) -> None:
+def test_a_stated_number_is_met_missed_or_straddled(readings: FrictionModelRuns) -> None:
     column = levels_of_readings()[:, READ.index("gap")]
     values = 2.0 + 0.5 * column
     assert readings.against(values, 2.0, "mm", 1.0).verdict == "depends"

@@ -18,10 +18,10 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.crews import checked_crew
 from spirillum.files import Stored, region_files, write_pieces
 from spirillum.results import study_store
 from spirillum.studies import regions, run
+from spirillum.worker_pool import checked_crew
 
 AT = "0.5 Hz", "1 Hz"
 GRID = {
@@ -289,7 +289,7 @@ def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(
 def test_a_scheduler_that_is_not_there_gets_a_sentence(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spirillum.crews._PATIENCE", 0.5)
+    monkeypatch.setattr("spirillum.worker_pool._PATIENCE", 0.5)
     begun = time.monotonic()
     with pytest.raises(sp.InputError, match=r"cluster = .*allowed: the address of a Dask scheduler"):
         sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr", workers=address)

@@ -18,18 +18,18 @@ from flat_pictures import PAINTS, Flat
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.robot.robot import Robot
-from spirillum.robot.text import robot_text
+from spirillum.robot.toml_writer import robot_text
 from spirillum.units import Hz
+from spirillum.virtual.artifacts import Troubles, stripe_edges
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.frames import Frames
+from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import framed, lens_of, swimming_range
 from spirillum.virtual.motion import motion_of
-from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.solids import linear
 from spirillum.virtual.tank import tank_of
-from spirillum.virtual.troubles import Troubles, stripe_edges
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.truth import setup_text
 
 STYLES = ("virtual", "flat", "light-table")
@@ -210,7 +210,7 @@ def _virtual(truth: Drawn, variant: str) -> Scene:
     if variant == "one-colour":
         painter.body = replace(painter.body, colours=_all_of_one(painter.body.colours, truth.paint))
     clean = Disturbances.of_robot(Degradation(), truth.seed, lens, DURATION, robot, tank)
-    frames = Frames(painter, clean, trajectory, camera.exposure)
+    frames = FrameEncoder(painter, clean, trajectory, camera.exposure)
 
     def middle(time: float) -> np.ndarray:
         return np.asarray(lens.seen(trajectory.at(time).position[None])[0, :2])

@@ -18,7 +18,7 @@ import numpy as np
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.links import outlines_of
 from spirillum.robot.load import load
-from spirillum.robot.outline import Line
+from spirillum.robot.outline import Segment
 from spirillum.robot.robot import Robot
 
 PAINTS = {
@@ -191,7 +191,7 @@ class Flat:
 
         # The hull of a straight piece is that of its ends.
         straight, bent = np.array([0.0, 1.0]), np.linspace(0.0, 1.0, 25)
-        pieces = [piece.points(straight if isinstance(piece, Line) else bent) for piece in outline.pieces]
+        pieces = [piece.points(straight if isinstance(piece, Segment) else bent) for piece in outline.pieces]
         x, rho = (np.concatenate(part) for part in zip(*pieces, strict=True))
         around = np.linspace(0.0, 2 * np.pi, 97)[:-1, None]
         points = np.stack([x + 0 * around, rho * np.cos(around), rho * np.sin(around)], axis=-1).reshape(-1, 3)

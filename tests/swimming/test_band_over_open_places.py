@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.answer import quantity
 from spirillum.cli import main
+from spirillum.envelope import quantity
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import Seat
-from spirillum.swimming.answer import Swimming
+from spirillum.robot.tube_pose import Seat
 from spirillum.swimming.band import TOLERANCE, at_place, band_places, left_open
+from spirillum.swimming.steady_quantities import Swimming
 
 WIDE = "biorob2012-wide"
 RADIUS = 20e-3

@@ -10,7 +10,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.placement import Placement
-from spirillum.studies.loading import load_study
+from spirillum.studies.study_loader import load_study
 from spirillum.swimming.model_choice import choose_model
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"

@@ -11,12 +11,12 @@ import spirillum as sp
 from spirillum.robot.load import load
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trial import render
 
-LENS = Lens(0.21, 0.06, 1.4, 370.0, (320, 240))
+LENS = VirtualLens(0.21, 0.06, 1.4, 370.0, (320, 240))
 BODY = (0.035, 0.018)
 
 
@@ -68,7 +68,7 @@ def test_the_tilt_has_its_size_and_any_direction() -> None:
 
 
 def test_glare_covers_its_share_of_the_body() -> None:
-    lens = Lens(0.21, 0.06, 1.4, 740.0, (640, 480))
+    lens = VirtualLens(0.21, 0.06, 1.4, 740.0, (640, 480))
     light = np.zeros((480, 640, 3), dtype=np.float32)
     place = np.array([0.01, 0.0, 0.0115])
     Disturbances(Degradation(glare=0.2), 3, lens, 20.0, BODY, 0.03).disturb(light, 1.0, place)

@@ -6,7 +6,7 @@ import pytest
 import spirillum as sp
 from spirillum.kernels.raster import Shading, draw
 from spirillum.robot.surface import mass_properties
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.solids import solids_of
 from spirillum.virtual.tank import backdrop, spots, tank_of
@@ -79,7 +79,7 @@ def test_shortened_triangles_keep_the_robots_volume_and_area() -> None:
 @pytest.mark.parametrize("view", ["top", "side"])
 def test_straight_edges_stand_for_bent_ones(view: str) -> None:
     robot = sp.load("biorob2012-wide")
-    lens = Lens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0), tilt=(0.025, -0.025))
+    lens = VirtualLens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0), tilt=(0.025, -0.025))
     tank = tank_of(robot, view)
     for x in (-0.02, 0.035, 0.062):
         for solid in solids_of(robot):
@@ -94,7 +94,7 @@ def test_straight_edges_stand_for_bent_ones(view: str) -> None:
 
 def test_the_silhouette_of_the_body_moves_as_its_vertices_do() -> None:
     robot = sp.load("biorob2012-wide")
-    lens = Lens(20.0, 0.06, 1.4, 20.0 * 740 / 0.19, (320, 120))  # from far away: every part moves alike
+    lens = VirtualLens(20.0, 0.06, 1.4, 20.0 * 740 / 0.19, (320, 120))  # from far away: every part moves alike
     solid = solids_of(robot)[0]
     seen = lens.seen(solid.vertices + np.array([0.0, 0.0, 0.0115]))
     v, u = np.mgrid[2:122, 3:323]
@@ -110,7 +110,7 @@ def test_the_silhouette_of_the_body_moves_as_its_vertices_do() -> None:
 
 def test_ruler_lines_lie_where_the_lens_sees_them() -> None:
     robot = sp.load("biorob2012-wide", channel="none")
-    lens = Lens(0.21, 0.06, 1.4, 740.0, (320, 200), distortion=(-0.02, 0.0))
+    lens = VirtualLens(0.21, 0.06, 1.4, 740.0, (320, 200), distortion=(-0.02, 0.0))
     tank = tank_of(robot, "top")
     still = backdrop(tank, lens)
     across = tank.ruler + 4e-3
@@ -124,7 +124,7 @@ def test_ruler_lines_lie_where_the_lens_sees_them() -> None:
 
 def test_a_blurred_edge_spreads_over_its_way() -> None:
     robot = sp.load("biorob2012-wide", channel="none")
-    lens = Lens(0.21, 0.06, 1.4, 370.0, (320, 240))
+    lens = VirtualLens(0.21, 0.06, 1.4, 370.0, (320, 240))
     tank = tank_of(robot, "top")
     painter = Painter(robot, tank, lens)
     place = np.array([0.03, 0.0, tank.tube_height])

@@ -109,7 +109,7 @@ def test_a_grid_gives_each_tail_a_folder_and_the_spread_its_size(tmp_path: Path)
 def test_the_planted_spread_has_its_size() -> None:
     from spirillum.robot.load import load
     from spirillum.virtual.experiment import _Plan, _planned
-    from spirillum.virtual.options import CameraOptions
+    from spirillum.virtual.trial_options import CameraOptions
 
     steady = {"forward_velocity": 1e-3, "tail_rotation_rate": 7.0, "body_rotation_rate": -0.5}
     plan = _Plan.of({"trials": 400, "spread": 0.02})

@@ -7,14 +7,13 @@ import pytest
 
 import spirillum as sp
 from spirillum.errors import InputError
-from spirillum.virtual.cover import light_path
-from spirillum.virtual.lens import Lens
-from spirillum.virtual.painter import Painter
+from spirillum.virtual.artifacts import Troubles, ViewArtifacts
+from spirillum.virtual.lens import VirtualLens
+from spirillum.virtual.painter import Painter, light_path
 from spirillum.virtual.tank import backdrop, tank_of
 from spirillum.virtual.trajectory import TrialTrajectory, steady_trajectory
-from spirillum.virtual.troubles import Troubles, View
 
-LENS = Lens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0))
+LENS = VirtualLens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0))
 RADIUS, WALL, GLASS = 9e-3, 0.11, 1.47
 
 
@@ -128,14 +127,14 @@ def test_a_robot_without_a_seal_has_no_cover() -> None:
 
 
 def test_mirrored_lamps_stand_still_and_add_light() -> None:
-    view = View(Troubles(mirrored_lamps=2), 4, (160, 120))
+    view = ViewArtifacts(Troubles(mirrored_lamps=2), 4, (160, 120))
     dark, bright = np.zeros((120, 160, 3), dtype=np.float32), np.full((120, 160, 3), 0.3, dtype=np.float32)
     first, later = view.seen(dark, 0.0), view.seen(bright, 7.0) - bright
     assert later == pytest.approx(first, abs=1e-6)
     assert 0.02 < (first > 0.1).mean() < 0.3
     assert first.dtype == np.float32
-    assert np.any(first != View(Troubles(mirrored_lamps=2), 5, (160, 120)).seen(dark, 0.0))
-    assert View(Troubles(), 4, (160, 120)).seen(dark, 0.0) is dark
+    assert np.any(first != ViewArtifacts(Troubles(mirrored_lamps=2), 5, (160, 120)).seen(dark, 0.0))
+    assert ViewArtifacts(Troubles(), 4, (160, 120)).seen(dark, 0.0) is dark
 
 
 def test_the_truth_is_that_of_the_same_robot(tmp_path) -> None:

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from spirillum.kernels.sightlines import sightline
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.trajectory import lab_to_camera
 
 SIZE = (640, 480)
 
 
-def lens(**changes: object) -> Lens:
-    return Lens(**({"eye": 0.21, "surface": 0.06, "index": 1.4, "focal": 740.0, "size": SIZE} | changes))
+def lens(**changes: object) -> VirtualLens:
+    return VirtualLens(**({"eye": 0.21, "surface": 0.06, "index": 1.4, "focal": 740.0, "size": SIZE} | changes))
 
 
 CASES = [
@@ -29,14 +29,14 @@ def points() -> np.ndarray:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_pixel_and_its_point_agree(case: Lens, points: np.ndarray) -> None:
+def test_a_pixel_and_its_point_agree(case: VirtualLens, points: np.ndarray) -> None:
     for point in points:
         pixel = case.seen(point[None])[:, :2]
         assert np.allclose(case.points(pixel, point[2])[0], point, atol=1e-12)
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_rays_bend_at_the_surface_by_snells_law(case: Lens, points: np.ndarray) -> None:
+def test_rays_bend_at_the_surface_by_snells_law(case: VirtualLens, points: np.ndarray) -> None:
     for point in points:
         u, v, _ = case.seen(point[None])[0]
         ray = sightline(u, v, case.camera, case.turn)

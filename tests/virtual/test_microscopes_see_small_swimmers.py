@@ -7,8 +7,8 @@ import pytest
 
 import spirillum as sp
 from spirillum.virtual.framing import lens_of
-from spirillum.virtual.options import CameraOptions
 from spirillum.virtual.tank import tank_of
+from spirillum.virtual.trial_options import CameraOptions
 
 SMALL = {
     "extends": "magnetic-helix",

@@ -15,9 +15,9 @@ from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import motion_of_run, steady_rates
-from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial import render
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.vision.setup import load_setup
 
 ROBOT = "biorob2012-wide"

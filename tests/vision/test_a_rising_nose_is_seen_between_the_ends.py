@@ -6,12 +6,12 @@ import pytest
 from spirillum.robot.load import load
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.frames import Frames
+from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import lens_of
-from spirillum.virtual.options import CameraOptions
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trajectory import TrialTrajectory
+from spirillum.virtual.trial_options import CameraOptions
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import BodyFinder
 
@@ -30,7 +30,7 @@ def elongation_of_a_film(rise: float) -> np.ndarray:
     camera = CameraOptions.of({"size": SIZE, "distortion": 0.0})
     tank, lens = tank_of(robot, "top"), lens_of(camera, (0.0, 0.0))
     clean = Disturbances.of_robot(Degradation(), 0, lens, float(time[-1]), robot, tank)
-    frames = Frames(Painter(robot, tank, lens), clean, path, camera.exposure)
+    frames = FrameEncoder(Painter(robot, tank, lens), clean, path, camera.exposure)
     pictures = [frames.image(float(moment)) for moment in time]
     optics = Optics(SIZE, lens.focal, lens.eye, HEIGHT, lens.surface, lens.index)
     body = BodyFinder(robot, optics, (0, 0, *SIZE))

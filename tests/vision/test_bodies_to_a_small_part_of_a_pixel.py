@@ -8,8 +8,8 @@ from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import GROUPS, contour_of
-from spirillum.vision.track.search import Candidate, candidates, most_likely
-from spirillum.vision.track.warnings import gaps_of
+from spirillum.vision.track.search import PoseCandidate, candidates, most_likely
+from spirillum.vision.track.visibility import gaps_of
 
 pytest.importorskip("cv2")
 
@@ -90,7 +90,7 @@ def test_the_robot_is_found_without_a_hint_and_its_place_is_no_place_without_it(
 
 
 def test_frames_on_which_every_candidate_vanishes_show_no_robot():
-    gone, here = Candidate(BodyPose(0.0, 0.0, 0.0), 0.0), Candidate(BodyPose(0.01, 0.0, 0.0), 2.0)
+    gone, here = PoseCandidate(BodyPose(0.0, 0.0, 0.0), 0.0), PoseCandidate(BodyPose(0.01, 0.0, 0.0), 2.0)
     assert most_likely([[gone], [here, gone], [], [gone, gone]], 0.04) == [None, here, None, None]
     assert most_likely([[gone], []], 0.04) == [None, None]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.motion import RobotMotion
 
 PIXEL = 2.5e-4
 
@@ -32,7 +32,9 @@ def unwrapped(angle, period):
 @pytest.mark.parametrize(("start", "end"), [(4.0, 6.0), (2.0, 3.1), (7.0, 7.4)])
 def test_a_missing_piece_is_found_where_it_is(start, end):
     true, x, body, tail = series(missing=[(start, end)])
-    (flag,) = cuts_in(Motion(np.arange(true.size) / 30.0, x, unwrapped(body, np.pi), unwrapped(tail, 2 * np.pi)), PIXEL)
+    (flag,) = cuts_in(
+        RobotMotion(np.arange(true.size) / 30.0, x, unwrapped(body, np.pi), unwrapped(tail, 2 * np.pi)), PIXEL
+    )
     assert flag.name == "video-is-cut"
     assert f"at {start - 0.5 / 30:.2f} s" in flag.sentence
     assert "forward_velocity" in flag.spoils
@@ -41,14 +43,14 @@ def test_a_missing_piece_is_found_where_it_is(start, end):
 @pytest.mark.parametrize("seed", range(20))
 def test_whole_films_are_whole(seed):
     _, x, body, tail = series(noise=3.0, seed=seed)
-    assert cuts_in(Motion(np.arange(x.size) / 30.0, x, body, tail), PIXEL) == ()
+    assert cuts_in(RobotMotion(np.arange(x.size) / 30.0, x, body, tail), PIXEL) == ()
 
 
 @pytest.mark.parametrize("gap", [0.2, 0.5, 2.0, 5.0, 60.0])
 def test_a_gap_with_true_times_is_honest(gap):
     true, x, body, tail = series(frames=300, seconds=gap + 20.0, missing=[(4.0, 4.0 + gap)])
-    assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
-    assert clock_of(Motion(true, x, body, tail), PIXEL, np.pi) == (0.0, ())
+    assert cuts_in(RobotMotion(true, x, body, tail), PIXEL) == ()
+    assert clock_of(RobotMotion(true, x, body, tail), PIXEL, np.pi) == (0.0, ())
 
 
 @pytest.mark.parametrize("jump", [0.5, 1.7, 4.7, 40.1, 1000.3])
@@ -57,7 +59,7 @@ def test_times_that_jump_alone_are_said(jump):
     stamps = np.where(true > 4.0, true + jump, true)
     tail = np.where(true > 4.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)  # as it is unwrapped by these times
     body = np.where(true > 4.0, body - np.pi * np.round(0.24 * jump), body)
-    (flag,) = clock_of(Motion(stamps, x, body, tail), PIXEL, np.pi).flags
+    (flag,) = clock_of(RobotMotion(stamps, x, body, tail), PIXEL, np.pi).flags
     assert flag.name == "times-do-not-fit"
     assert f"jump by {jump + 1 / 30:.2f} s at {true[120]:.2f} s" in flag.sentence
     assert "tail_rotation_rate" in flag.spoils
@@ -70,7 +72,7 @@ def test_the_clock_of_a_slow_robot_is_told_by_all_series_together():
     stamps = np.where(true > 1.0, true + jump, true)
     tail = np.where(true > 1.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)
     body = np.where(true > 1.0, body + np.pi * np.round(0.3 * jump), body)
-    (flag,) = clock_of(Motion(stamps, 0.25 * x, body, tail), PIXEL, np.pi).flags
+    (flag,) = clock_of(RobotMotion(stamps, 0.25 * x, body, tail), PIXEL, np.pi).flags
     assert flag.name == "times-do-not-fit"
 
 
@@ -79,12 +81,12 @@ def test_where_the_motion_does_not_tell_the_intervals_hold_both_readings():
     true, x, body, tail = series(frames=120)
     stamps = np.where(true > 2.0, true + 2.5, true)
     tail = np.where(true > 2.0, tail + 3 * 2 * np.pi, tail)
-    found = clock_of(Motion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi)
+    found = clock_of(RobotMotion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi)
     assert found.relative_error == pytest.approx(0.5 * 2.5 / (119 / 30), rel=0.01)
     assert [flag.name for flag in found.flags] == ["clock-in-doubt"]
     assert not found.flags[0].spoils
     assert "no frame was taken for 2.53 s at 2.00 s" in found.flags[0].sentence
-    put_back = clock_of(Motion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi, stated=true)
+    put_back = clock_of(RobotMotion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi, stated=true)
     assert put_back == (0.0, ())  # frames that were lost there by the motion itself
 
 
@@ -98,22 +100,22 @@ def test_pauses_of_a_camera_are_honest_whatever_the_motor_does():
             rate * way + error * rng.normal(size=240)
             for rate, error in ((speed, 0.05 * PIXEL), (-body, 0.01), (tail, 0.03))
         ]
-        assert clock_of(Motion(time, *values), PIXEL, np.pi) == (0.0, ())
+        assert clock_of(RobotMotion(time, *values), PIXEL, np.pi) == (0.0, ())
 
 
 def test_a_push_moves_the_robot_alone():
     true, x, body, tail = series()
-    assert cuts_in(Motion(true, np.where(true > 5.0, x + 2e-3, x), body, tail), PIXEL) == ()
+    assert cuts_in(RobotMotion(true, np.where(true > 5.0, x + 2e-3, x), body, tail), PIXEL) == ()
 
 
 def test_short_and_unseen_series_say_nothing():
     true, x, body, tail = series(frames=20)
-    assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
-    assert cuts_in(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL) == ()
-    assert clock_of(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL, np.pi) == (0.0, ())
-    assert clock_of(Motion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == (0.0, ())
+    assert cuts_in(RobotMotion(true, x, body, tail), PIXEL) == ()
+    assert cuts_in(RobotMotion(true[:1], x[:1], body[:1], tail[:1]), PIXEL) == ()
+    assert clock_of(RobotMotion(true[:1], x[:1], body[:1], tail[:1]), PIXEL, np.pi) == (0.0, ())
+    assert clock_of(RobotMotion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == (0.0, ())
     true, x, body, tail = series()
-    assert cuts_in(Motion(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan)), PIXEL) == ()
+    assert cuts_in(RobotMotion(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan)), PIXEL) == ()
 
 
 def test_a_robot_that_turns_but_does_not_advance_has_no_speed():
@@ -121,15 +123,15 @@ def test_a_robot_that_turns_but_does_not_advance_has_no_speed():
     still = x[0] + 0.02 * PIXEL * np.random.default_rng(3).normal(size=x.size)
     unseen = np.full(x.size, np.nan)
     for motion in (
-        Motion(true, still, body, tail),
-        Motion(true, still, body, unseen),
-        Motion(true, still, unseen, tail),
+        RobotMotion(true, still, body, tail),
+        RobotMotion(true, still, body, unseen),
+        RobotMotion(true, still, unseen, tail),
     ):
         (flag,) = stands_still(motion, PIXEL)
         assert flag.name == "does-not-advance"
         assert set(flag.spoils) >= {"forward_velocity", "tail_rotation_rate"}
         assert "body_rotation_rate" not in flag.spoils
-    assert "its tail turns 12.0 times" in stands_still(Motion(true, still, body, tail), PIXEL)[0].sentence
+    assert "its tail turns 12.0 times" in stands_still(RobotMotion(true, still, body, tail), PIXEL)[0].sentence
 
 
 def test_slow_and_resting_robots_are_not_said_to_stand():
@@ -137,11 +139,11 @@ def test_slow_and_resting_robots_are_not_said_to_stand():
     rest = np.full(x.size, x[0])
     slow = 0.005 * PIXEL * np.arange(x.size)  # 1.5 pixels in all
     for motion in (
-        Motion(true, slow, body, tail),
-        Motion(true, x, body, tail),
-        Motion(true, rest, 0.01 * body, 0.01 * tail),
-        Motion(true, rest, np.zeros(x.size), np.full(x.size, np.nan)),
-        Motion(true, np.full(x.size, np.nan), body, tail),
+        RobotMotion(true, slow, body, tail),
+        RobotMotion(true, x, body, tail),
+        RobotMotion(true, rest, 0.01 * body, 0.01 * tail),
+        RobotMotion(true, rest, np.zeros(x.size), np.full(x.size, np.nan)),
+        RobotMotion(true, np.full(x.size, np.nan), body, tail),
     ):
         assert stands_still(motion, PIXEL) == ()
 
@@ -150,9 +152,9 @@ def test_one_picture_again_and_again_gives_nothing():
     """Without the noise of any camera; of few frames nothing is said, for their rates have wide intervals."""
     true, x, body, tail = (values[:40] for values in series())
     same = [np.full(40, values[0]) for values in (x, body, tail)]
-    (flag,) = one_picture(Motion(true, *same))
+    (flag,) = one_picture(RobotMotion(true, *same))
     assert flag.name == "one-picture"
     assert set(flag.spoils) >= {"forward_velocity", "body_rotation_rate", "tail_rotation_rate"}
-    assert one_picture(Motion(true, *same[:2], np.full(40, np.nan)))[0].name == "one-picture"
-    assert one_picture(Motion(*(values[:20] for values in (true, *same)))) == ()
-    assert one_picture(Motion(true, *same[:2], tail)) == ()
+    assert one_picture(RobotMotion(true, *same[:2], np.full(40, np.nan)))[0].name == "one-picture"
+    assert one_picture(RobotMotion(*(values[:20] for values in (true, *same)))) == ()
+    assert one_picture(RobotMotion(true, *same[:2], tail)) == ()

@@ -6,7 +6,7 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.vision.camera.camera import scale_of
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import Seen, follow
+from spirillum.vision.track.follow import FrameDetection, follow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")
@@ -43,7 +43,7 @@ def followed(swimmer):
     _, path = swimmer
     setup, robot = load_setup(path.with_name("a.setup.toml"))
     setup = setup.model_copy(update={"end": 1000.0})  # beyond the film, which changes nothing
-    seen: list[Seen] = []
+    seen: list[FrameDetection] = []
     done: list[int] = []
     found = follow(
         path,
@@ -108,11 +108,11 @@ def test_a_nose_on_the_other_side_gives_no_numbers(flat_pictures, tmp_path):
 
 
 def test_a_robot_that_is_clear_only_the_other_way_round_names_the_direction(flat_pictures, tmp_path, monkeypatch):
-    from spirillum.vision.track import first_look
+    from spirillum.vision.track import initial_detection
 
     answers = iter([False, True])
-    monkeypatch.setattr(first_look, "_found_by_seal", lambda *given: None)
-    monkeypatch.setattr(first_look, "_clear", lambda found: next(answers, False))
+    monkeypatch.setattr(initial_detection, "_found_by_seal", lambda *given: None)
+    monkeypatch.setattr(initial_detection, "_clear", lambda found: next(answers, False))
     monkeypatch.setattr("spirillum.vision.track.identity.best_other_size", lambda *given: None)
     with pytest.raises(InputError, match=r"robot.direction = 'right', but .* other side; allowed: 'left'"):
         track(flat_pictures.Flat(frames=2), tmp_path)

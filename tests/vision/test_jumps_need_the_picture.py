@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spirillum.vision.track.cuts import cuts_in, hops_in
-from spirillum.vision.track.lost_frames import Reading, restored_times
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.lost_frames import FrameSeries, restored_times
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import PictureChange, PictureSteps, picture_steps
 
 pytest.importorskip("cv2")
@@ -56,7 +56,7 @@ def moving(hop=0.0, at=150, lost=0, frames=300):
     x = 1e-3 * true + 0.05 * PIXEL * rng.normal(size=frames) + hop * PIXEL * after
     body = -2 * np.pi * 0.12 * true + 0.01 * rng.normal(size=frames) + 0.1 * hop * after
     tail = 2 * np.pi * 1.2 * true + 0.02 * rng.normal(size=frames)
-    return Motion(time, x, body, tail)
+    return RobotMotion(time, x, body, tail)
 
 
 def steps_with(jump_at, frames=300):
@@ -88,9 +88,9 @@ def test_a_cut_that_the_picture_shows_is_told():
 def test_lost_frames_are_put_back_where_the_picture_jumps(shown, names):
     motion = moving(lost=2)
     readings = (
-        Reading(motion.tail_phase, 2 * np.pi, 0.01),
-        Reading(motion.body_angle, np.pi, 0.002),
-        Reading(motion.x, np.inf, 0.02 * PIXEL),
+        FrameSeries(motion.tail_phase, 2 * np.pi, 0.01),
+        FrameSeries(motion.body_angle, np.pi, 0.002),
+        FrameSeries(motion.x, np.inf, 0.02 * PIXEL),
     )
     found = restored_times(motion.time, readings, steps_with(shown))
     assert [flag.name for flag in found.flags] == names

@@ -8,8 +8,8 @@ import pytest
 from spirillum.vision.camera.camera import background, ruler_of
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.camera.ruler import lines_in, resolved
-from spirillum.vision.track.scouting import _walls
 from spirillum.vision.track.search import searched_at
+from spirillum.vision.track.setup_free_detection import _walls
 from spirillum.vision.video.frames import Frame
 from spirillum.vision.video.pictures import reduced, reduction
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from spirillum.vision.track.lost_frames import Reading, Restored, restored_times
+from spirillum.vision.track.lost_frames import FrameSeries, Restored, restored_times
 from spirillum.vision.track.multiples import multiples_of
 
 PIXEL, FPS = 2.5e-4, 30.0
@@ -13,7 +13,7 @@ PIXEL, FPS = 2.5e-4, 30.0
 
 def film(
     lost: int, seed: int, *, burst: int = 1, stray: float = 0.0, noise: float = 1.0
-) -> tuple[np.ndarray, np.ndarray, tuple[Reading, ...]]:
+) -> tuple[np.ndarray, np.ndarray, tuple[FrameSeries, ...]]:
     """Even and true times, and readings of a robot at 1 mm/s, -0.12 Hz and 1.2 Hz; noise as on degraded films."""
     rng = np.random.default_rng(seed)
     count = 300 + lost
@@ -27,14 +27,14 @@ def film(
     misread = rng.random(true.size) < stray
     tail[misread] += rng.uniform(-3.0, 3.0, misread.sum())
     readings = (
-        Reading(tail % (2 * np.pi), 2 * np.pi, 0.009),
-        Reading(body % np.pi, np.pi, 0.002),
-        Reading(x, np.inf, 0.02 * PIXEL),
+        FrameSeries(tail % (2 * np.pi), 2 * np.pi, 0.009),
+        FrameSeries(body % np.pi, np.pi, 0.002),
+        FrameSeries(x, np.inf, 0.02 * PIXEL),
     )
     return np.arange(true.size) / FPS, true, readings
 
 
-def restored(time: np.ndarray, readings: tuple[Reading, ...]) -> tuple[Restored, list[str]]:
+def restored(time: np.ndarray, readings: tuple[FrameSeries, ...]) -> tuple[Restored, list[str]]:
     found = restored_times(time, readings)
     return found, [flag.name for flag in found.flags]
 
@@ -61,7 +61,7 @@ def test_whole_films_keep_their_times(stray: float, noise: float) -> None:
     assert found.time is time
 
 
-def repeating(steps: list[int]) -> tuple[np.ndarray, np.ndarray, tuple[Reading, ...]]:
+def repeating(steps: list[int]) -> tuple[np.ndarray, np.ndarray, tuple[FrameSeries, ...]]:
     """Even and true times, and readings, of a film that goes on by so many pictures on each frame."""
     rng = np.random.default_rng(11)
     true = np.cumsum([0, *steps]) / FPS
@@ -69,9 +69,9 @@ def repeating(steps: list[int]) -> tuple[np.ndarray, np.ndarray, tuple[Reading, 
     body = -2 * np.pi * 0.12 * true + 0.006 * rng.normal(size=true.size)
     tail = 2 * np.pi * 1.2 * true + 0.03 * rng.normal(size=true.size)
     readings = (
-        Reading(tail % (2 * np.pi), 2 * np.pi, 0.009),
-        Reading(body % np.pi, np.pi, 0.002),
-        Reading(x, np.inf, 0.02 * PIXEL),
+        FrameSeries(tail % (2 * np.pi), 2 * np.pi, 0.009),
+        FrameSeries(body % np.pi, np.pi, 0.002),
+        FrameSeries(x, np.inf, 0.02 * PIXEL),
     )
     return np.arange(true.size) / FPS, true, readings
 
@@ -138,7 +138,7 @@ def test_a_clear_tail_says_that_a_slow_body_only_scatters() -> None:
         time = np.arange(76) / 25.0
         tail = 2 * np.pi * 4.0 * time + 0.03 * rng.normal(size=76)
         body = -2 * np.pi * 0.1 * time + 0.02 * rng.integers(-1, 2, size=76)
-        readings = Reading(tail % (2 * np.pi), 2 * np.pi, 0.009), Reading(body % np.pi, np.pi, 0.002)
+        readings = FrameSeries(tail % (2 * np.pi), 2 * np.pi, 0.009), FrameSeries(body % np.pi, np.pi, 0.002)
         assert "uneven-steps" not in restored(time, readings)[1]
 
 
@@ -158,7 +158,7 @@ def test_true_gaps_are_no_loss() -> None:
 def test_a_tail_that_steps_alone_is_not_believed() -> None:
     time, _, readings = film(0, 4)
     tail = readings[0].values + 2 * np.pi * 1.2 / FPS * np.searchsorted([60, 110, 150, 190, 240], np.arange(time.size))
-    found, names = restored(time, (Reading(tail % (2 * np.pi), 2 * np.pi, 0.009), *readings[1:]))
+    found, names = restored(time, (FrameSeries(tail % (2 * np.pi), 2 * np.pi, 0.009), *readings[1:]))
     assert names != ["lost-frames"] or found.relative_error > 0
     assert names
 

@@ -6,7 +6,7 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.vision.track import identity
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.standing import stands_flag
 
 pytest.importorskip("av")
@@ -79,7 +79,7 @@ def test_standing_is_told_from_small_motion():
     time = np.arange(60) / 15.0
     rng = np.random.default_rng(0)
     noise = rng.normal(0.0, 1.0, (3, 60)) * np.array([[0.02 * PIXEL], [0.002], [0.005]])
-    still = Motion(time, *noise)
+    still = RobotMotion(time, *noise)
     assert [flag.name for flag in stands_flag(still, PIXEL)] == ["robot-stands-still"]
     for moving in (
         still._replace(x=still.x + 0.1 * PIXEL * time),
@@ -88,4 +88,4 @@ def test_standing_is_told_from_small_motion():
     ):
         assert stands_flag(moving, PIXEL) == ()
     unread = np.full(60, np.nan)
-    assert stands_flag(Motion(time, still.x, unread, unread), PIXEL) == ()  # it may be anything that stands there
+    assert stands_flag(RobotMotion(time, still.x, unread, unread), PIXEL) == ()  # it may be anything that stands there

@@ -11,7 +11,7 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cues import agreement_of, cue_shifts
 from spirillum.vision.track.follow import follow
-from spirillum.vision.track.seal_search import SealSearch
+from spirillum.vision.track.initial_detection import SealSearch
 
 cv2 = pytest.importorskip("cv2")
 

@@ -10,7 +10,7 @@ from spirillum.errors import InputError
 from spirillum.measurement.setup_template import setup_answer, setup_text
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track import scouting
+from spirillum.vision.track import setup_free_detection
 
 pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")
@@ -110,8 +110,8 @@ def test_without_a_ruler_the_robot_gives_the_scale_and_another_order_of_stripes_
 
 def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
     """With a ruler the setup is written as far as it goes; without one there is nothing to write."""
-    monkeypatch.setattr(scouting, "best_other_size", lambda *given: None)  # it takes a while
-    monkeypatch.setattr(scouting, "SCOUTING", replace(scouting.SCOUTING, shares=(0.25,)))
+    monkeypatch.setattr(setup_free_detection, "best_other_size", lambda *given: None)  # it takes a while
+    monkeypatch.setattr(setup_free_detection, "SCOUTING", replace(setup_free_detection.SCOUTING, shares=(0.25,)))
     empty = {"frames": 2, "start": (1.0, 0.0), "noise": 4.0}
     flat_pictures.Flat(**empty, size=(240, 120), focal=260.0, spacing=3e-3).write(tmp_path / "a.mp4")
     looks = []
@@ -124,7 +124,9 @@ def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, mo
     assert looks[-1][1] == looks[-1][2]
     with pytest.raises(InputError, match=r"spacing .* out of range"):
         sp.propose_setup(tmp_path / "a.mp4", spacing=0.0)
-    monkeypatch.setattr(scouting, "_looked", lambda *given: None)  # where the robot is not in the first film either
+    monkeypatch.setattr(
+        setup_free_detection, "_looked", lambda *given: None
+    )  # where the robot is not in the first film either
     flat_pictures.Flat(**empty, size=(160, 120), focal=175.0).write(tmp_path / "b.mp4")
     with pytest.raises(InputError, match=r"b\.mp4 shows neither a ruler nor a robot like 'biorob2012-wide'"):
         sp.propose_setup(tmp_path / "b.mp4", output=tmp_path / "setup.toml")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.track.elsewhere import something_else, something_else_flag
+from spirillum.vision.track.assembly import something_else, something_else_flag
 
 LENGTH = 0.04
 TIME = np.arange(150) / 30.0

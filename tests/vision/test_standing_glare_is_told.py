@@ -9,7 +9,7 @@ import pytest
 from spirillum.vision.camera.optics import BodyPose, optics_of
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.glare import Glare, standing_glare
+from spirillum.vision.track.learning import Glare, standing_glare
 
 pytest.importorskip("cv2")
 REAR, MIDDLE, NOSE, ASIDE, RIM = (-0.014, 0.0), (0.0, 0.0), (0.022, 0.003), (-0.014, 0.012), (0.018, 0.005)

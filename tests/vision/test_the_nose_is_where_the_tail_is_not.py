@@ -12,8 +12,8 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track import identity
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.first_look import Start
 from spirillum.vision.track.identity import Identified, identify
+from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.video.frames import Frame
 
 pytest.importorskip("cv2")

@@ -7,7 +7,7 @@ from spirillum.fluid.resistance import resistance
 from spirillum.robot.load import load
 from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.unwrapping import _largest_advance, contradictions, no_stripe_passes, unwrapped
 
 FPS = 30.0
@@ -97,13 +97,13 @@ def test_body_and_tail_cannot_turn_the_same_way() -> None:
     robot = load("biorob2012-wide")
     time = np.arange(300) / FPS
     forward, back, still = 0.005 * time, -0.005 * time, 0.0 * time
-    assert contradictions(Motion(time, forward, -0.7 * time, 7.0 * time), robot) == ()
-    assert contradictions(Motion(time, back, still, -7.0 * time), robot) == ()
+    assert contradictions(RobotMotion(time, forward, -0.7 * time, 7.0 * time), robot) == ()
+    assert contradictions(RobotMotion(time, back, still, -7.0 * time), robot) == ()
     for hand, name in ((0, "handedness"), (1, "aliased-tail")):
-        (flag,) = contradictions(Motion(time, forward, -0.7 * time, -7.0 * time), robot, hand)
+        (flag,) = contradictions(RobotMotion(time, forward, -0.7 * time, -7.0 * time), robot, hand)
         assert flag.name == name
         assert "tail_rotation_rate" in flag.spoils
-    (flag,) = contradictions(Motion(time, forward, np.full(300, np.nan), -7.0 * time), robot)
+    (flag,) = contradictions(RobotMotion(time, forward, np.full(300, np.nan), -7.0 * time), robot)
     assert flag.name == "aliased-tail"
 
 
@@ -111,8 +111,8 @@ def test_no_wire_advances_more_than_it_can_without_a_body() -> None:
     time = np.arange(300) / FPS
     robot = load("biorob2012-wide")
     advance = 0.3 * robot.tail.wavelength * 3.0 / TURN
-    assert contradictions(Motion(time, advance * time, -0.1 * time, 3.0 * time), robot) == ()
-    (flag,) = contradictions(Motion(time, 1.2 * advance * time, -0.1 * time, 3.0 * time), robot)
+    assert contradictions(RobotMotion(time, advance * time, -0.1 * time, 3.0 * time), robot) == ()
+    (flag,) = contradictions(RobotMotion(time, 1.2 * advance * time, -0.1 * time, 3.0 * time), robot)
     assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
     for amplitude in ("1 mm", "3 mm", "8 mm"):  # the tail alone, free of any body, by resistive force theory
         tail = load("biorob2012-wide", **{"tail.amplitude": amplitude, "tail.wavelength": "15 mm"})
@@ -124,11 +124,11 @@ def test_a_robot_that_swims_on_a_tail_at_rest_betrays_a_tail_at_the_frame_rate()
     time = np.arange(300) / FPS
     robot = load("biorob2012-wide")
     still = 1e-3 * np.sin(time)
-    (flag,) = contradictions(Motion(time, 1e-3 * time, -0.1 * time, still), robot)
+    (flag,) = contradictions(RobotMotion(time, 1e-3 * time, -0.1 * time, still), robot)
     assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
-    assert contradictions(Motion(time, 1e-5 * time, still, still), robot) == ()  # a robot at rest
+    assert contradictions(RobotMotion(time, 1e-5 * time, still, still), robot) == ()  # a robot at rest
     assert (
-        contradictions(Motion(time, 1e-3 * time, -0.1 * time, np.full(300, np.nan)), robot) == ()
+        contradictions(RobotMotion(time, 1e-3 * time, -0.1 * time, np.full(300, np.nan)), robot) == ()
     )  # a tail that is not seen
 
 
@@ -170,5 +170,5 @@ def test_stripes_read_on_few_frames_give_no_rate():
 def test_a_body_that_rests_while_its_tail_turns_shows_no_stripes(turned: float, names: list[str]) -> None:
     time = np.arange(150) / FPS
     body = -np.radians(turned) * time / time[-1]
-    motion = Motion(time, 1e-4 * time, body, TURN * 1.2 * time)
+    motion = RobotMotion(time, 1e-4 * time, body, TURN * 1.2 * time)
     assert [flag.name for flag in no_stripe_passes(motion, load("biorob2012-wide"))] == names

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.estimate import LEVEL, Estimate
 from spirillum.calibration.experiment import Experiment, Quantity
@@ -17,9 +16,8 @@ from spirillum.calibration.methods import Method
 from spirillum.calibration.paper_method import PaperFit
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
-from spirillum.shown import Shown
-
-__all__ = ["MEANINGS", "Calibrated"]
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 
 MEANINGS: dict[Quantity, tuple[str, str]] = {
     "advance": ("m/rad", "advance per radian of the tail"),
@@ -30,7 +28,7 @@ MEANINGS: dict[Quantity, tuple[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Calibrated(Shown):
+class Calibrated(DisplayMixin):
     """What a calibration found."""
 
     problem: Problem

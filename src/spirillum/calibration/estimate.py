@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["LEVEL", "Estimate"]
-
 LEVEL = 0.95
 """Level of all intervals."""
 

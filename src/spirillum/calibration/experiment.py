@@ -21,7 +21,7 @@ from spirillum.errors import InputError
 from spirillum.files import read_bytes
 from spirillum.files.limits import LARGEST_TABLE
 from spirillum.measurement.observations import (
-    Observation,
+    ObservationRow,
     all_rates,
     check_driven,
     check_signs,
@@ -34,8 +34,6 @@ from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.robot.robot import Robot
 from spirillum.swimming.discrepancy import error_of_mean
-
-__all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "tail_words", "with_tail"]
 
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
@@ -169,15 +167,11 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     Args:
         path: observations file.
         robots: one robot for each channel; what of them is not in a row (body, fluid, motor) holds for it.
-
-    Raises:
-        InputError: if the file is wrong, a row belongs to no robot, or a number contradicts the physics; the sentence
-            names row and column.
     """
     path = Path(path)
     observations = read_observations(path)
     by_channel = _by_channel(robots)
-    groups: dict[tuple[float, float, float], list[Observation]] = {}
+    groups: dict[tuple[float, float, float], list[ObservationRow]] = {}
     for item in observations:
         robot = by_channel.get(round(item.channel_diameter, 9))
         if robot is None:
@@ -238,7 +232,7 @@ def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
     return found
 
 
-def _check_name(path: Path, item: Observation, robot: Robot, robots: Sequence[Robot]) -> None:
+def _check_name(path: Path, item: ObservationRow, robot: Robot, robots: Sequence[Robot]) -> None:
     """A row that names one of the robots has to lie in its channel; any other name is the user's own."""
     if item.robot != robot.name and any(item.robot == other.name for other in robots):
         raise InputError(
@@ -247,7 +241,7 @@ def _check_name(path: Path, item: Observation, robot: Robot, robots: Sequence[Ro
         )
 
 
-def _check_signs(path: Path, observations: Sequence[Observation], by_channel: Mapping[float, Robot]) -> None:
+def _check_signs(path: Path, observations: Sequence[ObservationRow], by_channel: Mapping[float, Robot]) -> None:
     """A tail turns the way that it is driven, and the body against it."""
     for robot in by_channel.values():
         items = [item for item in observations if by_channel[round(item.channel_diameter, 9)] is robot]
@@ -257,7 +251,7 @@ def _check_signs(path: Path, observations: Sequence[Observation], by_channel: Ma
         check_signs(path, items, ["body_rate_Hz"], sense, f"{allowed}{robot.tail.handedness}-handed tail")
 
 
-def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
+def _check_variety(path: Path, observations: Sequence[ObservationRow]) -> None:
     """Speeds that are all equal were not measured, but those of one tail that are read to a digit or two."""
     rows = [item for item in observations if np.isfinite(item.forward_velocity)]
     if len(rows) < _FEWEST_EQUAL or len({item.forward_velocity for item in rows}) > 1:
@@ -270,7 +264,7 @@ def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
         )
 
 
-def _copies(items: Sequence[Observation]) -> list[str]:
+def _copies(items: Sequence[ObservationRow]) -> list[str]:
     """A sentence on trials of one tail that are equal in every number; none where they differ."""
     alike: dict[str, list[int]] = {}
     for item in items:
@@ -284,7 +278,7 @@ def _copies(items: Sequence[Observation]) -> list[str]:
     ]
 
 
-def _check_direction(path: Path, items: Sequence[Observation]) -> None:
+def _check_direction(path: Path, items: Sequence[ObservationRow]) -> None:
     """A trial that swims the other way than all others of its tail, and no less fast, has a wrong sign."""
     speeds = np.array([item.forward_velocity for item in items])
     for place, speed in enumerate(speeds.tolist()):
@@ -326,7 +320,7 @@ class _Seen:
     tail_rate: float
 
 
-def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
+def _ratios(path: Path, items: Sequence[ObservationRow], hand: float) -> _Seen:
     velocity, tail, body, motor = (
         np.array([getattr(item, name) for item in items])
         for name in ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
@@ -355,7 +349,7 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
     return found
 
 
-def _check_rates(path: Path, observations: Sequence[Observation], found: Sequence[_Seen]) -> None:
+def _check_rates(path: Path, observations: Sequence[ObservationRow], found: Sequence[_Seen]) -> None:
     """Speeds alone say nothing of the fluid: how fast the tail turned has to be known too."""
     speeds = [item for item in observations if np.isfinite(item.forward_velocity)]
     if speeds and not any(np.isfinite(seen.advance.mean) for seen in found):
@@ -365,7 +359,7 @@ def _check_rates(path: Path, observations: Sequence[Observation], found: Sequenc
         )
 
 
-def _check_zeros(path: Path, observations: Sequence[Observation]) -> None:
+def _check_zeros(path: Path, observations: Sequence[ObservationRow]) -> None:
     """Refuse a column of zeros: no model has a robot that does not move at all, and errors are relative."""
     for name, column in (("forward_velocity", "forward_velocity_mm_s"), ("body_rate", "body_rate_Hz")):
         known = [item for item in observations if np.isfinite(getattr(item, name))]
@@ -377,12 +371,7 @@ def _check_zeros(path: Path, observations: Sequence[Observation]) -> None:
 
 
 def _of_trials(values: Samples, *relative: Samples) -> _Trials:
-    """Mean and scatter of trials.
-
-    Args:
-        values: one value a trial; NaN where it was not observed.
-        relative: relative standard errors of what the value is made of, trial by trial; NaN where not stated.
-    """
+    """Mean and scatter of trials."""
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _Trials(values, float("nan"), 0, 0.0, 0.0)
@@ -393,7 +382,9 @@ def _of_trials(values: Samples, *relative: Samples) -> _Trials:
     return _Trials(values, mean, known.size, float(((known - mean) ** 2).sum()), known.size - 1.0, error)
 
 
-def _of_a_mean(item: Observation, velocity: float, tail: float, body: float, motor: float, *, by_motor: bool) -> _Seen:
+def _of_a_mean(
+    item: ObservationRow, velocity: float, tail: float, body: float, motor: float, *, by_motor: bool
+) -> _Seen:
     """A row that is a mean over trials: its interval gives the trials' scatter back (Student's t)."""
     count = item.trials
     quantile = student_t_quantile(0.975, count - 1)

@@ -1,4 +1,9 @@
-"""From observations to parameters, with what they are worth."""
+"""From observations to parameters, with what they are worth.
+
+Which hydrodynamic model is fitted where nobody names one: that with which `spirillum.predict` answers.
+A model without walls fitted to robots in a tube gives factors and friction that hold what the walls do: a friction
+planted in a tube comes back a fifth off. Where every observed robot has the table of its tube, `tube` is fitted.
+"""
 
 from __future__ import annotations
 
@@ -26,22 +31,62 @@ from spirillum.calibration.fit_warnings import (
     outlier_warnings,
     prior_warnings,
 )
-from spirillum.calibration.fitted_model import choose_fitted_model, is_fitted_in_tube
 from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement, torque_error
 from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.paper_method import paper_fit
-from spirillum.calibration.parameters import assumed_uncertainties, free_names
+from spirillum.calibration.parameters import UNWALLED, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.fluid.tube.tabled import TabledTube, tables_of
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import all_hold
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice
+from spirillum.swimming.steady import requirements
 
-__all__ = ["RobotSource", "fit_model", "given_robots"]
+
+def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
+    """Return whether a fit may be one with walls: so it is asked for, or with `auto` its free numbers allow it.
+
+    Args:
+        asked: name of a model, or `auto`.
+        free: free parameters, as `fit_model` takes them.
+        method: method of the fit; the paper's inverts drag factors.
+    """
+    if asked != AUTO:
+        return asked == WALLED
+    return method != "paper" and is_free_in(WALLED, free)
+
+
+def choose_fitted_model(
+    asked: str, experiment: Experiment, free: str | Sequence[str] | None, method: str, *, prepare: bool
+) -> ModelChoice:
+    """Return the model that is fitted, and why."""
+    if asked != AUTO:
+        return ModelChoice(find_swimmer_model(asked, AUTO).name)
+    if not is_fitted_in_tube(asked, free, method):
+        why = "method 'paper' inverts" if method == "paper" else "the free numbers are of"
+        return ModelChoice(UNWALLED, f"{why} a model with drag factors")
+    batch = RobotBatch.of(experiment.robots)
+    if not all_hold(requirements(batch, TabledTube({}))).all():
+        return _without_walls("not every robot fits its tube with a film around it")
+    lacking = 0 if prepare else sum(table is None for table in tables_of(batch))
+    if lacking:
+        remedy = f"--prepare makes them in {TABLE_TAKES} each, and fits model '{WALLED}'"
+        return _without_walls(f"{lacking} of {batch.size} robots have no table of their tubes: {remedy}")
+    return ModelChoice(WALLED, "every robot has the table of its tube")
+
+
+def _without_walls(why: str) -> ModelChoice:
+    caution = f"model '{UNWALLED}' leaves the walls out, which its fitted numbers then stand for: {why}"
+    return ModelChoice(UNWALLED, why.partition(":")[0], caution)
+
 
 _READINGS = ("rotor", "paper")
 _FRICTION_DRAWS = 2000
@@ -71,27 +116,7 @@ def fit_model(
     prepare: bool = False,
     progress: Progress | None = None,
 ) -> Calibrated:
-    """Fit parameters of a model to observed speeds and rates.
-
-    Args:
-        observations: observations file, see `docs/commands`.
-        robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
-        model: hydrodynamic model; or `auto`: `tube` where every robot has the table of its tube, or `prepare` makes it,
-            and what is free is of that model; else `sbt`.
-        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted, or
-            with `tube` the gap.
-        method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
-        friction: reading under which B_eff follows from (18): `rotor` or `paper`.
-        assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
-            `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
-            taken as exact.
-        sampling: how the posterior is sampled.
-        prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
-        progress: told what is being done.
-
-    Raises:
-        InputError: for wrong input, or observations that cannot tell what is asked.
-    """
+    """Fit parameters of a model to observed speeds and rates."""
     if method not in METHODS:
         raise InputError(f"method = {method!r}{did_you_mean(method, METHODS)}; allowed: {', '.join(METHODS)}")
     if friction not in _READINGS:

@@ -15,26 +15,10 @@ from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.parameters import LogUniform, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
+from spirillum.display import percent
 from spirillum.robot.batch import RobotBatch
 from spirillum.robust import mad_scale
-from spirillum.shown import percent
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
-
-__all__ = [
-    "CALLED",
-    "RATES_IN_RADIANS",
-    "check_plausible",
-    "common_warnings",
-    "edge_warnings",
-    "factor_misfit_warnings",
-    "friction_interval_warnings",
-    "friction_warnings",
-    "misfit_warnings",
-    "narrow_channel_warnings",
-    "outlier_warnings",
-    "prior_warnings",
-    "synthetic_warning",
-]
 
 RATES_IN_RADIANS = (
     "a motor that is too weak for most tails is most often a unit: are the rates in Hz, turns a second, and not in "
@@ -63,10 +47,6 @@ _OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
 
 def check_plausible(problem: Problem, z: Samples) -> None:
     """Refuse an implausible fit: most often the observations are in other units.
-
-    Args:
-        problem: the fit.
-        z: coordinates of the best fit.
 
     Raises:
         UnexplainedError: if the median misfit exceeds a factor of ten, or a parameter with a wide prior lies more than
@@ -272,11 +252,7 @@ def synthetic_warning(source: str) -> str:
 
 
 def inertia_warnings(experiment: Experiment) -> list[str]:
-    """Return warnings of observations at Reynolds numbers at which Stokes flow is not accurate.
-
-    Raises:
-        InputError: if a robot was observed far outside Stokes flow.
-    """
+    """Return warnings of observations at Reynolds numbers at which Stokes flow is not accurate."""
     batch = RobotBatch.of(experiment.robots)
     rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
     limits = reynolds_limits(

@@ -27,8 +27,6 @@ from spirillum.swimming.drawn_resistance import DrawnResistance, Draws
 from spirillum.swimming.dry_friction import with_dry_friction
 from spirillum.swimming.motor import steady_current
 
-__all__ = ["DryContact", "Forward", "Predicted", "kinematics"]
-
 
 @dataclass(frozen=True)
 class Predicted:

@@ -14,22 +14,14 @@ from spirillum.arrays import Samples
 from spirillum.calibration.estimate import Estimate
 from spirillum.calibration.parameters import ASSUMABLE
 from spirillum.calibration.problem import Problem
-from spirillum.fluid.stated import CHECKED, tail_error
+from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.robot.batch import RobotBatch
-
-__all__ = ["friction_sensitivity", "friction_statement"]
 
 _STEP = 1e-4
 
 
 def friction_sensitivity(problem: Problem, z: Samples, reading: str) -> dict[str, Samples]:
-    """Change of B_eff of every robot per relative change of each constant, N m s/rad, (robots,), by its field.
-
-    Args:
-        problem: the fit.
-        z: coordinates of the best fit, (free numbers,).
-        reading: reading of the friction.
-    """
+    """Change of B_eff of every robot per relative change of each constant, N m s/rad, (robots,), by its field."""
     if "friction" not in problem.free:
         return {}
     rates = problem.experiment.motor_rate.mean[None]
@@ -57,13 +49,7 @@ def torque_error(problem: Problem) -> float | None:
 
 
 def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivity: Mapping[str, Samples]) -> str:
-    """What the intervals of B_eff take as exact, and how far it moves with each constant; empty without B_eff.
-
-    Args:
-        problem: the fit.
-        friction: B_eff of every robot, were the model exact.
-        sensitivity: change of B_eff per relative change of each constant.
-    """
+    """What the intervals of B_eff take as exact, and how far it moves with each constant; empty without B_eff."""
     middle = np.array([item.value for item in friction])
     middle = np.abs(middle[np.isfinite(middle)])
     if middle.size == 0 or not np.median(middle) > 0:

@@ -25,8 +25,6 @@ from spirillum.calibration.parameters import ASSUMABLE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 
-__all__ = ["FAR", "Identifiability", "LikelihoodProfile", "check_identifiable", "identified", "profiles"]
-
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
 _POOR = 3.0
@@ -68,13 +66,6 @@ def check_identifiable(problem: Problem, z: Samples) -> None:
     """Refuse free numbers that no observations of these quantities can tell apart, however exact.
 
     A number whose uncertainty is stated is known by that, and left out.
-
-    Args:
-        problem: the fit.
-        z: coordinates of the best fit.
-
-    Raises:
-        InputError: naming the numbers.
     """
     kept = [n for n, item in enumerate(problem.coordinates) if item.parameter.name not in problem.assumed]
     if len(kept) < 2:
@@ -96,12 +87,7 @@ def check_identifiable(problem: Problem, z: Samples) -> None:
 
 
 def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
-    """Find the directions in which a fit is not determined, at its optimum.
-
-    Args:
-        problem: the fit.
-        fit: its least squares.
-    """
+    """Find the directions in which a fit is not determined, at its optimum."""
     error = {name: max(np.nan_to_num(value), LEAST_ERROR) for name, value in fit.error.items()}
     jacobian = np.concatenate(list(weighted_sensitivities(problem, fit.z, error, fit.discrepancy).values()))
     columns = sensitivities(problem, fit.z)
@@ -175,13 +161,7 @@ class LikelihoodProfile:
 
 
 def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[LikelihoodProfile]:
-    """LikelihoodProfile likelihood of every free number: the others are fitted anew at each held value.
-
-    Args:
-        problem: the fit.
-        fit: its least squares.
-        count: number of held values.
-    """
+    """LikelihoodProfile likelihood of every free number: the others are fitted anew at each held value."""
 
     def residuals(z: Samples) -> Samples:
         return weighted_residuals(problem, z, fit.error, fit.discrepancy)

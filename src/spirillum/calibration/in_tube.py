@@ -15,7 +15,7 @@ from spirillum.calibration.experiment import Experiment
 from spirillum.calibration.forward import DryContact, Forward
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.announced import TABLE_TAKES
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.fluid.tube.tabled import TabledTube, tables_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement, gap_on_asperities
@@ -23,8 +23,6 @@ from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.preparation import prepare_all
-
-__all__ = ["ROUGHNESS_BAND", "Ranges", "place_ranges", "tube_forward"]
 
 ROUGHNESS_BAND = (1e-4, 1e-2)
 """Least and largest height of asperities over the body's radius: from polished surfaces (1 um for the paper's robot) to
@@ -35,16 +33,7 @@ Ranges = dict[str, tuple[float, float]]
 
 
 def place_ranges(batch: RobotBatch, model: SwimmerModel, names: Sequence[str]) -> Ranges:
-    """Gaps, pitches and roughnesses that every robot of a batch allows: ends of their priors, m and rad.
-
-    Args:
-        batch: the robots.
-        model: a model that computes the walls.
-        names: which of `gap`, `pitch` and `roughness` are free.
-
-    Raises:
-        InputError: if the robots share no range.
-    """
+    """Gaps, pitches and roughnesses that every robot of a batch allows: ends of their priors, m and rad."""
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     for _, one in batch.blocks(1):
         radius = 0.5 * float(one.body_diameter[0])
@@ -74,18 +63,7 @@ def tube_forward(
     *,
     prepare: bool,
 ) -> tuple[Forward, float]:
-    """The forward model, and the largest relative error of the robots' tables in speed and body rate.
-
-    Args:
-        experiment: the observations.
-        batch: its robots.
-        free: names of the free parameters.
-        tell: told what is being computed.
-        prepare: make the tables that are not there.
-
-    Raises:
-        InputError: if robots have no table, or dry friction is free and something that it takes is not known.
-    """
+    """The forward model, and the largest relative error of the robots' tables in speed and body rate."""
     model = _tables(experiment, batch, tell, prepare=prepare)
     level = replace(batch, placement=Placement().model_copy(update={"pitch": 0.0}))
     contact = _contact(experiment, batch) if "friction_coefficient" in free else None
@@ -97,11 +75,7 @@ def tube_forward(
 def _tables(
     experiment: Experiment, batch: RobotBatch, tell: Callable[[str, int, int], None], *, prepare: bool
 ) -> TabledTube:
-    """The robots' tables.
-
-    Raises:
-        InputError: naming the robots that have none.
-    """
+    """The robots' tables."""
     found = tables_of(batch)
     lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
     if lacking and not prepare:
@@ -116,11 +90,7 @@ def _tables(
 
 
 def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
-    """What dry friction depends on.
-
-    Raises:
-        InputError: for a robot whose weight or whose observed tail rate is not known.
-    """
+    """What dry friction depends on."""
     weight = weights_in_fluid(experiment.robots)
     if not np.all(weight > 0):
         place = int(np.argmin(weight > 0))

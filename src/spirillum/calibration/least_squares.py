@@ -20,19 +20,6 @@ from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.errors import InputError
 from spirillum.units import display_unit, in_unit
 
-__all__ = [
-    "FEWEST_LEFT",
-    "LARGEST",
-    "LEAST_ERROR",
-    "LeastSquares",
-    "drawn_fit",
-    "least_squares_fit",
-    "sensitivities",
-    "standard_errors",
-    "weighted_residuals",
-    "weighted_sensitivities",
-]
-
 _STARTS = 6
 _STEP = 1e-4
 """Step of the central differences, in standard deviations of the prior."""
@@ -78,12 +65,7 @@ class LeastSquares:
 
 
 def sensitivities(problem: Problem, z: Samples) -> dict[Quantity, Samples]:
-    """Relative change of every prediction per unit of each coordinate, (robots, free numbers), by central differences.
-
-    Args:
-        problem: the fit.
-        z: coordinates, (free numbers,).
-    """
+    """Return relative changes of predictions per coordinate, (robots, free numbers), by central differences."""
     count = z.size
     steps = _STEP * np.eye(count)
     points = np.concatenate([z + steps, z - steps, z[None]])
@@ -100,14 +82,7 @@ def standard_errors(
     error: dict[Quantity, float],
     discrepancy: dict[Quantity, float],
 ) -> dict[Quantity, Samples]:
-    """Standard error of each mean against its prediction, in the quantity's unit.
-
-    Args:
-        problem: the fit.
-        predicted: predictions, to which the discrepancy is relative.
-        error: relative error of one trial, by quantity.
-        discrepancy: relative misfit from robot to robot, by quantity.
-    """
+    """Standard error of each mean against its prediction, in the quantity's unit."""
     found: dict[Quantity, Samples] = {}
     for name, values in predicted.items():
         found[name] = np.sqrt(_noise(problem, name, error[name]) + (discrepancy[name] * values) ** 2)
@@ -123,11 +98,7 @@ def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
 
 
 def least_squares_fit(problem: Problem) -> LeastSquares:
-    """Fit the free numbers.
-
-    Raises:
-        InputError: if there are fewer means than free numbers, or one on which nothing observed depends.
-    """
+    """Fit the free numbers."""
     _check_count(problem)
     error = {name: problem.ratio(name).pooled_error for name in problem.quantities}
     scattered = {name: bool(error[name] > 0) or problem.ratio(name).explained for name in error}
@@ -214,15 +185,7 @@ def weighted_residuals(
     *,
     prior: float = 1.0,
 ) -> Samples:
-    """What least squares make small: means less predictions over their standard errors, and the prior's share.
-
-    Args:
-        problem: the fit.
-        z: coordinates, (free numbers,).
-        error: relative error of one trial, by quantity.
-        discrepancy: relative misfit from robot to robot, by quantity.
-        prior: weight of the distance from the middle of the prior.
-    """
+    """What least squares make small: means less predictions over their standard errors, and the prior's share."""
     found: Samples = _residuals(problem, z[None], error, discrepancy, prior)[0]
     return found
 
@@ -284,14 +247,7 @@ def _best(
 def weighted_sensitivities(
     problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> dict[Quantity, Samples]:
-    """Change of each seen mean over its standard error per unit of each coordinate, (seen robots, free numbers).
-
-    Args:
-        problem: the fit.
-        z: coordinates, (free numbers,).
-        error: relative error of one trial, by quantity.
-        discrepancy: relative misfit from robot to robot, by quantity.
-    """
+    """Change of each seen mean over its standard error per unit of each coordinate, (seen robots, free numbers)."""
     predicted = problem.predicted_at(z)
     errors = standard_errors(problem, predicted, error, discrepancy)
     found: dict[Quantity, Samples] = {}
@@ -346,12 +302,6 @@ def drawn_fit(
     problem: Problem, fit: LeastSquares, count: int, rng: np.random.Generator
 ) -> tuple[Samples, dict[Quantity, Samples]]:
     """Draws around a fit: discrepancies from what the residuals tell of them, then the numbers given each.
-
-    Args:
-        problem: the fit.
-        fit: its least squares.
-        count: number of draws.
-        rng: source of chance.
 
     Returns:
         Coordinates, (draws, free numbers), and discrepancies by quantity, (draws,).

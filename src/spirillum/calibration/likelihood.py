@@ -22,8 +22,6 @@ from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.problem import Problem
 
-__all__ = ["DISCREPANCY_SCALE", "ERROR_SCALE", "LEAST_RELATIVE", "Density", "half_normal"]
-
 DISCREPANCY_SCALE = 0.3
 """Scale of the half-normal prior of a discrepancy: models of this kind miss by up to some tens of per cent."""
 ERROR_SCALE = 0.05

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-__all__ = ["METHODS", "Method"]
-
 Method = Literal["posterior", "least-squares", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)
 """Draws of the posterior, its most probable values, or the paper's own way."""

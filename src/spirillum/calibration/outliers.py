@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.measurement.observations import Observation
+from spirillum.measurement.observations import ObservationRow
 from spirillum.robust import mad_scale
-
-__all__ = ["outlying_trials"]
 
 _LIMIT = 8.0
 """Robust standard deviations, pooled over all trials, beyond which a trial is an outlier."""
@@ -21,14 +19,9 @@ _COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
 
 
 def outlying_trials(
-    groups: Sequence[Sequence[Observation]], ratios: Sequence[tuple[Samples, Samples]]
+    groups: Sequence[Sequence[ObservationRow]], ratios: Sequence[tuple[Samples, Samples]]
 ) -> tuple[str, ...]:
-    """A sentence for each row whose advance or turning is an outlier among the trials of its tail.
-
-    Args:
-        groups: rows of each robot.
-        ratios: advance and turning of each row of each robot.
-    """
+    """A sentence for each row whose advance or turning is an outlier among the trials of its tail."""
     found: list[str] = []
     for number, column in enumerate(_COLUMNS):
         deviations = [_deviations(own[number]) for own in ratios]

@@ -21,8 +21,6 @@ from spirillum.arrays import Samples
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 
-__all__ = ["PaperFit", "paper_fit"]
-
 _FACTORS = ("body_drag", "body_rotation")
 
 
@@ -39,15 +37,7 @@ class PaperFit:
 
 
 def paper_fit(problem: Problem) -> PaperFit:
-    """Invert (15) for the drag factors.
-
-    Args:
-        problem: with `body_drag` free, and `body_rotation` unless the model is resistive force theory.
-
-    Raises:
-        InputError: if anything else is free, the model takes no factors, a channel lacks what its factor needs, or a
-            factor comes out negative.
-    """
+    """Invert (15) for the drag factors."""
     names = [name for name in problem.free if name != "friction"]
     wrong = [name for name in names if name not in _FACTORS]
     if wrong or problem.model.placed:

@@ -15,27 +15,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
-from spirillum.robot.options import CALIBRATED
+from spirillum.robot.model_options import CALIBRATED
 from spirillum.swimming.model_choice import AUTO, WALLED
-
-__all__ = [
-    "ASSUMABLE",
-    "DEFAULT_FREE",
-    "OBSERVED",
-    "PARAMETERS",
-    "UNWALLED",
-    "Coordinate",
-    "LogNormal",
-    "LogUniform",
-    "Parameter",
-    "Prior",
-    "Uniform",
-    "assumed_uncertainties",
-    "check_not_set",
-    "free_names",
-    "is_free_in",
-    "listed_names",
-]
 
 
 class Prior(Protocol):
@@ -125,7 +106,7 @@ class Uniform:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FitParameter:
     """Something that a fit may free."""
 
     name: str
@@ -143,7 +124,7 @@ class Parameter:
 
 _ALL = tuple(SWIMMER_MODELS)
 _LISTED = (
-    Parameter(
+    FitParameter(
         "body_drag",
         "factor on the body's axial drag D_x, one for each channel (Table III)",
         "",
@@ -151,7 +132,7 @@ _LISTED = (
         CALIBRATED,
         "a body in a tube drags as much as alone or several times more: from a third to fourteen times",
     ),
-    Parameter(
+    FitParameter(
         "body_rotation",
         "factor on the body's rotational drag E_x, one for each channel (Table III)",
         "",
@@ -159,7 +140,7 @@ _LISTED = (
         CALIBRATED,
         "walls raise it, and the paper found 0.6: from a seventh to seven times",
     ),
-    Parameter(
+    FitParameter(
         "friction",
         "effective friction B_eff of eq. (18), one for each tail; from the observed motor rate",
         "N m s/rad",
@@ -167,7 +148,7 @@ _LISTED = (
         _ALL,
         "none of its own: it follows from (17) and (18), and its uncertainty from the rates and the other parameters",
     ),
-    Parameter(
+    FitParameter(
         "shared_friction",
         "effective friction B_eff, one for all tails",
         "N m s/rad",
@@ -176,7 +157,7 @@ _LISTED = (
         "around the value that takes half of the motor's torque at the observed rates, a factor of 19 either way",
         needs_motor=True,
     ),
-    Parameter(
+    FitParameter(
         "normal_factor",
         "factor on RFT's coefficient across the wire, c_n",
         "",
@@ -184,7 +165,7 @@ _LISTED = (
         ("rft",),
         "published sets of coefficients differ by a factor of two",
     ),
-    Parameter(
+    FitParameter(
         "tangential_factor",
         "factor on RFT's coefficient along the wire, c_t",
         "",
@@ -192,7 +173,7 @@ _LISTED = (
         ("rft",),
         "published sets of coefficients differ by a factor of two",
     ),
-    Parameter(
+    FitParameter(
         "wire_diameter",
         "diameter of the tail's wire",
         "m",
@@ -200,7 +181,7 @@ _LISTED = (
         CALIBRATED,
         "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
     ),
-    Parameter(
+    FitParameter(
         "viscosity",
         "viscosity of the fluid",
         "Pa s",
@@ -209,7 +190,7 @@ _LISTED = (
         "around the robot's own value, 95 % within 20 %: silicone oil changes by 2 % a kelvin",
         needs_motor=True,
     ),
-    Parameter(
+    FitParameter(
         "torque_constant",
         "the motor's torque constant K_m",
         "N m/A",
@@ -218,7 +199,7 @@ _LISTED = (
         "around the robot's own value, 95 % within 20 %, as small motors scatter",
         needs_motor=True,
     ),
-    Parameter(
+    FitParameter(
         "back_emf_constant",
         "the motor's back-emf constant K_b",
         "V s/rad",
@@ -227,7 +208,7 @@ _LISTED = (
         "around the robot's own value, 95 % within 20 %, as small motors scatter",
         needs_motor=True,
     ),
-    Parameter(
+    FitParameter(
         "gap",
         "gap under the body, one for each channel",
         "m",
@@ -235,7 +216,7 @@ _LISTED = (
         ("tube",),
         "anywhere in the band of `predict`, from a ninetieth to a ninth of the body's radius",
     ),
-    Parameter(
+    FitParameter(
         "pitch",
         "angle by which the nose is raised, one for each channel",
         "rad",
@@ -243,7 +224,7 @@ _LISTED = (
         ("tube",),
         "anywhere from level to the steepest that every tail of the channel allows",
     ),
-    Parameter(
+    FitParameter(
         "roughness",
         "height of the asperities on which the robot lies, which decides its gap, one for all channels",
         "m",
@@ -251,7 +232,7 @@ _LISTED = (
         ("tube",),
         "from polished surfaces to burrs and seams, 1e-4 to 1e-2 of the body's radius",
     ),
-    Parameter(
+    FitParameter(
         "friction_coefficient",
         "coefficient of dry friction where the asperities carry the robot's weight",
         "",
@@ -261,7 +242,7 @@ _LISTED = (
         "Tabor, The Friction and Lubrication of Solids, 1950)",
     ),
 )
-PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _LISTED}
+PARAMETERS: dict[str, FitParameter] = {parameter.name: parameter for parameter in _LISTED}
 """All parameters by name."""
 
 UNWALLED = "sbt"
@@ -287,7 +268,7 @@ _LARGEST_UNCERTAINTY = 0.5
 class Coordinate:
     """One free number of a fit."""
 
-    parameter: Parameter
+    parameter: FitParameter
     channel: int | None
     """Place of its channel; None for all."""
     label: str
@@ -311,9 +292,6 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
     Args:
         free: names, or one text with commas; None: those that the paper fitted.
         model: name of the model.
-
-    Raises:
-        InputError: for an unknown name, one given twice, or one that the model does not have.
     """
     if free is None:
         return DEFAULT_FREE[model]
@@ -364,16 +342,7 @@ _IN_PLACE_OF = {
 
 
 def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model: str) -> None:
-    """Refuse set fields of a robot that the observations replace, or a fit without having looked at them.
-
-    Args:
-        fields: dotted names of the fields that were set.
-        free: names of the free parameters, as `free_names` takes them.
-        model: name of the model, or `auto`.
-
-    Raises:
-        InputError: for such a field, or wrong names.
-    """
+    """Refuse set fields of a robot that the observations replace, or a fit without having looked at them."""
     asked = set(fields)
     observed = [field for field in OBSERVED if field in asked]
     if observed:
@@ -403,9 +372,6 @@ def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, 
 
     Args:
         given: field of the robot (see `ASSUMABLE`) to a share, such as ``"5%"`` or 0.05; None: none.
-
-    Raises:
-        InputError: for an unknown field, or a share that is none.
     """
     found = {}
     for field, share in (given or {}).items():

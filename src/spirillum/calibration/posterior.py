@@ -11,15 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spirillum.argument_kinds import check_kind
+from spirillum.argument_validation import check_kind
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Density
 from spirillum.calibration.problem import Problem, Progress
 from spirillum.errors import InputError
-
-__all__ = ["ENSEMBLES", "FEWEST_EFFECTIVE", "LARGEST_RHAT", "Posterior", "Sampling", "sampled"]
 
 LARGEST_RHAT = 1.01
 """Largest R-hat (rank-normalised, split) of a posterior that may be used."""
@@ -98,14 +96,7 @@ class Posterior:
 def sampled(
     problem: Problem, fit: LeastSquares, sampling: Sampling | None = None, progress: Progress | None = None
 ) -> Posterior:
-    """Draw from the posterior.
-
-    Args:
-        problem: the fit.
-        fit: its least squares, around which the ensembles start.
-        sampling: how the sampler runs.
-        progress: told how far it is.
-    """
+    """Draw from the posterior."""
     how = sampling or Sampling()
     tell = progress or (lambda _what, _done, _total: None)
     density = Density(problem)

@@ -21,15 +21,9 @@ if TYPE_CHECKING:
     from spirillum.calibration.experiment import Quantity
     from spirillum.calibration.posterior import Posterior
 
-__all__ = ["posterior_tree"]
-
 
 def posterior_tree(found: Calibrated) -> xr.DataTree:
-    """Groups `posterior`, `log_likelihood` (robot by robot), `observed_data` and `sample_stats` of a posterior.
-
-    Args:
-        found: a calibration by method `posterior`.
-    """
+    """Groups `posterior`, `log_likelihood` (robot by robot), `observed_data` and `sample_stats` of a posterior."""
     posterior = found.posterior
     assert posterior is not None  # noqa: S101 - the caller has asked
     density, problem, experiment = posterior.density, found.problem, found.experiment

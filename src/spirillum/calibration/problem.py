@@ -16,9 +16,9 @@ from spirillum.calibration.parameters import (
     ASSUMABLE,
     PARAMETERS,
     Coordinate,
+    FitParameter,
     LogNormal,
     LogUniform,
-    Parameter,
     Uniform,
 )
 from spirillum.errors import InputError
@@ -30,8 +30,6 @@ from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
-
-__all__ = ["Problem", "Progress", "UnexplainedError", "posed", "stated_spread"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -215,9 +213,6 @@ def posed(
         assumed: parameter to its stated uncertainty, half of a relative 95 % interval. Where the motor's rate is
             compared, such a parameter is free too, with that for its prior.
         prepare: for `tube`, make the robots' tables that are not there.
-
-    Raises:
-        InputError: if a robot has no table, is outside the model's domain, or has not what a parameter needs.
     """
     stated = dict(assumed or {})
     free = _with_assumed(free, stated)
@@ -254,11 +249,7 @@ def posed(
 
 
 def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[str, ...]:
-    """Free parameters, with those of stated uncertainty where the motor's rate is compared.
-
-    Raises:
-        InputError: where nothing that is fitted depends on the motor.
-    """
+    """Free parameters, with those of stated uncertainty where the motor's rate is compared."""
     if any(PARAMETERS[name].needs_motor for name in free):
         return (*free, *(name for name in assumed if name not in free))
     if assumed and "friction" not in free:
@@ -300,7 +291,7 @@ def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch)
 
 
 def _forward(
-    experiment: Experiment, model: SwimmerModel, batch: RobotBatch, parameters: Sequence[Parameter], tell: Progress
+    experiment: Experiment, model: SwimmerModel, batch: RobotBatch, parameters: Sequence[FitParameter], tell: Progress
 ) -> tuple[Forward, float]:
     """Resistances, over a table where the wire is free, and the largest error of its interpolation."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
@@ -326,7 +317,7 @@ def _forward(
     return forward, forward.largest_difference(exact, {"wire_diameter": np.full((1, 1), between)})
 
 
-def _coordinates(problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: Ranges) -> list[Coordinate]:
+def _coordinates(problem: Problem, parameter: FitParameter, batch: RobotBatch, ranges: Ranges) -> list[Coordinate]:
     prior = _prior(problem, parameter, batch, ranges)
     if parameter.scope == "all":
         return [Coordinate(parameter, None, parameter.name, prior)]
@@ -336,7 +327,7 @@ def _coordinates(problem: Problem, parameter: Parameter, batch: RobotBatch, rang
 
 
 def _prior(
-    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: Ranges
+    problem: Problem, parameter: FitParameter, batch: RobotBatch, ranges: Ranges
 ) -> LogNormal | LogUniform | Uniform:
     name = parameter.name
     if name in _LOG_NORMAL:

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL
@@ -26,12 +25,11 @@ from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinat
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress, UnexplainedError
+from spirillum.display import DisplayMixin, counted
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
-from spirillum.shown import Shown, counted
-
-__all__ = ["Ranked", "Ranking", "free_by_model", "rank_models", "ranked_fits"]
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
@@ -62,7 +60,7 @@ def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class ModelRank:
     """One model's place."""
 
     model: str
@@ -81,14 +79,14 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Ranking(Shown):
+class Ranking(DisplayMixin):
     """Models from the best to the worst."""
 
-    ranked: tuple[Ranked, ...]
+    ranked: tuple[ModelRank, ...]
     warnings: tuple[str, ...]
 
     @property
-    def best(self) -> Ranked:
+    def best(self) -> ModelRank:
         """The model that predicts left-out robots best."""
         return self.ranked[0]
 
@@ -130,7 +128,7 @@ class Ranking(Shown):
             return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
         return f"{names[0]} and {names[1]} cannot be told apart: {how} in favour of {names[0]}"
 
-    def failures(self, item: Ranked) -> list[dict[str, Any]]:
+    def failures(self, item: ModelRank) -> list[dict[str, Any]]:
         """Where a model fails: robots with the largest misfit, relative to what the fit expects of a robot."""
         experiment = item.fit.experiment
         found = []
@@ -235,15 +233,7 @@ def rank_models(
 
 
 def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None) -> dict[str, tuple[str, ...]]:
-    """Models that are ranked, each with its free parameters.
-
-    Args:
-        models: hydrodynamic models, as `rank_models` takes them.
-        free: free parameters of every model, as `rank_models` takes them.
-
-    Raises:
-        InputError: for unknown names, a single model, or parameters that not all models have.
-    """
+    """Models that are ranked, each with its free parameters."""
     names = list(dict.fromkeys(models or _MODELS))
     for name in names:
         find_swimmer_model(name)
@@ -256,11 +246,7 @@ def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None
 
 
 def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
-    """Refuse models that have no common set of free numbers: the freer one would win by its freedom.
-
-    Raises:
-        InputError: naming the model and what it lacks.
-    """
+    """Refuse models that have no common set of free numbers: the freer one would win by its freedom."""
     listed = [name.strip() for name in (free.split(",") if isinstance(free, str) else free)]
     for model in models:
         lacking = [name for name in listed if name in PARAMETERS and model not in PARAMETERS[name].models]
@@ -274,11 +260,7 @@ def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
 
 
 def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
-    """Rank models whose posteriors are of the same observations.
-
-    Args:
-        fits: model to its calibration.
-    """
+    """Rank models whose posteriors are of the same observations."""
     from arviz_stats import compare, loo
 
     found = {}
@@ -293,7 +275,7 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
         each = np.asarray(found[name].elpd_i).reshape(-1)
         gap = each - best
         ranked.append(
-            Ranked(
+            ModelRank(
                 model=name,
                 elpd=float(found[name].elpd),
                 standard_error=float(found[name].se),
@@ -307,7 +289,7 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
     return Ranking(tuple(ranked), tuple(_cautions(ranked)))
 
 
-def _cautions(ranked: Sequence[Ranked]) -> list[str]:
+def _cautions(ranked: Sequence[ModelRank]) -> list[str]:
     said = []
     for item in ranked:
         bad = int(np.count_nonzero(item.pareto > _PARETO))

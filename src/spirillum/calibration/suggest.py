@@ -25,11 +25,12 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import channel_of, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
+from spirillum.display import DisplayMixin, counted
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
@@ -40,13 +41,10 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown, counted
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
-
-__all__ = ["Candidate", "Suggestion", "suggest"]
 
 _WHAT = "a file of candidates (CSV with channel_diameter_mm, wavelength_mm, amplitude_mm)"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
@@ -62,7 +60,7 @@ _SAID = 5
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateRobot:
     """A robot that might be measured."""
 
     channel_diameter: float
@@ -84,12 +82,12 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Suggestion(Shown):
+class Suggestion(DisplayMixin):
     """Candidates from the most to the least telling."""
 
     posterior: PosteriorFile
     trials: int
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateRobot, ...]
     warnings: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -143,7 +141,7 @@ def suggest(
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
     listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
-    found: list[tuple[Candidate, Samples]] = []
+    found: list[tuple[CandidateRobot, Samples]] = []
     left_out = []
     numbers, names = _numbers(known)
     for robot in listed:
@@ -170,11 +168,7 @@ def suggest(
 
 
 def _papers_robots(known: PosteriorFile) -> list[Robot]:
-    """The paper's robots, for a posterior of these.
-
-    Raises:
-        InputError: if it is of others.
-    """
+    """The paper's robots, for a posterior of these."""
     robots = given_robots(PAPER_ROBOTS)
     channels = [robot.channel.diameter for robot in robots if robot.channel]
     body = (robots[0].body.diameter, robots[0].body.length)
@@ -246,12 +240,8 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
     return np.stack(columns, axis=1), names
 
 
-def _ranked(found: Sequence[tuple[Candidate, Samples]]) -> tuple[Candidate, ...]:
-    """Candidates from the most to the least telling, each with how far it is behind the first.
-
-    Args:
-        found: each with its information where one block of draws after another is left out.
-    """
+def _ranked(found: Sequence[tuple[CandidateRobot, Samples]]) -> tuple[CandidateRobot, ...]:
+    """Candidates from the most to the least telling, each with how far it is behind the first."""
     ordered = sorted(found, key=lambda pair: -pair[0].gain)
     best, of_best = ordered[0]
     return tuple(
@@ -280,7 +270,7 @@ def _information(seen: Samples, noise: Samples) -> tuple[float, Samples, Samples
 
 def _candidate(
     known: PosteriorFile, robot: Robot, trials: int, numbers: Samples, names: list[str]
-) -> tuple[Candidate, Samples]:
+) -> tuple[CandidateRobot, Samples]:
     """A candidate, and its information where one block of draws after another is left out."""
     predicted = drawn_kinematics(robot, find_swimmer_model(known.model), known)
     rows, noise = [], []
@@ -302,7 +292,7 @@ def _candidate(
     variance = deviations.var(axis=0, ddof=1)
     told = np.einsum("ij,jk,ik->i", shared, np.linalg.inv(spread + errors), shared)
     narrowing = np.sqrt(np.clip(1.0 - told / np.maximum(variance, 1e-300), 0.0, 1.0))
-    candidate = Candidate(
+    candidate = CandidateRobot(
         channel_of(robot),
         robot.tail.wavelength,
         robot.tail.amplitude,

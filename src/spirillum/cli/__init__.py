@@ -100,11 +100,7 @@ class _Closed(TextIOBase):
     """Standard output that was closed before the program began."""
 
     def write(self, _text: str) -> int:
-        """Say that an answer would be lost.
-
-        Raises:
-            InputError: always.
-        """
+        """Say that an answer would be lost."""
         from spirillum.errors import InputError
 
         raise InputError("standard output is closed, and the answer is lost; allowed: a terminal, a file or a pipe")
@@ -159,11 +155,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _check_names(arguments: Sequence[str]) -> None:
-    """Refuse empty names, which would else be taken for the folder one works in.
-
-    Raises:
-        InputError: if there is one.
-    """
+    """Refuse empty names, which would else be taken for the folder one works in."""
     from spirillum.errors import InputError
 
     if not arguments or arguments[0] not in _NAMING:

@@ -19,7 +19,13 @@ from spirillum.cli.inputs import angle, given_options, loaded_robot, overrides_f
 from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
-from spirillum.cli.options import (
+from spirillum.cli.page_commands import page
+from spirillum.cli.prepare_commands import prepare
+from spirillum.cli.remote_commands import remote
+from spirillum.cli.robot_commands import robot_app
+from spirillum.cli.settle_commands import settle
+from spirillum.cli.setup_commands import setup_app
+from spirillum.cli.shared_options import (
     Accuracy,
     All,
     Calibration,
@@ -49,17 +55,9 @@ from spirillum.cli.options import (
     complete_resistance_models,
     complete_schemas,
 )
-from spirillum.cli.page_commands import page
-from spirillum.cli.prepare_commands import prepare
-from spirillum.cli.remote_commands import remote
-from spirillum.cli.robot_commands import robot_app
-from spirillum.cli.settle_commands import settle
-from spirillum.cli.setup_commands import setup_app
 from spirillum.cli.show_commands import film, show
 from spirillum.cli.track_commands import track
 from spirillum.cli.virtual_commands import render, virtual_experiment
-
-__all__ = ["app", "command_line"]
 
 _ROWS = 10
 
@@ -388,7 +386,7 @@ def schema(
 
     Example: `spirillum schema robot`
     """
-    from spirillum.answer import as_json
+    from spirillum.envelope import as_json
     from spirillum.schemas import schema_of
 
     typer.echo(as_json(schema_of(name)))

@@ -11,7 +11,7 @@ import typer
 
 from spirillum.calibration.methods import METHODS
 from spirillum.cli.inputs import given_options, loaded_robot, overrides_from
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
     Settings,
@@ -21,13 +21,11 @@ from spirillum.cli.options import (
     starting,
 )
 from spirillum.errors import InputError
-from spirillum.fluid.tube.announced import TABLE_TAKES
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 
 if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
     from spirillum.calibration.suggest import Suggestion
-
-__all__ = ["calibrate", "rank_models", "suggest"]
 
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
@@ -130,11 +128,7 @@ def calibrate(
 
 
 def _stated(given: Sequence[str]) -> dict[str, str]:
-    """Field to share of `--assume-uncertainty`.
-
-    Raises:
-        InputError: for what has no field, or a field that stands twice.
-    """
+    """Field to share of `--assume-uncertainty`."""
     found: dict[str, str] = {}
     for item in given:
         name, equals, share = item.partition("=")

@@ -11,13 +11,11 @@ import typer
 
 from spirillum.cli.inputs import loaded_robot, placement_from
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.options import Eccentricity, Ends, Gap, Json, Pitch, RobotArgument, Settings, starting
+from spirillum.cli.shared_options import Eccentricity, Ends, Gap, Json, Pitch, RobotArgument, Settings, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
     from spirillum.controllers.sensors import Senses
-
-__all__ = ["control"]
 
 _TASK = "Task"
 _LAB = "Laboratory"
@@ -214,11 +212,7 @@ def control(
 
 
 def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
-    """What makes camera and remote of a run; None: the modelled ones.
-
-    Raises:
-        InputError: for other eyes.
-    """
+    """What makes camera and remote of a run; None: the modelled ones."""
     from spirillum.errors import InputError
 
     if seen_by not in _EYES:
@@ -231,11 +225,7 @@ def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
 
 
 def _lab(path: Path | None, changes: list[str] | None) -> Lab:
-    """The lab of a file with fields changed.
-
-    Raises:
-        InputError: if one is wrong.
-    """
+    """The lab of a file with fields changed."""
     from spirillum.controllers.lab import Lab
     from spirillum.robot.load import parse_setting
 

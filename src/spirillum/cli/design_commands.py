@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot, pairs_of
-from spirillum.cli.options import Json, Posterior, RobotArgument, Settings, TailRate
-
-__all__ = ["design"]
+from spirillum.cli.shared_options import Json, Posterior, RobotArgument, Settings, TailRate
 
 _Pairs = Annotated[
     list[str],
@@ -89,7 +87,7 @@ def design(
     from spirillum.cli import renderer
     from spirillum.designs.design import design as answer
     from spirillum.files import PICTURES, output_target, protected, whole_files
-    from spirillum.robot.text import robot_text
+    from spirillum.robot.toml_writer import robot_text
 
     with protected(robot, posterior):
         target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")

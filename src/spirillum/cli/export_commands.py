@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import angle, given_options, loaded_robot, placement_from
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     Calibration,
     Friction,
     Gap,
@@ -20,8 +20,6 @@ from spirillum.cli.options import (
     complete_robots,
     starting,
 )
-
-__all__ = ["export"]
 
 _OF_ROBOTS = (
     *("phase", "fineness", "unit", "sidecar", "no_sidecar", "model", "friction", "calibration", "gap", "pitch", "flow"),

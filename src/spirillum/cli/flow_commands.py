@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from spirillum.cli.inputs import angle, given_options, loaded_robot, placement_from
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     Eccentricity,
     Ends,
     Friction,
@@ -30,8 +30,6 @@ from spirillum.errors import InputError
 
 if TYPE_CHECKING:
     from spirillum.fields.flow import Flow
-
-__all__ = ["flow"]
 
 _OF_PLANES = ("plane", "offset", "resolution")
 _OF_RUNS = (
@@ -117,9 +115,9 @@ def flow(
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
     from spirillum.cli import renderer
-    from spirillum.fields.answer import flow_answer
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
+    from spirillum.fields.flow_summary import flow_answer
     from spirillum.files import protected
     from spirillum.fluid.tube.domain import seat_of
     from spirillum.results.flow import check_targets, write_flow
@@ -185,9 +183,6 @@ def _check_options(
         run: the run; None for the flow around a robot.
         time: moment of the run; None without one.
         model: as it was asked for.
-
-    Raises:
-        InputError: if one is given, or no moment of a run.
     """
     if output is None and (given := given_options(context, *_OF_PLANES)):
         raise InputError(f"{given[0]} without a plane (-o FILE), to which it belongs; allowed: both or neither")

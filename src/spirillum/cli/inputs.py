@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from spirillum.robot.robot import Robot
 
-__all__ = ["angle", "given_options", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
-
 _V = TypeVar("_V")
 
 
@@ -40,22 +38,14 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
-    """Fields of the robot by `--set`.
-
-    Raises:
-        InputError: if one is no field with a value, or is set twice.
-    """
+    """Fields of the robot by `--set`."""
     from spirillum.robot.load import parse_setting
 
     return _each_once(map(parse_setting, settings or []), "--set")
 
 
 def _each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
-    """Values by field.
-
-    Raises:
-        InputError: if a field is named twice.
-    """
+    """Values by field."""
     found: dict[str, _V] = {}
     for field, value in pairs:
         if field in found:
@@ -74,9 +64,6 @@ def loaded_robot(
         settings: the options `--set`.
         calibration: calibration file that will be applied to the robot; None without one.
         posterior: posterior that will be applied to it; None without one.
-
-    Raises:
-        InputError: if it or a field is wrong, or a field is set whose value one of these files replaces.
     """
     from spirillum.robot.load import load
 
@@ -112,11 +99,7 @@ def placement_from(
 
 
 def pairs_of(items: list[str], option: str) -> dict[str, str]:
-    """FIELD=VALUE texts by field.
-
-    Raises:
-        InputError: if one is none, or names a field twice.
-    """
+    """FIELD=VALUE texts by field."""
 
     def pair(text: str) -> tuple[str, str]:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -128,20 +111,12 @@ def pairs_of(items: list[str], option: str) -> dict[str, str]:
 
 
 def angle(text: str) -> float:
-    """An angle with its unit, rad.
-
-    Raises:
-        InputError: if it is none.
-    """
+    """An angle with its unit, rad."""
     return parse_option("phase", text, KINDS["angle"])
 
 
 def time_window(text: str) -> tuple[float, float]:
-    """FROM:TO, such as ``0s:2s``, in s.
-
-    Raises:
-        InputError: if it is none.
-    """
+    """FROM:TO, such as ``0s:2s``, in s."""
     start, colon, stop = text.partition(":")
     if not colon or ":" in stop:
         raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")

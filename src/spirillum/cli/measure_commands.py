@@ -9,9 +9,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import given_options, overrides_from
-from spirillum.cli.options import Json, Settings
-
-__all__ = ["measure"]
+from spirillum.cli.shared_options import Json, Settings
 
 _FEASIBILITY = "Before an experiment"
 _BY_HAND = "Instead of the tracker"
@@ -155,11 +153,7 @@ def measure(
 
 
 def _check_apart(context: typer.Context, *, feasibility: bool) -> None:
-    """Refuse options of the other way.
-
-    Raises:
-        InputError: naming all of them.
-    """
+    """Refuse options of the other way."""
     from spirillum.errors import InputError
 
     given = given_options(context, *_APART[not feasibility])

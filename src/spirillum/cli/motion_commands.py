@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot, placement_from, time_window
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     Accuracy,
     Calibration,
     Friction,
@@ -26,8 +26,6 @@ from spirillum.cli.options import (
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["check_movie", "magnetic_sweep", "simulate"]
 
 _START = "Start of a free run, and its tube"
 _TIMING = "Timing and remote"
@@ -198,7 +196,7 @@ def simulate(
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
     from spirillum.cli import renderer
-    from spirillum.dynamics.answer import run_answer
+    from spirillum.dynamics.run_summary import run_answer
     from spirillum.dynamics.simulation import simulate as answer
     from spirillum.dynamics.tube_integration import INTERRUPTED
     from spirillum.errors import InputError
@@ -260,13 +258,13 @@ def simulate(
 
 def check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
-    from spirillum.extras import required
     from spirillum.files import output_target
+    from spirillum.optional_dependencies import import_optional
     from spirillum.view.scene3d.encode import FILMS
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):
-        required(package, "a film")
+        import_optional(package, "a film")
 
 
 def _drawn(
@@ -326,8 +324,8 @@ def magnetic_sweep(
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
     """
     from spirillum.cli import renderer
-    from spirillum.dynamics.answer import sweep_answer
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as answer
+    from spirillum.dynamics.run_summary import sweep_answer
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)

@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.options import Json
-
-__all__ = ["observations_app"]
+from spirillum.cli.shared_options import Json
 
 observations_app = typer.Typer(name="observations", help="Files of observed speeds and rates.", no_args_is_help=True)
 

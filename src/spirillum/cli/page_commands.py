@@ -8,10 +8,8 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Settings, complete_robots
+from spirillum.cli.shared_options import Settings, complete_robots
 from spirillum.errors import InputError
-
-__all__ = ["page"]
 
 
 def page(

@@ -7,9 +7,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot, overrides_from
-from spirillum.cli.options import Json, Settings, complete_robots
-
-__all__ = ["prepare"]
+from spirillum.cli.shared_options import Json, Settings, complete_robots
 
 
 def prepare(
@@ -34,7 +32,7 @@ def prepare(
     from spirillum.cli import renderer
     from spirillum.errors import InputError
     from spirillum.papers.studies import study_of
-    from spirillum.studies.loading import load_study
+    from spirillum.studies.study_loader import load_study
     from spirillum.swimming.preparation import preparations_answer, prepare_all
 
     if not robots and study is None:

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from threading import Event, Lock, Thread
 from time import monotonic
 
-__all__ = ["ProgressLines", "progress_lines"]
-
 _PERIOD = 15.0
 """Least time between two lines, s; shorter work prints none."""
 _SHARE = 0.05
@@ -21,12 +19,7 @@ _LOOK = 1.0
 
 @contextmanager
 def progress_lines(write: Callable[[str], object], announcements: tuple[str, ...]) -> Iterator[ProgressLines]:
-    """Print progress from time to time, also while a step takes long.
-
-    Args:
-        write: prints a line.
-        announcements: beginnings of messages that are printed at once and are no stage.
-    """
+    """Print progress from time to time, also while a step takes long."""
     lines, ended = ProgressLines(write, announcements), Event()
 
     def look() -> None:
@@ -48,13 +41,7 @@ class ProgressLines:
     def __init__(
         self, write: Callable[[str], object], announcements: tuple[str, ...], clock: Callable[[], float] = monotonic
     ) -> None:
-        """No work yet.
-
-        Args:
-            write: prints a line.
-            announcements: beginnings of messages that are printed at once and are no stage.
-            clock: time, s.
-        """
+        """No work yet."""
         self._write, self._announcements, self._clock, self._lock = write, announcements, clock, Lock()
         self._begin = self._printed = self._start = clock()
         self._stage: tuple[str, int | None] = ("", None)

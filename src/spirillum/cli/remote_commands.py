@@ -6,9 +6,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.options import Json
-
-__all__ = ["remote"]
+from spirillum.cli.shared_options import Json
 
 
 def remote(

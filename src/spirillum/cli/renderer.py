@@ -12,11 +12,9 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.answer import as_json
 from spirillum.cli.progress_lines import progress_lines
 from spirillum.cli.tables.parts import Answer
-
-__all__ = ["at_work", "patience", "progress_bar", "show", "with_files"]
+from spirillum.envelope import as_json
 
 _NARROWEST = 80
 
@@ -37,11 +35,6 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
     """Print an answer as JSON, or as the table of its kind followed by its warnings.
 
     The table is the function `table` of the module in `spirillum.cli.tables` that is named after the answer's schema.
-
-    Args:
-        answer: an envelope, see `spirillum.answer.envelope`.
-        json: print JSON.
-        options: of the table, such as its number of rows.
     """
     if json:
         try:
@@ -70,7 +63,7 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
     That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
     """
     from spirillum.fluid.registry import MODELS
-    from spirillum.fluid.tube.announced import TILTED
+    from spirillum.fluid.tube.progress_messages import TILTED
 
     if tilted and model in MODELS and MODELS[model].placed:
         Console(stderr=True, soft_wrap=True).print(TILTED, highlight=False)
@@ -99,8 +92,8 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will take,
     are lines of their own on standard error in any case.
     """
-    from spirillum.crews import ESTIMATE
-    from spirillum.fluid.tube.announced import ANNOUNCED, OF_A_RUN, TILTED
+    from spirillum.fluid.tube.progress_messages import ANNOUNCED, OF_A_RUN, TILTED
+    from spirillum.worker_pool import ESTIMATE
 
     lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, TILTED)
     if quiet:

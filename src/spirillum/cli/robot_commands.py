@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot, overrides_from
-from spirillum.cli.options import Json, RobotArgument, Settings, complete_presets
-
-__all__ = ["robot_app"]
+from spirillum.cli.shared_options import Json, RobotArgument, Settings, complete_presets
 
 robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 
@@ -40,7 +38,7 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
     Example: `spirillum robot show biorob2012-narrow`
     """
     from spirillum.cli import renderer
-    from spirillum.robot.answer import robot_answer
+    from spirillum.robot.robot_report import robot_answer
 
     renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
 
@@ -52,7 +50,7 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     Example: `spirillum robot check biorob2012-wide`
     """
     from spirillum.cli import renderer
-    from spirillum.robot.answer import check_answer, checked
+    from spirillum.robot.robot_report import check_answer, checked
     from spirillum.swimming.model_choice import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))

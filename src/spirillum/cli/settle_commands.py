@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot, placement_from
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     Calibration,
     Eccentricity,
     Ends,
@@ -22,8 +22,6 @@ from spirillum.cli.options import (
     TailRate,
     Yaw,
 )
-
-__all__ = ["settle"]
 
 
 def settle(

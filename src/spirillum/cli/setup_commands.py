@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.options import Json
-
-__all__ = ["setup_app"]
+from spirillum.cli.shared_options import Json
 
 setup_app = typer.Typer(name="setup", help="Setup files: camera, tank, ruler and robot.", no_args_is_help=True)
 

@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import angle, loaded_robot
-from spirillum.cli.options import Json, RobotArgument, Settings, starting
-
-__all__ = ["film", "show"]
+from spirillum.cli.shared_options import Json, RobotArgument, Settings, starting
 
 _VIEWS = ("front", "perspective", "rear", "side", "top")
 

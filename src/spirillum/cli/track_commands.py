@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from spirillum.cli.inputs import overrides_from
-from spirillum.cli.options import Json, Settings, starting
+from spirillum.cli.shared_options import Json, Settings, starting
 
 if TYPE_CHECKING:
-    from spirillum.live.answer import Tracked
     from spirillum.live.observation import Observation
-
-__all__ = ["track"]
+    from spirillum.live.tracking_summary import Tracked
 
 
 def _complete_paces(incomplete: str) -> list[str]:

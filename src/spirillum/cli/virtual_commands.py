@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import (
+from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Friction,
     Json,
@@ -24,8 +24,6 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     from spirillum.robot.arguments import Options
     from spirillum.robot.robot import Robot
-
-__all__ = ["render", "virtual_experiment"]
 
 
 def _complete_presets(incomplete: str) -> list[str]:
@@ -253,8 +251,8 @@ def render(
     """
     given = locals()
     from spirillum.cli import renderer
-    from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
     from spirillum.virtual.trial import render as answer
+    from spirillum.virtual.trial_options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
@@ -274,11 +272,7 @@ def render(
 
 
 def _robot(robot: str | None, settings: list[str] | None) -> Robot | None:
-    """The robot with its fields set; None, for that of a run, where none is named.
-
-    Raises:
-        InputError: if it or a field is wrong, or fields are set of none.
-    """
+    """The robot with its fields set; None, for that of a run, where none is named."""
     if robot is not None:
         return loaded_robot(robot, settings)
     if settings:
@@ -344,7 +338,7 @@ def virtual_experiment(
     given = locals()
     from spirillum.cli import renderer
     from spirillum.virtual.experiment import virtual_experiment as answer
-    from spirillum.virtual.options import CameraOptions, MotionOptions
+    from spirillum.virtual.trial_options import CameraOptions, MotionOptions
 
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(

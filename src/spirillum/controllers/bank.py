@@ -17,13 +17,11 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.lab import Unknown
-from spirillum.controllers.sensors import Drawn
+from spirillum.controllers.sensors import SampledErrors
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Moment, Plant, uninterrupted
+from spirillum.dynamics.plant import Plant, Snapshot, uninterrupted
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
-
-__all__ = ["Bank", "Paths", "interpolation", "points"]
 
 _POINTS = 5
 _STEP = 0.1
@@ -68,24 +66,17 @@ class Bank:
         arguments: Mapping[str, Any] | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Lay the members down.
-
-        Args:
-            robot: as its file says.
-            unknown: what is unknown of it.
-            arguments: further arguments of `spirillum.Plant`.
-            progress: told how many are laid down.
-
-        Raises:
-            InputError: for a robot that cannot have these factors.
-        """
+        """Lay the members down."""
         if robot.drive is None or robot.drive.kind != "dc-motor":
             raise InputError(f"learn is given with {robot.name}; allowed: a robot with drive.kind 'dc-motor'")
         self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)
         factors = [float(unknown.friction_factor**u) for u in self.friction]
-        members = [Drawn(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
+        members = [SampledErrors(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
         for factor in factors:
-            members += [Drawn(factor, 1.0, None, 1.0 + _CHANGE), Drawn(factor, 1.0, None, 1.0, 1.0 + _CHANGE)]
+            members += [
+                SampledErrors(factor, 1.0, None, 1.0 + _CHANGE),
+                SampledErrors(factor, 1.0, None, 1.0, 1.0 + _CHANGE),
+            ]
         self._plants: list[Plant] = []
         for member in members:
             self._plants.append(plant_of(robot, arguments or {}, member))
@@ -129,6 +120,6 @@ class Bank:
         return Paths(np.array(self._time), members, sensitivity)
 
 
-def _quantities(moment: Moment) -> list[float]:
+def _quantities(moment: Snapshot) -> list[float]:
     values = moment.values
     return [moment.pose.tail_phase, values["body_angle"], values["motor_current"], values["battery_voltage"]]

@@ -9,35 +9,91 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spirillum.answer import envelope, quantity
+import numpy as np
+
 from spirillum.controllers.bank import Bank
 from spirillum.controllers.drawn_plant import plant_of
-from spirillum.controllers.jobs import Job, Outcome, draw_plant, outcome_of, run_job
+from spirillum.controllers.jobs import ControlJob, Outcome, draw_plant, outcome_of, run_job
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learner import Learner
-from spirillum.controllers.learning import Learnt
+from spirillum.controllers.learning import RobotEstimate
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.registry import task_of
-from spirillum.controllers.run_record import record
 from spirillum.controllers.scores import Scores, scored
-from spirillum.controllers.sensors import Drawn, Senses
+from spirillum.controllers.sensors import SampledErrors, Senses
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
 from spirillum.costs import check_memory
+from spirillum.display import DisplayMixin
+from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import vertical_drift
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.start import reach_of
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped, did_you_mean
-from spirillum.processes import as_they_come
+from spirillum.processes import imap_unordered
+from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Control", "control"]
+
+_SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
+_SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
+_MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
+
+
+def record(run: LoopRun, plant: Plant) -> xr.Dataset:
+    """A controlled run.
+
+    Returns:
+        Dataset over `time` (the robot after every event), `frame_time` (the camera), `reading_time` (the meter) and
+        `decision_time` (the controller), SI.
+    """
+    import xarray as xr
+
+    moments = run.moments
+    data: dict[str, Any] = {
+        "position": (("time", "axis"), np.array([m.pose.position for m in moments]), attributes("position")),
+        "attitude": (("time", "quaternion"), np.array([m.pose.attitude for m in moments]), attributes("attitude")),
+        "imposed_flow": ("time", np.array(run.flows), attributes("imposed_flow")),
+    }
+    for name in moments[-1].values:
+        values = np.array([m.values[name] for m in moments])
+        data[name] = ("time", values, attributes(name, meaning=_MEANINGS.get(name)))
+    for name, seen in _SEEN.items():
+        values = np.array([np.nan if sight is None else getattr(sight, name) for _, sight in run.frames])
+        data[seen] = ("frame_time", values, attributes(seen))
+    for name in ("current", "voltage"):
+        values = np.array([getattr(reading, name) for reading in run.readings], dtype=float)
+        data[f"read_{name}"] = ("reading_time", values, attributes(f"read_{name}"))
+    data["command"] = ("decision_time", np.array([d.duty for d in run.decisions]), attributes("command"))
+    for name in run.decisions[-1].estimate if run.decisions else ():
+        values = np.array([d.estimate.get(name, np.nan) for d in run.decisions])
+        base, _, end = name.rpartition("_") if name.endswith(("_low", "_high")) else (name, "", "")
+        meaning = f"{QUANTITIES[base].meaning}, {end} end of its 95 % interval" if end else None
+        data[name] = ("decision_time", values, attributes(base, meaning=meaning))
+    coords = {
+        "time": ("time", np.array([m.time for m in moments]), attributes("time")),
+        "frame_time": ("frame_time", np.array([time for time, _ in run.frames]), attributes("frame_time")),
+        "reading_time": ("reading_time", np.array([r.time for r in run.readings]), attributes("reading_time")),
+        "decision_time": ("decision_time", np.array([d.time for d in run.decisions]), attributes("decision_time")),
+        "axis": ("axis", list("xyz"), {"long_name": "axis of the lab"}),
+        "quaternion": ("quaternion", list("wxyz"), {"long_name": "part of the quaternion"}),
+    }
+    attrs = {
+        "title": f"Controlled swimming of {plant.robot.name}",
+        **run_attributes(plant.steady),
+        "motion": "free",
+        "channel_middle": reach_of(plant.robot).middle,
+        "events": json.dumps([{"time": moments[-1].time, "what": run.ended}] if run.ended else []),
+    }
+    return xr.Dataset(data, coords=coords, attrs=attrs)
+
 
 _MOST_SEEDS = 10_000
 _EVENT = 3000.0
@@ -47,7 +103,7 @@ _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weig
 
 
 @dataclass(frozen=True)
-class Control(Shown):
+class Control(DisplayMixin):
     """A controlled run, and scores over many."""
 
     robot: Robot
@@ -58,7 +114,7 @@ class Control(Shown):
     seed: int
     speed: float
     """Predicted while the drive is on, m/s, with its sign."""
-    drawn: Drawn
+    drawn: SampledErrors
     """What the robot and the flow of this run were, and the controller did not know."""
     score: Score
     run: LoopRun
@@ -66,7 +122,7 @@ class Control(Shown):
     """The run, see `docs/control.md`."""
     late: float | None
     """Live: by how much the last decision was late against the clock on the wall, s."""
-    learnt: Learnt | None
+    learnt: RobotEstimate | None
     """Friction and gap as estimated by the end of the run; None without `learn` or with too few data."""
     scores: Scores | None
     """Over many seeds; None without `seeds`."""
@@ -115,7 +171,7 @@ class Control(Shown):
         return envelope("control", content, self.warnings)
 
     def _shown(self) -> tuple[dict[str, Any], None]:
-        """See `Shown`: the task's error first, then every controller's scores."""
+        """See `DisplayMixin`: the task's error first, then every controller's scores."""
         answer = self.to_dict()
         error, scores = answer.pop("error"), answer.pop("scores") or {}
         controllers = [{"controller": name, **one} for name, one in scores.get("controllers", {}).items()]
@@ -166,9 +222,9 @@ def control(
     task, lab, arguments = task_of(task), Lab.of(lab), dict(plant or {})
     _check(controller, seed, seeds, workers, arguments)
     robot = load(robot)
-    nominal = plant_of(robot, arguments, Drawn(1.0, 1.0), progress)
+    nominal = plant_of(robot, arguments, SampledErrors(1.0, 1.0), progress)
     lab, cautions = _without_unknown_flow(lab, nominal.model)
-    job = Job(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)
+    job = ControlJob(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)
     _check_memory(job.brief.duration, lab)
     actual, drawn = draw_plant(job)
     learner = Learner(lab, Bank(robot, lab.unknown, arguments, progress)) if learn else None
@@ -224,12 +280,12 @@ def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[str]]:
     return lab.model_copy(update={"pulse": still}), [f"model '{model}' knows no flow: there is no pulse"]
 
 
-def _scores(job: Job, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[str]]:
+def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[str]]:
     """Scores of every controller from every seed; with an interrupt of the runs that are done, and a sentence."""
     jobs = [replace(job, controller=name, seed=job.seed + n) for n in range(seeds) for name in CONTROLLERS]
     outcomes: list[Outcome] = []
     try:
-        for _job, outcome in as_they_come(outcome_of, jobs, workers):
+        for _job, outcome in imap_unordered(outcome_of, jobs, workers):
             outcomes.append(outcome)
             if progress is not None:
                 progress("scored runs", len(outcomes), len(jobs))
@@ -240,7 +296,7 @@ def _scores(job: Job, seeds: int, workers: int, progress: Progress | None) -> tu
     return scored(job.task, outcomes) if outcomes else None, [] if complete else [sentence]
 
 
-def _dataset(job: Job, run: LoopRun, plant: Plant) -> xr.Dataset:
+def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
     """The run as a dataset, with all that it can be done again from."""
     settings = {
         "task": {"kind": job.task.kind, **job.task.model_dump()},

@@ -5,29 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spirillum.controllers.sensors import Drawn
+from spirillum.controllers.sensors import SampledErrors
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
-
-__all__ = ["plant_of"]
+from spirillum.robot.tube_pose import gap_of
 
 
-def plant_of(robot: Robot, arguments: Mapping[str, Any], drawn: Drawn, progress: Progress | None = None) -> Plant:
-    """The robot that a run has drawn, at rest where it starts.
-
-    Args:
-        robot: as its file says.
-        arguments: further arguments of `spirillum.Plant`.
-        drawn: what was drawn.
-        progress: told how far a table is that has to be made.
-
-    Raises:
-        InputError: for wrong arguments, or a friction or gap factor where there is nothing to multiply.
-    """
+def plant_of(
+    robot: Robot, arguments: Mapping[str, Any], drawn: SampledErrors, progress: Progress | None = None
+) -> Plant:
+    """The robot that a run has drawn, at rest where it starts."""
     arguments = dict(arguments)
     if drawn.gap != 1.0:
         if robot.channel is None:
@@ -55,7 +45,7 @@ def _with_friction(robot: Robot, factor: float) -> Robot:
     return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * effective})})
 
 
-def _with_supply_and_fluid(robot: Robot, drawn: Drawn) -> Robot:
+def _with_supply_and_fluid(robot: Robot, drawn: SampledErrors) -> Robot:
     """A robot whose battery and fluid have the voltage and viscosity that were drawn."""
     changes: dict[str, Any] = {}
     if drawn.viscosity != 1.0:

@@ -9,17 +9,15 @@ from typing import Any
 from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.learner import Learner, Learning
 from spirillum.controllers.loop import LoopRun, run_loop
-from spirillum.controllers.sensors import Drawn, Senses, draw
+from spirillum.controllers.sensors import SampledErrors, Senses, draw
 from spirillum.controllers.task import Brief, Score, Task
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.robot.robot import Robot
 
-__all__ = ["Job", "Outcome", "draw_plant", "outcome_of", "run_job"]
-
 
 @dataclass(frozen=True)
-class Job:
+class ControlJob:
     """All that a run follows from; a process of its own can do it."""
 
     robot: Robot
@@ -38,12 +36,12 @@ class Outcome:
     controller: str
     seed: int
     score: Score
-    drawn: Drawn
+    drawn: SampledErrors
     ended: str
     """Why it ended before its time; empty if it did not."""
 
 
-def draw_plant(job: Job) -> tuple[Plant, Drawn]:
+def draw_plant(job: ControlJob) -> tuple[Plant, SampledErrors]:
     """The plant of a run, at rest where it starts, and what was drawn for it."""
     lab = job.brief.lab
     drawn = draw(lab.unknown, lab.pulse, job.seed, job.brief.duration)
@@ -51,9 +49,9 @@ def draw_plant(job: Job) -> tuple[Plant, Drawn]:
 
 
 def run_job(
-    job: Job,
+    job: ControlJob,
     plant: Plant,
-    drawn: Drawn,
+    drawn: SampledErrors,
     learner: Learner | None = None,
     *,
     senses: Senses | None = None,
@@ -87,7 +85,7 @@ def run_job(
     )
 
 
-def outcome_of(job: Job) -> Outcome:
+def outcome_of(job: ControlJob) -> Outcome:
     """Do a run for its score alone.
 
     Raises:

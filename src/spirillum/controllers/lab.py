@@ -13,8 +13,6 @@ from spirillum.files import read_toml
 from spirillum.robot.arguments import Options, in_range, refusal, within
 from spirillum.robot.fields import Angle, Current, LengthOrZero, Section, Time, Velocity
 
-__all__ = ["Camera", "Lab", "Meter", "Pulse", "Remote", "Unknown"]
-
 _WHAT = "a lab file (TOML with the tables [camera], [meter], [remote], [pulse], [unknown])"
 _LONGEST_DELAY = 60.0
 
@@ -31,7 +29,7 @@ _AngleNoise = Annotated[Angle, AfterValidator(_not_negative)]
 _Share = Annotated[float, BeforeValidator(in_range(0.0, 0.95))]
 
 
-class Camera(Options):
+class CameraModel(Options):
     """The camera: when it sees, and how it errs: normal errors of each frame, and slow ones with a memory.
 
     The sizes are those of the tracker on degraded films of the virtual camera, see `docs/control.md`.
@@ -138,7 +136,7 @@ class Unknown(Options):
 class Lab(Section):
     """Sensors, actuators and disturbances of a controlled run."""
 
-    camera: Camera = Camera()
+    camera: CameraModel = CameraModel()
     meter: Meter = Meter()
     remote: Remote = Remote()
     pulse: Pulse = Pulse()
@@ -200,8 +198,8 @@ class Lab(Section):
     @classmethod
     def exact(cls) -> Self:
         """Sensors without errors, drops and latency, a remote without delay and losses, no pulse, nothing unknown."""
-        names = (name for name in Camera.model_fields if name.endswith(("_noise", "_wander", "_error")))
-        camera = Camera.of({**dict.fromkeys(names, 0.0), "latency": 0.0, "dropped": 0.0})
+        names = (name for name in CameraModel.model_fields if name.endswith(("_noise", "_wander", "_error")))
+        camera = CameraModel.of({**dict.fromkeys(names, 0.0), "latency": 0.0, "dropped": 0.0})
         meter = Meter.of({"current_noise": 0.0, "voltage_noise": 0.0, "gain_error": 0.0, "latency": 0.0})
         return cls(
             camera=camera,

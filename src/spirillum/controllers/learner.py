@@ -13,10 +13,8 @@ import numpy as np
 
 from spirillum.controllers.bank import Bank
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.learning import BLOCK, SETTLING, Learnt, Stretch, learnt
-from spirillum.controllers.signals import Command, Controller, News, Reading, Sight
-
-__all__ = ["Learner", "Learning"]
+from spirillum.controllers.learning import BLOCK, SETTLING, DriveInterval, RobotEstimate, learnt
+from spirillum.controllers.signals import Command, Controller, Detection, Message, MeterReading
 
 _NAMES = ("friction", "gap")
 
@@ -25,22 +23,17 @@ class Learner:
     """What has been seen of a run, and the factors estimated from it."""
 
     def __init__(self, lab: Lab, bank: Bank) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors, remote, and what is unknown.
-            bank: where the run begins; it is moved.
-        """
+        """Begin."""
         self._lab, self._bank = lab, bank
-        self._sights: list[Sight] = []
-        self._readings: list[Reading] = []
+        self._sights: list[Detection] = []
+        self._readings: list[MeterReading] = []
         self._duties: list[tuple[float, float]] = [(0.0, 0.0)]
         """From when on the drive has which duty, s."""
         self._sent: list[tuple[float, float]] = [(0.0, 0.0)]
         self._next = SETTLING + 2.0 * BLOCK
-        self.learnt: Learnt | None = None
+        self.learnt: RobotEstimate | None = None
 
-    def take(self, news: News, duty: float) -> None:
+    def take(self, news: Message, duty: float) -> None:
         """Take in what reached a controller, and the duty that it sent."""
         self._sights += news.sights
         acts = news.time + self._lab.remote.delay
@@ -55,7 +48,7 @@ class Learner:
         if until >= self._next:
             self._learn(until)
 
-    def _hear(self, reading: Reading) -> None:
+    def _hear(self, reading: MeterReading) -> None:
         """Note a reading, and a switching that it shows: halfway to the reading before."""
         on = reading.current > 0.5 * self._bank.current * min(self._last_sent(reading.time), 1.0)
         duty = self._last_sent(reading.time) if on else 0.0
@@ -76,14 +69,14 @@ class Learner:
         self._next = until + BLOCK
         self.learnt = learnt(self._bank.paths(), self._lab, self._on(until), self._sights, self._readings)
 
-    def _on(self, until: float) -> list[Stretch]:
+    def _on(self, until: float) -> list[DriveInterval]:
         """Stretches of time in which the drive was on."""
-        stretches: list[Stretch] = []
+        stretches: list[DriveInterval] = []
         for (start, duty), (end, _) in zip(self._duties, [*self._duties[1:], (until, 0.0)], strict=True):
             if duty > 0.0 and stretches and stretches[-1].end == start:
-                stretches[-1] = Stretch(stretches[-1].start, end)
+                stretches[-1] = DriveInterval(stretches[-1].start, end)
             elif duty > 0.0:
-                stretches.append(Stretch(start, end))
+                stretches.append(DriveInterval(start, end))
         return stretches
 
 
@@ -94,7 +87,7 @@ class Learning(Controller):
         self._controller, self.learner = controller, learner
         self.blind, self.knowing = controller.blind, controller.knowing
 
-    def decide(self, news: News) -> float | Command:
+    def decide(self, news: Message) -> float | Command:
         """The controller's duty, which the learner takes note of."""
         asked = self._controller.decide(news)
         self.learner.take(news, asked.duty if isinstance(asked, Command) else asked)

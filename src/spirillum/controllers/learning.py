@@ -19,13 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.controllers.bank import Paths, interpolation, points
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.signals import Reading, Sight
-
-__all__ = ["BLOCK", "SETTLING", "Learnt", "Stretch", "learnt"]
+from spirillum.controllers.signals import Detection, MeterReading
+from spirillum.envelope import quantity
 
 BLOCK = 1.0
 """Length of a block, s."""
@@ -49,7 +47,7 @@ _UNINFORMED = 0.8
 
 
 @dataclass(frozen=True)
-class Stretch:
+class DriveInterval:
     """A time in which the drive was on; s."""
 
     start: float
@@ -72,7 +70,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class Learnt:
+class RobotEstimate:
     """What is known of the robot."""
 
     friction: Factor
@@ -101,18 +99,11 @@ class _Block:
 def learnt(
     paths: Paths,
     lab: Lab,
-    stretches: Sequence[Stretch],
-    sights: Sequence[Sight],
-    readings: Sequence[Reading],
-) -> Learnt | None:
+    stretches: Sequence[DriveInterval],
+    sights: Sequence[Detection],
+    readings: Sequence[MeterReading],
+) -> RobotEstimate | None:
     """The posterior of friction and gap.
-
-    Args:
-        paths: what the bank did under the commands of the run.
-        lab: sensors, and what is unknown.
-        stretches: when the drive was on.
-        sights: what was seen, in the order of time.
-        readings: what the meter told.
 
     Returns:
         Medians and 95 % intervals; None before there are two blocks.
@@ -137,7 +128,7 @@ def learnt(
             near = log > log.max() - _NEGLIGIBLE
             axes = [_refined(axis, near.any(axis=1 - side)) for side, axis in enumerate(axes)]
     weight = np.exp(log - log.max())
-    return Learnt(
+    return RobotEstimate(
         _factor(axes[0], weight.sum(axis=1), lab.unknown.friction_factor),
         _factor(axes[1], weight.sum(axis=0), lab.unknown.gap_factor),
     )
@@ -155,7 +146,7 @@ class _Electric:
     """Variances of the means, (rows, 2)."""
 
 
-def _blocks(paths: Paths, number: int, stretch: Stretch, sights: Sequence[Sight]) -> list[_Block]:
+def _blocks(paths: Paths, number: int, stretch: DriveInterval, sights: Sequence[Detection]) -> list[_Block]:
     """Blocks of one stretch, without those that have too few frames."""
     blocks: list[_Block] = []
     begin, end = stretch.start + SETTLING, min(stretch.end, float(paths.time[-1]))
@@ -186,7 +177,7 @@ def _means_at(time: Samples, moments: Samples) -> Samples:
 
 
 def _electric(
-    paths: Paths, lab: Lab, stretches: Sequence[Stretch], readings: Sequence[Reading]
+    paths: Paths, lab: Lab, stretches: Sequence[DriveInterval], readings: Sequence[MeterReading]
 ) -> tuple[Samples, _Electric]:
     end = float(paths.time[-1])
     inside = [one for one in readings if any(s.start + SETTLING <= one.time <= min(s.end, end) for s in stretches)]

@@ -16,13 +16,11 @@ from typing import Any
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse, Senses
-from spirillum.controllers.signals import Command, Controller, News, Reading, Sight
+from spirillum.controllers.signals import Command, Controller, Detection, Message, MeterReading
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Moment, Plant
+from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.dynamics.tube_integration import INTERRUPTED
 from spirillum.errors import InputError
-
-__all__ = ["SILENCE", "Decision", "LoopRun", "run_loop"]
 
 SILENCE = 1.0
 """The drive is off so long after the last frame has arrived, s."""
@@ -65,13 +63,13 @@ class Decision:
 class LoopRun:
     """A controlled run; SI."""
 
-    moments: list[Moment] = field(default_factory=list)
+    moments: list[Snapshot] = field(default_factory=list)
     """The robot after every event that moved it, in order of time."""
     flows: list[float] = field(default_factory=list)
     """Flow that is imposed up to each of them, m/s; 0: none."""
-    frames: list[tuple[float, Sight | None]] = field(default_factory=list)
+    frames: list[tuple[float, Detection | None]] = field(default_factory=list)
     """Times of the frames, and what was seen."""
-    readings: list[Reading] = field(default_factory=list)
+    readings: list[MeterReading] = field(default_factory=list)
     """Readings of the meter."""
     decisions: list[Decision] = field(default_factory=list)
     """Decisions of the controller."""
@@ -112,8 +110,8 @@ class _Loop:
         self.still = plant.state.flow
         self._queue: list[tuple[float, int, int, Any]] = []
         self._order = count()
-        self._sights: list[Sight] = []
-        self._readings: list[Reading] = []
+        self._sights: list[Detection] = []
+        self._readings: list[MeterReading] = []
         self._arrived = lab.camera.latency
         remote = lab.remote.period + lab.remote.delay  # what a decision may wait, and what its command takes
         self._patience = max(SILENCE - remote, _LEAST_PATIENCE)
@@ -136,7 +134,7 @@ class _Loop:
         self.run.ended = self.plant.state.ended
         return not self.run.ended
 
-    def now(self) -> Moment:
+    def now(self) -> Snapshot:
         """The robot as it is."""
         return self.run.moments[-1]
 
@@ -149,7 +147,7 @@ class _Loop:
         if waiting and not silent:
             return self.swim_until_seen(time, waiting)
         truth = self.now() if self.controller.knowing else None
-        asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
+        asked = self.controller.decide(Message(time, tuple(self._sights), tuple(self._readings), truth))
         command = asked if isinstance(asked, Command) else Command(float(asked))
         self._sights, self._readings = [], []
         if not 0.0 <= command.duty <= 1.0:
@@ -203,9 +201,9 @@ class _Loop:
                 return False
         return True
 
-    def _deliver(self, time: float, content: Sight | Reading) -> None:
+    def _deliver(self, time: float, content: Detection | MeterReading) -> None:
         """A frame or a reading reaches the controller."""
-        if isinstance(content, Sight):
+        if isinstance(content, Detection):
             self._sights.append(content)
             self._arrived = time
         else:

@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.controllers.jobs import Outcome
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Task
-
-__all__ = ["ControllerScore", "Scores", "scored"]
+from spirillum.envelope import quantity
 
 _LEVEL = 0.95
 _RESAMPLES = 2000

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.controllers.lab import Lab, Pulse, Unknown
-from spirillum.controllers.signals import Command, Reading, Sight
-from spirillum.dynamics.plant import Moment
-
-__all__ = ["Drawn", "FlowPulse", "Senses", "draw"]
+from spirillum.controllers.signals import Command, Detection, MeterReading
+from spirillum.dynamics.plant import Snapshot
 
 _STREAMS = ("unknown", "pulse", "camera", "meter", "remote", "across")
 _SEEN = ("position", "heading", "body_angle", "tail_phase")
@@ -41,7 +39,7 @@ class FlowPulse:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SampledErrors:
     """What a run has drawn from its seed and the controller does not know."""
 
     friction: float
@@ -56,7 +54,7 @@ class Drawn:
     """Factor of the viscosity."""
 
 
-def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
+def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> SampledErrors:
     """Draw the robot and the flow of a run.
 
     Args:
@@ -76,7 +74,7 @@ def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
         if start is None:
             start, velocity = _LATEST * duration * place, velocity if side < 0.5 else -velocity
         flow = FlowPulse(float(start), float(start) + pulse.duration, float(velocity))
-    return Drawn(float(factors[0]), float(factors[1]), flow, float(voltage), float(viscosity))
+    return SampledErrors(float(factors[0]), float(factors[1]), flow, float(voltage), float(viscosity))
 
 
 class Senses:
@@ -96,7 +94,7 @@ class Senses:
         self._wander_across = self._across.standard_normal(2)
         self._gains = 1.0 + lab.meter.gain_error * self._meter.standard_normal(2)
 
-    def sight(self, moment: Moment) -> Sight | None:
+    def sight(self, moment: Snapshot) -> Detection | None:
         """The next frame; None where it is lost."""
         camera = self._lab.camera
         lost = self._camera.uniform() < camera.dropped
@@ -110,7 +108,7 @@ class Senses:
         self.pictured = moment.time
         errors = (self._sizes[0] * noise[0] + self._sizes[1] * self._wander).tolist()
         across = self._scale * moment.pose.position[1:] + self._sizes[:, 0] @ [noise_across[0], self._wander_across]
-        return Sight(
+        return Detection(
             moment.time,
             self._scale * float(moment.pose.position[0]) + errors[0],
             moment.values["yaw"] + errors[1],
@@ -119,12 +117,12 @@ class Senses:
             *across.tolist(),
         )
 
-    def reading(self, moment: Moment) -> Reading:
+    def reading(self, moment: Snapshot) -> MeterReading:
         """The next reading of current and voltage; NaN where the robot has no motor."""
         meter = self._lab.meter
         current, voltage = self._meter.standard_normal(2).tolist()
         true = moment.values.get("motor_current", np.nan), moment.values.get("battery_voltage", np.nan)
-        return Reading(
+        return MeterReading(
             moment.time,
             float(self._gains[0]) * true[0] + meter.current_noise * current,
             float(self._gains[1]) * true[1] * (1.0 + meter.voltage_noise * voltage),

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
-from spirillum.dynamics.plant import Moment
+from spirillum.dynamics.plant import Snapshot
 from spirillum.dynamics.turning_field import Field
-
-__all__ = ["Command", "Controller", "News", "Reading", "Sight"]
 
 
 @dataclass(frozen=True)
-class Sight:
+class Detection:
     """What the camera has seen on one frame; SI."""
 
     time: float
@@ -44,7 +42,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class Reading:
+class MeterReading:
     """What the meter has read; SI."""
 
     time: float
@@ -56,16 +54,16 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class News:
+class Message:
     """What a controller knows when it decides."""
 
     time: float
     """Now, s."""
-    sights: tuple[Sight, ...] = ()
+    sights: tuple[Detection, ...] = ()
     """Those that have arrived since the last decision, in the order of their frames."""
-    readings: tuple[Reading, ...] = ()
+    readings: tuple[MeterReading, ...] = ()
     """Readings of the meter that have arrived since the last decision, in the order of their times."""
-    truth: Moment | None = field(default=None, compare=False)
+    truth: Snapshot | None = field(default=None, compare=False)
     """The robot itself, for a controller that knows everything; else None."""
 
 
@@ -77,7 +75,7 @@ class Controller(Protocol):
     knowing: bool = False
     """Whether it is told the truth."""
 
-    def decide(self, news: News) -> float | Command:
+    def decide(self, news: Message) -> float | Command:
         """Duty from now on, 0 (off) to 1; for a magnetic robot a command with its field."""
         ...
 

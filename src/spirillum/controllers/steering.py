@@ -29,10 +29,8 @@ from typing import Literal
 import numpy as np
 
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.signals import Command, Controller, News, Sight
+from spirillum.controllers.signals import Command, Controller, Detection, Message
 from spirillum.dynamics.turning_field import Field
-
-__all__ = ["MOST_TILT", "Law", "Replay", "Steer", "Steering", "pushed_for"]
 
 Law = Literal["position", "aim"]
 
@@ -87,14 +85,7 @@ class Steer(Controller):
     """Feedback of the place across the tube."""
 
     def __init__(self, lab: Lab, known: Steering, law: Law, *, knowing: bool = False) -> None:
-        """Begin.
-
-        Args:
-            lab: its remote.
-            known: the robot, as far as it is known.
-            law: `position` or `aim`.
-            knowing: whether it is told the truth.
-        """
+        """Begin."""
         self.knowing = self.blind = knowing
         self._known, self._law, self._delay = known, law, lab.remote.delay
         self._rate = known.rate
@@ -104,11 +95,11 @@ class Steer(Controller):
         self._turns: deque[tuple[float, float]] = deque()
         self._tilt = 0j
 
-    def decide(self, news: News) -> Command:
+    def decide(self, news: Message) -> Command:
         """The tilt of the law where the command will act."""
         if news.truth is not None:
             place = complex(*news.truth.pose.position[1:])
-            self._see(Sight(news.time, 0.0, 0.0, news.truth.values["body_angle"], 0.0, place.real, place.imag))
+            self._see(Detection(news.time, 0.0, 0.0, news.truth.values["body_angle"], 0.0, place.real, place.imag))
             self._place = place
         for sight in news.sights:
             self._see(sight)
@@ -130,7 +121,7 @@ class Steer(Controller):
             "field_rate": self._rate,
         }
 
-    def _see(self, sight: Sight) -> None:
+    def _see(self, sight: Detection) -> None:
         """Take a sight into the observer, and watch whether the robot follows the field."""
         seen = complex(sight.side, sight.height)
         if self._place is None:
@@ -172,7 +163,7 @@ class Replay(Controller):
         """
         self._rate, self._tilts = rate, tilts
 
-    def decide(self, news: News) -> Command:
+    def decide(self, news: Message) -> Command:
         """The last tilt that was due."""
         tilt = next((tilt for start, tilt in reversed(self._tilts) if start <= news.time), 0j)
         return Command(1.0, _field(self._rate, tilt))

@@ -18,8 +18,6 @@ from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.robot.arguments import Options, within
 from spirillum.robot.fields import Time
 
-__all__ = ["CONTROLLERS", "FEEDBACK", "Brief", "Score", "Task", "carried_by_flow"]
-
 FEEDBACK = "feedback"
 CONTROLLERS = {
     FEEDBACK: "the task's controller",

@@ -10,36 +10,34 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
-from spirillum.designs.answer import Alternative, Design, Uncertainty
-from spirillum.designs.bench import Bench
+from spirillum.designs.criteria import Judged
+from spirillum.designs.design_result import Alternative, Design, Uncertainty
 from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.leads import lead_warnings
+from spirillum.designs.improvement import lead_warnings
 from spirillum.designs.learned import chosen_model, is_learned
 from spirillum.designs.learning import learned_best
-from spirillum.designs.options import Judged
+from spirillum.designs.manufacturability import Manufacturability
 from spirillum.designs.profiles import bound_by_of, profile_of
 from spirillum.designs.reading import condition_of, quantity_of, with_unit
 from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
-from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
+from spirillum.designs.unknowns import SampledRobots, Unknowns, unknowns_of
 from spirillum.errors import InputError
-from spirillum.fitted.warnings import fitted_of
+from spirillum.fitted.fit_notes import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
-from spirillum.robot.text import with_numbers
-from spirillum.swimming.answer import LEVEL, STEADY, Swimming
+from spirillum.robot.toml_writer import with_numbers
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.swimming.steady import friction_reading
+from spirillum.swimming.steady_quantities import LEVEL, STEADY, Swimming
 from spirillum.units import KINDS, parse_option, show
-
-__all__ = ["design"]
 
 _MORE_DRAWS = 4
 """Draws of what is stated over those of the search."""
@@ -66,7 +64,7 @@ def design(
     unknown: Mapping[str, str | Sequence[object]] | None = None,
     posterior: str | Path | None = None,
     judged: Judged | Mapping[str, Any] | None = None,
-    bench: Bench | Mapping[str, Any] | None = None,
+    bench: Manufacturability | Mapping[str, Any] | None = None,
     model: str = AUTO,
     tail_rate: str | float | None = None,
     progress: Tell | None = None,
@@ -116,10 +114,10 @@ def design(
         raise InputError(f"{given.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     objectives = _objectives(maximise, minimise, options)
     conditions = tuple(condition_of(text) for text in ([subject_to] if isinstance(subject_to, str) else subject_to))
-    wound = Bench.of(bench)
+    wound = Manufacturability.of(bench)
     wound.check(space.batch(np.array([[0.0], [1.0]]) * np.ones(space.size)))
 
-    def under(drawn: Drawn) -> Evaluation:
+    def under(drawn: SampledRobots) -> Evaluation:
         return Evaluation(space, chosen, objectives, conditions, wound, drawn, options.confidence, rate)
 
     searched = under(unknowns.draws(options.draws, options.seed))

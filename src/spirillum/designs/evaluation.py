@@ -8,18 +8,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Flags, PerRobot, Samples
-from spirillum.designs.bench import Bench
+from spirillum.designs.manufacturability import Manufacturability
 from spirillum.designs.reading import Condition
 from spirillum.designs.space import Space
-from spirillum.designs.unknowns import Drawn
+from spirillum.designs.unknowns import SampledRobots
 from spirillum.fluid.model import SwimmerModel
 from spirillum.quantities import Quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
-from spirillum.swimming.answer import Swimming
 from spirillum.swimming.steady import requirements, swim
-
-__all__ = ["BROKEN", "REFUSED", "Evaluation", "Objective", "Scores"]
+from spirillum.swimming.steady_quantities import Swimming
 
 REFUSED = 1e6
 """Score of a design that cannot be built, to which what it breaks is added: worse than any condition that is broken."""
@@ -83,7 +81,7 @@ class Objective:
         return f"{'largest' if self.sign > 0 else 'least'} {kind}{name}"
 
 
-class Scores(NamedTuple):
+class DesignScores(NamedTuple):
     """What some designs are worth."""
 
     cost: Samples
@@ -102,8 +100,8 @@ class Evaluation:
     model: SwimmerModel
     objectives: tuple[Objective, ...]
     conditions: tuple[Condition, ...]
-    bench: Bench
-    drawn: Drawn
+    bench: Manufacturability
+    drawn: SampledRobots
     confidence: float
     """Share of the draws in which a condition has to hold."""
     tail_rate: float | None = None
@@ -126,7 +124,7 @@ class Evaluation:
         found: Samples = np.asarray(getattr(swum, name)).reshape(-1, self.drawn.number)
         return found
 
-    def scores(self, shares: Samples) -> Scores:
+    def scores(self, shares: Samples) -> DesignScores:
         """What designs are worth; those that cannot be built are not swum.
 
         Args:
@@ -139,7 +137,7 @@ class Evaluation:
         able = np.flatnonzero(excess <= 0)
         refused = excess > 0
         if able.size == 0:
-            return Scores(cost, values, refused)
+            return DesignScores(cost, values, refused)
         swum = self.swum(shares[able])
         answered = np.all(np.isfinite(self.quantity(swum, "forward_velocity")), axis=-1)
         broken = self.broken(swum)
@@ -151,7 +149,7 @@ class Evaluation:
             cost[row, able] = np.where(known, own, REFUSED)
             values[row, able] = np.where(good, objective.of(drawn), np.nan)
         refused[able] = ~answered
-        return Scores(cost, values, refused)
+        return DesignScores(cost, values, refused)
 
     def unbuildable(self, shares: Samples) -> Samples:
         """By how much designs break what bench, tube and model ask for, summed, (designs,); 0 where they do not."""

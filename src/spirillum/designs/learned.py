@@ -32,8 +32,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import joined
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 
-__all__ = ["Corrected", "Points", "check_learnable", "chosen_model", "corrected", "is_learned", "solved_at"]
-
 _COLUMNS = {
     "tail.wavelength": "wavelength",
     "tail.amplitude": "amplitude",
@@ -197,28 +195,13 @@ def _exponential(upper: Samples) -> Samples:
 
 
 def solved_at(name: str, batch: RobotBatch, variables: tuple[Variable, ...]) -> Points:
-    """Solve for the flow around some designs.
-
-    Args:
-        name: of the model, `tube` or `slender`.
-        batch: the designs.
-        variables: fields of the tail that are varied.
-    """
+    """Solve for the flow around some designs."""
     model = find_swimmer_model(name)
     return points_of(batch, variables, lambda one: quickest(model, one).axial(one))
 
 
 def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callable[[RobotBatch], Samples]) -> Points:
-    """What some designs teach.
-
-    Args:
-        batch: the designs.
-        variables: fields of the tail that are varied.
-        solve: axial resistance of the robots of a batch.
-
-    Raises:
-        InputError: where one of them has no answer.
-    """
+    """What some designs teach."""
     found = np.concatenate([joined(solve(one)) for _, one in batch.blocks(1)])
     fast, sound = _fast(batch)
     if not (np.all(np.isfinite(found)) and np.all(sound)):
@@ -272,11 +255,7 @@ def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> 
 
 
 def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variable, ...]:
-    """Fields of the tail that are varied, of which the flow has to be learned.
-
-    Raises:
-        InputError: for fields that change the flow in another way, too many of them, or a posterior.
-    """
+    """Fields of the tail that are varied, of which the flow has to be learned."""
     if unknowns.posterior is not None:
         raise InputError(f"model = '{name}' with a posterior; allowed: sbt or rft with it, or ranges (unknown)")
     own, strange = _changing_the_flow(space, unknowns)

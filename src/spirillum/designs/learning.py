@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.designs.answer import Learned
+from spirillum.designs.design_result import Learned
 from spirillum.designs.evaluation import Evaluation
 from spirillum.designs.learned import Points, check_learnable, corrected, solved_at
 from spirillum.designs.search import Archive, Found, Tell, best_design
@@ -18,8 +18,6 @@ from spirillum.designs.unknowns import Unknowns
 from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
-
-__all__ = ["learned_best"]
 
 _AGREES = 2e-3
 """Relative difference of the objective, learned and solved, at which the search ends."""
@@ -46,9 +44,6 @@ def learned_best(
 
     Returns:
         Designs with the learned model, all that the last search has swum, the best of them, and how well it is known.
-
-    Raises:
-        InputError: for fields of which it cannot be learned, or where no design can be built.
     """
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
@@ -75,11 +70,7 @@ def _objective(evaluation: Evaluation, shares: Samples) -> float:
 
 
 def _first_designs(empty: Evaluation, own: tuple[Variable, ...], seed: int) -> Samples:
-    """Designs that can be built: the corners of the ranges of the tail's fields, and points between, spread evenly.
-
-    Raises:
-        InputError: where there are none.
-    """
+    """Designs that can be built: the corners of the ranges of the tail's fields, and points between, spread evenly."""
     from scipy.stats import qmc
 
     space = empty.space

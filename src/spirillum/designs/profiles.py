@@ -7,11 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.designs.answer import Profile
+from spirillum.designs.design_result import ObjectiveProfile
 from spirillum.designs.evaluation import Evaluation
 from spirillum.robot.limits import broken
-
-__all__ = ["bound_by_of", "profile_of"]
 
 _PROFILE_POINTS = 41
 _HALVINGS = 12
@@ -21,7 +19,7 @@ _TOUCHES = 1e-3
 """Share of a range, or relative excess of a condition, within which the best design lies at it."""
 
 
-def profile_of(searched: Evaluation, best: Samples, number: int) -> Profile:
+def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectiveProfile:
     """The objective along one variable through the best design."""
     space, objective = searched.space, searched.objectives[0]
     variable = space.variables[number]
@@ -44,7 +42,7 @@ def profile_of(searched: Evaluation, best: Samples, number: int) -> Profile:
     low, high = float(values[first]), float(values[last])
     if not variable.is_whole:
         low, high = (_edge(searched, best, number, along, side) for side in ((first, -1), (last, 1)))
-    return Profile(
+    return ObjectiveProfile(
         variable.path,
         variable.unit,
         values,
@@ -89,7 +87,7 @@ def _binds(searched: Evaluation, shares: Samples, found: Samples, own: int) -> s
     return "; ".join(dict.fromkeys(words))
 
 
-def bound_by_of(stated: Evaluation, best: Samples, profiles: Sequence[Profile]) -> tuple[str, ...]:
+def bound_by_of(stated: Evaluation, best: Samples, profiles: Sequence[ObjectiveProfile]) -> tuple[str, ...]:
     """What the best design touches: ends of ranges, and what refuses its neighbours."""
     found = []
     for variable, share in zip(stated.space.variables, best, strict=True):

@@ -12,10 +12,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.quantities import Quantity
-from spirillum.swimming.answer import STEADY
+from spirillum.swimming.steady_quantities import STEADY
 from spirillum.units import Kind, display_unit, in_unit, parse_option
-
-__all__ = ["Condition", "condition_of", "quantity_of", "range_of", "with_unit"]
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]+)\s*(<=|>=)\s*(\S.*)", re.S)
 _LONGEST = 200
@@ -47,11 +45,7 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def quantity_of(name: str, option: str) -> Quantity:
-    """A quantity of steady swimming by name.
-
-    Raises:
-        InputError: for another name.
-    """
+    """A quantity of steady swimming by name."""
     for item in STEADY:
         if item.name == name:
             return item
@@ -60,11 +54,7 @@ def quantity_of(name: str, option: str) -> Quantity:
 
 
 def condition_of(text: str, option: str = "subject_to") -> Condition:
-    """A condition from text such as `motor_current <= 0.4 A`.
-
-    Raises:
-        InputError: for another form, an unknown quantity, or a unit that does not measure it.
-    """
+    """A condition from text such as `motor_current <= 0.4 A`."""
     given: object = text
     found = _CONDITION.fullmatch(given) if isinstance(given, str) and len(given) <= _LONGEST else None
     if found is None:
@@ -79,16 +69,7 @@ def condition_of(text: str, option: str = "subject_to") -> Condition:
 
 
 def range_of(name: str, given: str | Sequence[object], unit: str) -> tuple[float, float]:
-    """The two ends of a range, SI.
-
-    Args:
-        name: named in sentences.
-        given: text as `5 mm:40 mm`, or two values.
-        unit: SI unit.
-
-    Raises:
-        InputError: if it is no such range.
-    """
+    """The two ends of a range, SI."""
     ends: object = given.split(":") if isinstance(given, str) else given
     if isinstance(ends, bytes) or not isinstance(ends, Sequence) or len(ends) != 2:
         raise InputError(f"{name} = {str(given)[:60]!r}; allowed: LOW:HIGH, each with its unit")

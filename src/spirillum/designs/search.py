@@ -16,8 +16,6 @@ import numpy as np
 from spirillum.arrays import Flags, Samples
 from spirillum.designs.evaluation import BROKEN, REFUSED, Evaluation
 
-__all__ = ["Archive", "Found", "Tell", "best_design", "pareto_front"]
-
 Tell = Callable[[str, int, int], None]
 _GENERATIONS = 60
 _POPULATION = 12
@@ -169,13 +167,6 @@ def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points:
 
     The best of the first objective is sought with the second bounded (epsilon-constraint method, Haimes et al. 1971),
     for bounds that lie evenly between the extremes. Each search begins where all before it have been.
-
-    Args:
-        evaluation: designs with two objectives.
-        archive: takes all designs that are swum.
-        seed: of the search.
-        points: number of designs, at least 3.
-        tell: told how many are found.
     """
     say = tell
     say("designs on the front", 0, points)

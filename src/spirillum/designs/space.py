@@ -16,8 +16,6 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.robot import Robot
 
-__all__ = ["TURNS", "Space", "Variable", "space_of"]
-
 TURNS = "tail.turns"
 """Whole turns of the tail: its length over its wavelength, a field of designs only."""
 _MOST_TURNS = 100
@@ -101,15 +99,7 @@ class Space:
 
 
 def space_of(robot: Robot, vary: Mapping[str, str | Sequence[object]]) -> Space:
-    """The space of designs that some ranges span.
-
-    Args:
-        robot: the robot.
-        vary: dotted field to its range: text as `5 mm:40 mm`, or two values, texts with their unit or floats in SI.
-
-    Raises:
-        InputError: for a field that is no number of the robot, a range that is none, or fields that exclude each other.
-    """
+    """The space of designs that some ranges span."""
     if not vary:
         raise InputError("vary holds no field; allowed: one to 8 numeric fields, as tail.wavelength=5mm:40mm")
     if len(vary) > _MOST_VARIABLES:
@@ -120,17 +110,7 @@ def space_of(robot: Robot, vary: Mapping[str, str | Sequence[object]]) -> Space:
 
 
 def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: str = "vary") -> Variable:
-    """One field with its range.
-
-    Args:
-        robot: the robot.
-        path: dotted field.
-        given: its range.
-        option: named in sentences.
-
-    Raises:
-        InputError: for a field that is no number of the robot, or a range that is none.
-    """
+    """One field with its range."""
     if path == TURNS:
         low, high = range_of(f"{option} {path}", given, "1")
         if low != round(low) or high != round(high) or not 1 <= low <= high <= _MOST_TURNS:

@@ -18,10 +18,8 @@ from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
 
-__all__ = ["Drawn", "Unknowns", "unknowns_of"]
 
-
-class Drawn(NamedTuple):
+class SampledRobots(NamedTuple):
     """Robots that differ in what is not known."""
 
     batch: RobotBatch
@@ -49,19 +47,10 @@ class Unknowns:
         """Whether there is nothing unknown."""
         return not self.ranges and self.posterior is None
 
-    def draws(self, count: int, seed: int, sets: int = 1) -> Drawn:
-        """Robots that may be.
-
-        Args:
-            count: number of draws; ranges are filled evenly (scrambled Sobol' points).
-            seed: of the draws.
-            sets: number of independent sets, a divisor of `count`: how they differ tells how sure a mean is.
-
-        Raises:
-            InputError: for a posterior whose draws are not robots of one batch.
-        """
+    def draws(self, count: int, seed: int, sets: int = 1) -> SampledRobots:
+        """Robots that may be."""
         if self.known:
-            return Drawn(RobotBatch.of(self.robot), {}, 1)
+            return SampledRobots(RobotBatch.of(self.robot), {}, 1)
         if self.posterior is not None:
             return _of_posterior(self.robot, self.posterior, count, seed)
         from scipy.stats import qmc
@@ -71,10 +60,10 @@ class Unknowns:
             warnings.simplefilter("ignore", UserWarning)  # a number that is no power of two fills less evenly
             points = np.concatenate([qmc.Sobol(len(self.ranges), rng=rng).random(count // sets) for _ in range(sets)])
         values = {item.path: item.low + points[:, n] * (item.high - item.low) for n, item in enumerate(self.ranges)}
-        return Drawn(RobotBatch.of(self.robot).with_values(values), values, len(points), sets)
+        return SampledRobots(RobotBatch.of(self.robot).with_values(values), values, len(points), sets)
 
 
-def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int) -> Drawn:
+def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int) -> SampledRobots:
     rng = np.random.default_rng(seed)
     values = posterior.of(robot, rng)
     size = next(iter(values.values())).size
@@ -86,7 +75,7 @@ def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int)
             f"{posterior.source} holds draws of force coefficients, which are no column of a batch; allowed: a "
             "posterior without normal_factor and tangential_factor, or ranges"
         )
-    return Drawn(groups[0][1], {name: column[rows] for name, column in values.items()}, len(rows))
+    return SampledRobots(groups[0][1], {name: column[rows] for name, column in values.items()}, len(rows))
 
 
 def unknowns_of(
@@ -99,9 +88,6 @@ def unknowns_of(
         unknown: dotted field to its range.
         posterior: file of a calibration's posterior.
         model: the model that will be asked, or `auto`: that of the posterior.
-
-    Raises:
-        InputError: for both at once, a field that is no number of the robot, or a posterior of another model.
     """
     if posterior is not None:
         if unknown:

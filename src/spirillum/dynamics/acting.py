@@ -15,8 +15,6 @@ from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.swimming.balance import friction_torques
 
-__all__ = ["Acting", "drive_of", "friction_of", "state_sizes", "torque_scale", "weight_of"]
-
 _KINDS = {
     "dc-motor": rigid_links.MOTOR,
     "torque": rigid_links.TORQUE,

@@ -8,15 +8,9 @@ from typing import Any
 from spirillum.swimming.prediction import Prediction
 from spirillum.version import versions
 
-__all__ = ["run_attributes"]
-
 
 def run_attributes(prediction: Prediction) -> dict[str, Any]:
-    """Robot, model, friction, calibration, errors, settings, references and versions of a run.
-
-    Args:
-        prediction: the robot with model, friction and calibration.
-    """
+    """Robot, model, friction, calibration, errors, settings, references and versions of a run."""
     return {
         "robot": prediction.robot.name,
         "model": prediction.model.name,

@@ -14,8 +14,6 @@ from spirillum.quantities import attributes
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["STEADY", "Stretch", "run_averages", "stretches_on", "vertical_drift"]
-
 _WITHIN = 0.01
 """Relative difference from the end of a stretch below which a motion is steady."""
 _LEAST_TURNS = 2
@@ -29,7 +27,7 @@ STEADY = (
 """What a steady motion is, in words."""
 
 
-class Stretch(NamedTuple):
+class DutyInterval(NamedTuple):
     """A time at constant duty."""
 
     start: float
@@ -38,7 +36,7 @@ class Stretch(NamedTuple):
     """s."""
 
 
-def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[Stretch]:
+def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[DutyInterval]:
     """Times at constant duty in which the drive is on.
 
     Args:
@@ -46,16 +44,16 @@ def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> 
         end: end of the run, or of its drive, s.
         begin: beginning of the run, s.
     """
-    found: list[Stretch] = []
+    found: list[DutyInterval] = []
     before = 0.0
     ends = [*(switch.time for switch in switches[1:]), end]
     for (switched, duty), after in zip(switches, ends, strict=True):
         start, stop = max(switched, begin), min(after, end)
         if duty > 0 and stop > start:
             if found and before == duty and found[-1].end == start:
-                found[-1] = Stretch(found[-1].start, stop)
+                found[-1] = DutyInterval(found[-1].start, stop)
             else:
-                found.append(Stretch(start, stop))
+                found.append(DutyInterval(start, stop))
             before = duty
     return found
 
@@ -63,7 +61,7 @@ def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> 
 def run_averages(
     time: Samples,
     integrals: Mapping[str, tuple[Samples, str]],
-    stretches: Sequence[Stretch],
+    stretches: Sequence[DutyInterval],
     *,
     by_turn: bool,
 ) -> dict[str, tuple[Any, ...]]:
@@ -82,7 +80,7 @@ def run_averages(
     """
     judged = [integrals[name][0] for name in ("mean_forward_velocity", "mean_tail_rotation_rate")]
     steady = [part for stretch in stretches if (part := _steady_part(time, judged, stretch, by_turn=by_turn))]
-    whole = [Stretch(float(time[0] + (time[-1] - time[0]) / 3.0), float(time[-1]))]
+    whole = [DutyInterval(float(time[0] + (time[-1] - time[0]) / 3.0), float(time[-1]))]
     found: dict[str, tuple[Any, ...]] = {}
     for ending, over, note in (
         ("", whole, "average over the last two thirds of the run"),
@@ -102,17 +100,19 @@ def run_averages(
     return found
 
 
-def _length(stretches: Sequence[Stretch]) -> float:
+def _length(stretches: Sequence[DutyInterval]) -> float:
     return float(sum(end - start for start, end in stretches))
 
 
-def _average(time: Samples, values: Samples, stretches: Sequence[Stretch]) -> float:
+def _average(time: Samples, values: Samples, stretches: Sequence[DutyInterval]) -> float:
     length = _length(stretches)
     gained = sum(float(np.diff(np.interp(stretch, time, values))[0]) for stretch in stretches)
     return gained / length if length > 0 else float("nan")
 
 
-def _steady_part(time: Samples, judged: Sequence[Samples], stretch: Stretch, *, by_turn: bool) -> Stretch | None:
+def _steady_part(
+    time: Samples, judged: Sequence[Samples], stretch: DutyInterval, *, by_turn: bool
+) -> DutyInterval | None:
     """The end of a stretch in which all judged quantities are steady; None without one."""
     inside = time[(time >= stretch.start) & (time <= stretch.end)]
     if inside.size < 3:
@@ -133,10 +133,10 @@ def _steady_part(time: Samples, judged: Sequence[Samples], stretch: Stretch, *, 
         return None
     if by_turn:  # whole turns, back from the end
         start = stretch.end - window * np.floor((stretch.end - start) / window * (1.0 + 1e-12))
-    return Stretch(start, stretch.end)
+    return DutyInterval(start, stretch.end)
 
 
-def _turn(time: Samples, angle: Samples, stretch: Stretch) -> float:
+def _turn(time: Samples, angle: Samples, stretch: DutyInterval) -> float:
     """Time of a turn in the second half of a stretch, s; infinite where nothing turns."""
     middle = 0.5 * (stretch.start + stretch.end)
     turned = abs(float(np.diff(np.interp([middle, stretch.end], time, angle))[0])) / (2.0 * np.pi)
@@ -144,11 +144,7 @@ def _turn(time: Samples, angle: Samples, stretch: Stretch) -> float:
 
 
 def vertical_drift(run: xr.Dataset) -> list[str]:
-    """A sentence on a robot that sinks or rises over the last two thirds of a run; none where it hardly does.
-
-    Args:
-        run: with `position` and `pitch` over `time`.
-    """
+    """A sentence on a robot that sinks or rises over the last two thirds of a run; none where it hardly does."""
     late = run.isel(time=slice(run.sizes["time"] // 3, None))
     way = late["position"].values[-1] - late["position"].values[0]
     if not abs(way[2]) > _SINKS * np.hypot(way[0], way[1]):

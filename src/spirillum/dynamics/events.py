@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-__all__ = ["Told", "told"]
-
 _MOST_ALIKE = 4
 """Events of one kind that are told one by one."""
 

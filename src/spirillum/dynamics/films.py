@@ -24,8 +24,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.robot import Robot
 
-__all__ = ["ROUGHNESS_SHARE", "Films", "films_of"]
-
 ROUGHNESS_SHARE = 1e-4
 """Roughness over the body's radius where none is given: 0.9 micrometres for the paper's robot. Assumed."""
 _SIDE = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
@@ -35,7 +33,7 @@ _STIFFEST = 1e10
 
 
 @dataclass(frozen=True)
-class Films:
+class WallFilms:
     """Rings of a robot that may near the wall, as `kernels.two_links` reads them."""
 
     wall: Samples
@@ -48,7 +46,7 @@ class Films:
     """
 
 
-def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> Films:
+def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> WallFilms:
     """The films between a robot and its channel.
 
     Args:
@@ -60,12 +58,12 @@ def films_of(robot: Robot, roughness: float | None, drag: float, load: float) ->
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
-        return Films(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
+        return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)
     spots[:, kernel.FILM_RESISTANCE] /= spots[:, kernel.FILM_REACH] ** spots[:, kernel.FILM_POWER]
-    return Films(np.array([channel, height, _STIFFEST * drag, load]), spots)
+    return WallFilms(np.array([channel, height, _STIFFEST * drag, load]), spots)
 
 
 def _across(radius: float, channel: float) -> float:

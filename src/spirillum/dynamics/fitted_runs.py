@@ -10,20 +10,18 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
+from spirillum.fitted.fit_notes import CALIBRATED_HELD
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import CALIBRATED_HELD
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
-from spirillum.swimming.answer import LEVEL
 from spirillum.swimming.discrepancy import drawn_discrepancy
 from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
+from spirillum.swimming.steady_quantities import LEVEL
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["chosen_run", "drawn_number", "with_intervals"]
 
 _DRAWS = 100
 """Draws of a posterior that are run."""
@@ -62,9 +60,6 @@ def chosen_run(
 
     Returns:
         Both, and what was chosen instead of the usual, a sentence each.
-
-    Raises:
-        InputError: for an unknown model, or a calibration that was fitted with several.
     """
     choice = choose_model(
         model,
@@ -104,9 +99,6 @@ def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
     Args:
         draws: the number that is asked for; None: 100.
         posterior: the posterior; None without one.
-
-    Raises:
-        InputError: for a number that tells nothing or takes too long, or one without a posterior.
     """
     given: Any = _DRAWS if draws is None else draws
     if not is_whole(given) or not _FEWEST <= int(given) <= _MOST:
@@ -124,16 +116,7 @@ def with_intervals(
     draws: int,
     tell: Callable[[str, int, int], None],
 ) -> xr.Dataset:
-    """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`.
-
-    Args:
-        dataset: the run with the middle of the posterior.
-        posterior: its draws.
-        robot: the robot, as `PosteriorFile.central` gives it.
-        run: runs a robot for as long, given the number of its draw.
-        draws: how many draws are run.
-        tell: told how many are done, and of how many.
-    """
+    """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`."""
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}
     drawn, kept = posterior.drawn(robot, draws, rng), posterior.places(draws)

@@ -16,25 +16,23 @@ from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
-from spirillum.fluid.tube.announced import OF_A_RUN
+from spirillum.fluid.tube.progress_messages import OF_A_RUN
 from spirillum.fluid.tube.tube import Tube
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
-from spirillum.swimming.answer import STEADY, Swimming
-from spirillum.swimming.loading import checked_batch, least_gap
 from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.robot_preparation import checked_batch, least_gap
 from spirillum.swimming.steady import friction_reading, requirements
+from spirillum.swimming.steady_quantities import STEADY, Swimming
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     import xarray as xr
-
-__all__ = ["Moment", "flow_of_run", "moment_of_run"]
 
 _SCALARS = (
     *("azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow"),
@@ -54,7 +52,7 @@ _THINNEST = 0.02
 """Thinnest film that is drawn, in diameters of the body: thinner ones of a yawed robot take many minutes."""
 
 
-class Moment(NamedTuple):
+class RunSnapshot(NamedTuple):
     """A robot in its tube at a moment of a run, in axes of the body that do not roll; nothing is solved for yet."""
 
     prediction: Prediction
@@ -109,17 +107,8 @@ def flow_of_run(
 
 def moment_of_run(
     run: str | Path | xr.Dataset, time: str | float, resolution: Resolution | Mapping[str, Any] | None = None
-) -> Moment:
-    """A moment of a run by `simulate` with the model `tube`, checked before anything is solved.
-
-    Args:
-        run: its file, or its dataset.
-        time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
-        resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03.
-
-    Raises:
-        InputError: for another run, a moment outside it, or a place that cannot be resolved.
-    """
+) -> RunSnapshot:
+    """A moment of a run by `simulate` with the model `tube`, checked before anything is solved."""
     dataset = open_run(run) if isinstance(run, str | Path) else run
     moment = parse_option("time", time, KINDS["time"])
     missing = [name for name in _NEEDED if name not in dataset]
@@ -143,11 +132,7 @@ def moment_of_run(
 
 
 def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
-    """A run at one of its samples, with what its flow follows from checked.
-
-    Raises:
-        InputError: for what `simulate` does not write.
-    """
+    """A run at one of its samples, with what its flow follows from checked."""
     one = dataset.isel(time=[index])
     for name in _SCALARS:
         numbers_of(one, name)
@@ -164,7 +149,7 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
     return one.isel(time=0).assign(attitude=("quaternion", attitude)).assign_attrs(texts)
 
 
-def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) -> Moment:
+def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) -> RunSnapshot:
     """The motion at a sample."""
     from scipy.spatial.transform import Rotation
 
@@ -215,7 +200,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         motion="free",
         fitted_by=now.attrs["fitted_by"],
     )
-    return Moment(found, phase, body, rotor, mean_flow, max(drawn - gap, 0.0))
+    return RunSnapshot(found, phase, body, rotor, mean_flow, max(drawn - gap, 0.0))
 
 
 @contextmanager

@@ -12,16 +12,14 @@ import numpy as np
 
 from spirillum.dynamics.free_motion import FreeMotion, let_go, means_over
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.long_run import STABLE
-from spirillum.dynamics.turn_map import TurnMap, fixed_place
+from spirillum.dynamics.return_map import ReturnMap, fixed_place
+from spirillum.dynamics.steady_state_search import STABLE
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.swimming.answer import Intervals, Swimming
 from spirillum.swimming.discrepancy import PosteriorFor
 from spirillum.swimming.intervals import drawn_batch, intervals_over
 from spirillum.swimming.reynolds import without_reynolds_bound
-
-__all__ = ["DRAWS", "intervals_of_free_motion"]
+from spirillum.swimming.steady_quantities import Intervals, Swimming
 
 DRAWS = 40
 """Draws of a posterior that are followed: some second each."""
@@ -43,9 +41,6 @@ def intervals_of_free_motion(
         posterior: its draws.
         posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
         progress: told how many draws are done, and of how many.
-
-    Raises:
-        InputError: if the middle, or more than one draw of twenty, comes to no steady motion.
     """
     lying, robot = found.run.lying, found.prediction.robot
     if lying.state != "steady":
@@ -61,7 +56,7 @@ def intervals_of_free_motion(
         if progress is not None:
             progress("draws of the posterior", number, len(places))
         held, links, _ = let_go(one, found.laid._replace(contact=posterior.contact(place)))
-        fixed = fixed_place(TurnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
+        fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multipliers[0]) > STABLE:
             continue
         swum.append(means_over(held, links, fixed.state, fixed.turn.time, 1))

@@ -14,39 +14,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.averages import Stretch
+from spirillum.dynamics.averages import DutyInterval
 from spirillum.dynamics.integration import Progress, Reach
-from spirillum.dynamics.long_run import LongRun, long_run
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.return_map import STEPS
+from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.table_check import Checked, held_against_check, held_by_friction
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
-from spirillum.dynamics.turn_map import STEPS
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
+from spirillum.fitted.fit_notes import fitted_of, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import fitted_of, friction_acts
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
-from spirillum.swimming.answer import Swimming
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.drives import current_at
-from spirillum.swimming.loading import prepared
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
+from spirillum.swimming.robot_preparation import prepared
 from spirillum.swimming.steady import Rates, swimming_of
+from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import KINDS, parse_option, show
-
-__all__ = ["FreeMotion", "Laid", "free_motion", "let_go", "means_over"]
 
 _SAMPLES = 240
 """Samples of a turn over which means are taken."""
@@ -56,7 +54,7 @@ _LIGHT = 1e-9
 """Weight in the fluid, over the forces that act, below which a robot has none."""
 
 
-class Laid(NamedTuple):
+class Release(NamedTuple):
     """How a robot is laid down in its tube, and what drives and touches it there."""
 
     table: TubeTable
@@ -88,7 +86,7 @@ class FreeMotion(NamedTuple):
     """What its rates follow from."""
     start_gap: float
     """Smallest distance of body and wall where it was laid down, m."""
-    laid: Laid
+    laid: Release
     """How it was laid down."""
     checked: Checked
     """Whether its table was checked where it lies."""
@@ -122,9 +120,6 @@ def free_motion(
         in_tube: azimuth of the start and coefficient of dry friction.
         until: gap that it has to reach, m; None: no such gap.
         progress: told what is being computed, how much is done, and of how much.
-
-    Raises:
-        InputError: for wrong input, or a motion that cannot be followed for a turn.
     """
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
@@ -145,7 +140,7 @@ def free_motion(
     if ready.channel is not None:
         _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
-    laid = Laid(table, placed, asked, height, contact, tail_rate, friction, weight)
+    laid = Release(table, placed, asked, height, contact, tail_rate, friction, weight)
     held, links, start = let_go(ready, laid)
     state = laid_down(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
@@ -184,13 +179,8 @@ def free_motion(
     return FreeMotion(found, run, links, gap, laid, checked)
 
 
-def let_go(robot: Robot, laid: Laid) -> tuple[Prediction, TubeRobot, StartPlace]:
-    """The robot held where it is laid down, what its rates follow from with its drive on, and that place.
-
-    Args:
-        robot: the robot.
-        laid: how it is laid down.
-    """
+def let_go(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
+    """The robot held where it is laid down, what its rates follow from with its drive on, and that place."""
     rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
     held = predict(
         robot, model="tube", tail_rate=laid.tail_rate, friction=laid.friction, placement=laid.placement, band=False
@@ -200,11 +190,7 @@ def let_go(robot: Robot, laid: Laid) -> tuple[Prediction, TubeRobot, StartPlace]
 
 
 def _check(asked: InTube) -> None:
-    """Refuse what changes in time.
-
-    Raises:
-        InputError: if there is something.
-    """
+    """Refuse what changes in time."""
     for name in ("wait", "flow"):
         if getattr(asked, name) is not None:
             raise InputError(
@@ -218,9 +204,6 @@ def _check_until(until: float | None, gap: float) -> None:
     Args:
         until: the gap, m; None: no such gap.
         gap: at the start, m.
-
-    Raises:
-        InputError: if it is not smaller.
     """
     if until is not None and not until < gap:
         raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
@@ -275,7 +258,7 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
     start[rigid_links.CURRENT + 1 :] = 0.0
     followed = integrate_in_tube(links, start, moments, [Switch(0.0, duty)], _NOWHERE)
     more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
-    series = dataset_of(held, links, followed, [Stretch(0.0, float(followed.time[-1]))], more, {})
+    series = dataset_of(held, links, followed, [DutyInterval(0.0, float(followed.time[-1]))], more, {})
 
     def mean(name: str) -> float:
         return float(np.trapezoid(series[name].values, followed.time) / followed.time[-1])

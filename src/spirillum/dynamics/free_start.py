@@ -15,8 +15,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
 
-__all__ = ["links_without_walls", "resting_state"]
-
 
 def links_without_walls(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
     """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall.
@@ -40,11 +38,7 @@ def links_without_walls(steady: Prediction, roughness: float | None, *, weight: 
 
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:
-    """The state of a robot at rest in its seat, (17,); a heavy one whose gap is open lies low.
-
-    Raises:
-        InputError: if body or tail touch the wall there, naming what puts them there.
-    """
+    """The state of a robot at rest in its seat, (17,); a heavy one whose gap is open lies low."""
     start = start_state(robot, placement, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     if not links.spots.size:
         return start

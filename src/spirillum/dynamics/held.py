@@ -32,8 +32,6 @@ from spirillum.units import show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AxialResponse", "MotorTransient", "axial_response", "held_run", "motor_transient"]
-
 _TOLERANCE = 1e-9
 # Orders above 4 have so small a region of stability that the decay with L/R needs ten times the steps.
 _HIGHEST_ORDER = 4
@@ -86,11 +84,7 @@ class MotorTransient:
 
 
 def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
-    """The robot's linear answer to a joint torque, for the prediction's model, friction and calibration.
-
-    Raises:
-        InputError: for robots in an imposed flow, whose rates are not proportional to the torque.
-    """
+    """The robot's linear answer to a joint torque, for the prediction's model, friction and calibration."""
     if batch.placement.flow:
         raise InputError(
             f"placement.flow = {show(batch.placement.flow, 'mm/s')}: a run in time starts from rest; allowed: no flow, "
@@ -194,16 +188,9 @@ def _segment(
 def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
     """Axial swimming (two degrees of freedom) from rest.
 
-    Args:
-        prediction: steady motion of a robot with a `dc-motor` drive, any model that swims.
-        timing: length, sampling and remote control.
-
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
         averages over the last two thirds of the run, while on and while steady as scalars; settings in the attributes.
-
-    Raises:
-        InputError: for a wrong timing or a drive without a motor.
     """
     batch = prediction.batch
     if batch.drive != "dc-motor" or batch.electrics is None:

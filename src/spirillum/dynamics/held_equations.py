@@ -16,8 +16,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = ["INPUTS", "OUTPUTS", "outputs", "rates", "slopes", "steady_state"]
-
 INPUTS = ("duty", "mean_flow")
 """Inputs; quantities of the registry."""
 OUTPUTS = (

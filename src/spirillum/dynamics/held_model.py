@@ -26,10 +26,8 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.swimming.steady import calibrated_balance
 
-__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "check_steady", "held_model", "responses"]
 
-
-class Parameter(NamedTuple):
+class ModelParameter(NamedTuple):
     """One number of the equations."""
 
     name: str
@@ -41,20 +39,20 @@ class Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    Parameter("motor.torque_constant", "N m/A", "K_m: torque in the joint per current, gear included"),
-    Parameter("motor.back_emf_constant", "V s/rad", "K_b: back-emf per rate of the joint, gear included"),
-    Parameter("motor.inductance", "H", "L"),
-    Parameter("motor.resistance.constant", "ohm", "R(I): constant part"),
-    Parameter("motor.resistance.decay", "ohm", "R(I): part that decays with the current"),
-    Parameter("motor.resistance.decay_rate", "1/A", "R(I): how fast it decays"),
-    Parameter("motor.resistance.growth", "ohm", "R(I): part that grows with the current"),
-    Parameter("motor.resistance.growth_rate", "1/A", "R(I): how fast it grows"),
-    Parameter("motor.resistance.slope", "ohm/A", "R(I): part in proportion to the current"),
-    Parameter("battery.voltage", "V", "V(I) without a current"),
-    Parameter("battery.internal_resistance", "ohm", "V(I): loss per current"),
-    Parameter("polarity", "1", "sense about +x in which the motor turns the tail: 1 or -1"),
+    ModelParameter("motor.torque_constant", "N m/A", "K_m: torque in the joint per current, gear included"),
+    ModelParameter("motor.back_emf_constant", "V s/rad", "K_b: back-emf per rate of the joint, gear included"),
+    ModelParameter("motor.inductance", "H", "L"),
+    ModelParameter("motor.resistance.constant", "ohm", "R(I): constant part"),
+    ModelParameter("motor.resistance.decay", "ohm", "R(I): part that decays with the current"),
+    ModelParameter("motor.resistance.decay_rate", "1/A", "R(I): how fast it decays"),
+    ModelParameter("motor.resistance.growth", "ohm", "R(I): part that grows with the current"),
+    ModelParameter("motor.resistance.growth_rate", "1/A", "R(I): how fast it grows"),
+    ModelParameter("motor.resistance.slope", "ohm/A", "R(I): part in proportion to the current"),
+    ModelParameter("battery.voltage", "V", "V(I) without a current"),
+    ModelParameter("battery.internal_resistance", "ohm", "V(I): loss per current"),
+    ModelParameter("polarity", "1", "sense about +x in which the motor turns the tail: 1 or -1"),
     *(
-        Parameter(f"{of}_per_{per}", unit_of(f"{of}_per_{per}"), f"{words} per {over}")
+        ModelParameter(f"{of}_per_{per}", unit_of(f"{of}_per_{per}"), f"{words} per {over}")
         for per, over in (("torque", "joint torque"), ("flow", "imposed mean flow"))
         for of, words in (
             ("forward_velocity", "forward velocity"),
@@ -123,9 +121,6 @@ def held_model(
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
         placement: where the robot is held, for `tube`; with a `flow` the imposed flow is an input, which starts there.
-
-    Raises:
-        InputError: for wrong input, another drive, or a robot or place that the model does not know.
     """
     placed = Placement.of(placement)
     steady = predict(
@@ -147,16 +142,8 @@ def held_model(
 def check_steady(held: HeldModel, duty: float, flow: float) -> list[str]:
     """Refuse a held robot that moves far outside Stokes flow where a duty and a flow have become steady.
 
-    Args:
-        held: the equations of the robot.
-        duty: 0 to 1.
-        flow: imposed mean flow, m/s.
-
     Returns:
         A warning for each Reynolds number that is too large for an accurate answer.
-
-    Raises:
-        InputError: if one is above 10, and the robot's option `model.beyond_stokes` is off.
     """
     numbers, batch = held.parameters, held.prediction.batch
     speed, tail, _ = rates(numbers, steady_state(numbers, duty, flow), duty, flow)[1:4]

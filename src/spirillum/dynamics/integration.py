@@ -20,8 +20,6 @@ from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 
-__all__ = ["BATTERY_EMPTY", "INTEGRATOR", "TOLERANCE", "Event", "Progress", "Reach", "Trajectory", "integrate"]
-
 TOLERANCE = 1e-8
 """Relative tolerance of a step."""
 BATTERY_EMPTY = "battery empty"
@@ -105,9 +103,6 @@ def integrate(
         switches: every switching, the first at the first sample.
         reach: what ends the run, or its drive.
         progress: told what is being computed, how many stretches are done, and of how many.
-
-    Raises:
-        InputError: where the motion cannot be integrated.
     """
     blocks = [_observed(links.at_duty(switches[0].duty), time[:1], start[None])]
     times, states, duties = [time[:1]], [start[None]], [np.full(1, switches[0].duty)]

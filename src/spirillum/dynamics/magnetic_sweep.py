@@ -27,7 +27,7 @@ from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, with_resolution
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full
 from spirillum.swimming.prediction import Prediction, predict
@@ -45,8 +45,6 @@ from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["magnetic_sweep"]
 
 _TILT = 0.1
 """Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance."""
@@ -155,11 +153,7 @@ def magnetic_sweep(
 
 
 def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, str]:
-    """Warnings where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate.
-
-    Raises:
-        InputError: naming the least rate at which it does so far.
-    """
+    """Warnings where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate."""
     found: dict[str, str] = {}
     for rate, one, turned in zip(rates.tolist(), speed, turning, strict=True):
         limits = reynolds_limits(batch, body_reynolds(batch, one), tail_reynolds(batch, turned))
@@ -195,11 +189,7 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
 
 
 def _check_work(rates: Samples, turns: float, step_out: float) -> None:
-    """Refuse a sweep of hours: what the field aligns within a turn at step-out takes as many steps in any slower one.
-
-    Raises:
-        InputError: for too many turns at too low rates.
-    """
+    """Refuse a sweep that takes hours: steps are those of step-out, and slower turns take more of them."""
     slowness = np.maximum(step_out / np.abs(rates), 1.0) if np.isfinite(step_out) else np.ones(rates.size)
     work = turns * float(np.sum(slowness))
     if work > _MOST_WORK:

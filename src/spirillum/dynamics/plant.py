@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.argument_kinds import as_number, check_kind, checked
+from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, Trajectory, integrate
-from spirillum.dynamics.poses import Pose
+from spirillum.dynamics.poses import RobotPose
 from spirillum.dynamics.record import series_of
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.start import reach_of
@@ -48,20 +48,18 @@ from spirillum.swimming.preparation import table_for
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Moment", "Plant", "PlantState", "uninterrupted"]
-
 _LONGEST = 1e6
 """The longest step, s."""
 _TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
-class Moment:
+class Snapshot:
     """A robot at one moment of its run."""
 
     time: float
     """s."""
-    pose: Pose
+    pose: RobotPose
     """Where it is and how it lies."""
     values: dict[str, float]
     """Quantities by name, SI; NaN where one has no value."""
@@ -95,7 +93,7 @@ class PlantState:
     """Beginning of the integrator's last step, in a tube."""
 
 
-def uninterrupted(moment: Moment) -> Moment:
+def uninterrupted(moment: Snapshot) -> Snapshot:
     """The moment at the end of a step of a look ahead, of which nothing is kept.
 
     Raises:
@@ -109,7 +107,7 @@ def uninterrupted(moment: Moment) -> Moment:
 class Plant:
     """A free robot on its way, from rest, one step at a time; for one thread."""
 
-    @checked
+    @validate_arguments
     def __init__(
         self,
         robot: str | Path | Mapping[str, Any] | Robot,
@@ -221,7 +219,7 @@ class Plant:
         found = float(self._links.wall[kernel.ROUGHNESS])
         return found if np.isfinite(self._links.wall[kernel.RADIUS]) else None
 
-    def reset(self, state: PlantState | None = None) -> Moment:
+    def reset(self, state: PlantState | None = None) -> Snapshot:
         """Go back to rest at the start, or to a state that was noted.
 
         Args:
@@ -253,7 +251,7 @@ class Plant:
         duty: float | None = None,
         flow: str | float | None = None,
         field: Field | Mapping[str, Any] | None = None,
-    ) -> Moment:
+    ) -> Snapshot:
         """Go on for a time; what is not given stays as it was, and at first the drive is on.
 
         Args:
@@ -310,7 +308,7 @@ class Plant:
         )
         return self._moment(run)
 
-    def observe(self) -> Moment:
+    def observe(self) -> Snapshot:
         """The robot where it is: pose and true values of its quantities."""
         now, state = self._now, np.array([self._now.state])
         if isinstance(self._links, TubeRobot):
@@ -322,7 +320,7 @@ class Plant:
         switches = [Switch(now.time, now.duty)]
         return self._moment(integrate(self._links, state[0], np.array([now.time]), switches, self._reach))
 
-    @checked
+    @validate_arguments
     def impose_flow(self, velocity: float | None) -> None:
         """From now on another mean flow is imposed.
 
@@ -339,7 +337,7 @@ class Plant:
         self._impose(velocity)
         self._now = replace(self._now, flow=velocity, checkpoint=self._begun_anew())
 
-    @checked
+    @validate_arguments
     def impose_field(self, asked: Field) -> None:
         """From now on the field of a magnetic robot is another one; its angle does not jump.
 
@@ -358,11 +356,7 @@ class Plant:
             self._now = replace(self._now, field=field, checkpoint=self._begun_anew())
 
     def _check_stokes(self, run: Trajectory) -> None:
-        """Add what a step breaks of Stokes flow to the warnings, once for each limit.
-
-        Raises:
-            InputError: if the robot moves far outside Stokes flow.
-        """
+        """Add what a step breaks of Stokes flow to the warnings, once for each limit."""
         seen, batch = run.observed, self.steady.batch
         rates = seen[:, rigid_links.ROTATION] + seen[:, rigid_links.JOINT]
         limits = motion_limits(batch, seen[:, : rigid_links.ROTATION], rates)
@@ -420,7 +414,7 @@ class Plant:
         found = float(run.observed[-1, tube.AZIMUTH])
         return found + _TURN * round((self._now.azimuth - found) / _TURN)
 
-    def _moment(self, run: Trajectory) -> Moment:
+    def _moment(self, run: Trajectory) -> Snapshot:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
         if isinstance(run, TubeTrajectory):
             series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
@@ -428,21 +422,17 @@ class Plant:
             series["wall_gap"] = run.observed[:, rigid_links.FILM] + self._links.wall[kernel.ROUGHNESS]
         state = run.states[-1]
         attitude = state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
-        pose = Pose(
+        pose = RobotPose(
             state[rigid_links.POSITION : rigid_links.POSITION + 3].copy(),
             attitude / np.linalg.norm(attitude),
             float(state[rigid_links.PHASE]),
         )
         values = {name: float(column[-1]) for name, column in series.items()}
-        return Moment(float(run.time[-1]), pose, values, self._now.ended)
+        return Snapshot(float(run.time[-1]), pose, values, self._now.ended)
 
 
 def _check_number(name: str, value: Any, low: float, high: float, unit: str, *, closed: bool = False) -> None:
-    """Refuse what is no number from `low` to `high`, `low` itself excluded unless closed.
-
-    Raises:
-        InputError: if it is not.
-    """
+    """Refuse what is no number from `low` to `high`, `low` itself excluded unless closed."""
     number = as_number(value)
     if not (low <= number <= high) or (number == low and not closed):
         allowed = f"a number from {low:g} to {high:g}" if closed else f"above {low:g}, at most {high:g} {unit}".strip()

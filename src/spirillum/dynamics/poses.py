@@ -15,12 +15,10 @@ from spirillum.units import show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Poses", "attitudes_of", "poses_of", "rolled", "rotation_matrix"]
-
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class Pose(NamedTuple):
+class RobotPose(NamedTuple):
     """A robot at one moment."""
 
     position: Samples
@@ -93,7 +91,7 @@ class Poses:
         """(n,) angle by which the tail has turned in the lab about the body's axis, rad."""
         return np.asarray(self.tail_phase + self.roll)
 
-    def at(self, time: float) -> Pose:
+    def at(self, time: float) -> RobotPose:
         """The pose at a time, between samples in straight lines and even turns."""
         place = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2))
         step = float(self.time[place + 1] - self.time[place])
@@ -103,7 +101,7 @@ class Poses:
             return np.asarray(values[place] + share * (values[place + 1] - values[place]))
 
         attitude = _turned(self.attitude[place], self.attitude[place + 1], share)
-        return Pose(between(self.position), attitude, float(between(self.tail_phase)))
+        return RobotPose(between(self.position), attitude, float(between(self.tail_phase)))
 
 
 def _turned(start: Samples, end: Samples, share: float) -> Samples:
@@ -123,9 +121,6 @@ def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
     Args:
         dataset: what `spirillum.simulate` returns.
         height: z of the motor axis in an axial run, which does not hold it, m.
-
-    Raises:
-        InputError: if a variable is missing, has another shape, is not finite, or there are less than two samples.
     """
     time = numbers_of(dataset, "time", ())
     check_increasing(time)
@@ -140,11 +135,7 @@ def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
 
 
 def attitudes_of(dataset: xr.Dataset) -> Samples:
-    """(n, 4) attitudes of a free run as unit quaternions, without jumps of sign.
-
-    Raises:
-        InputError: if they are missing, have another shape, are not finite, or are no rotations.
-    """
+    """(n, 4) attitudes of a free run as unit quaternions, without jumps of sign."""
     attitude = numbers_of(dataset, "attitude", ("quaternion",), (4,))
     off = np.abs(np.linalg.norm(attitude, axis=1) - 1.0)
     if np.any(off > 1e-2):

@@ -9,10 +9,10 @@ from typing import Any
 
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
+from spirillum.fitted.fit_notes import FITTED_HELD, fitted_of
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import FITTED_HELD, fitted_of
 from spirillum.robot.load import load
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
@@ -20,8 +20,6 @@ from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice, check_calibrated, choose_model, posterior_alone
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
-
-__all__ = ["predict"]
 
 
 def predict(  # noqa: PLR0913 - the options of the command

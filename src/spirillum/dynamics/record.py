@@ -11,7 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.acting import Acting
 from spirillum.dynamics.attributes import run_attributes
-from spirillum.dynamics.averages import STEADY, Stretch, run_averages
+from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
 from spirillum.dynamics.integration import Reach, Trajectory
 from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
@@ -20,8 +20,6 @@ from spirillum.swimming.prediction import Prediction
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["dataset_of", "free_attributes", "series_of"]
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 _MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
@@ -37,7 +35,7 @@ def dataset_of(
     prediction: Prediction,
     links: Acting,
     run: Trajectory,
-    on: Sequence[Stretch],
+    on: Sequence[DutyInterval],
     more: Mapping[str, Samples],
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
@@ -87,13 +85,7 @@ def dataset_of(
 
 
 def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[str, Samples]:
-    """Angles, rates, torques, powers and energies of a free robot's run by name, each (n,); SI.
-
-    Args:
-        prediction: the robot with model, friction and calibration.
-        links: what acts on its two links.
-        run: its motion.
-    """
+    """Angles, rates, torques, powers and energies of a free robot's run by name, each (n,); SI."""
     rotation = _rotations(run.states)
     found = {**_motion(run, rotation), **_powers(links, run, rotation)}
     if prediction.batch.drive == "dc-motor":
@@ -106,16 +98,7 @@ def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[st
 def free_attributes(
     prediction: Prediction, run: Trajectory, reach: Reach, title: str, integrator: str, warnings: Sequence[str]
 ) -> dict[str, Any]:
-    """Attributes of a free robot's run.
-
-    Args:
-        prediction: the robot with model, friction and calibration.
-        run: its motion.
-        reach: its channel.
-        title: title of the dataset.
-        integrator: how it was integrated, in words.
-        warnings: what to be careful about, a sentence each.
-    """
+    """Attributes of a free robot's run."""
     return {
         "title": title,
         **run_attributes(prediction),
@@ -244,7 +227,7 @@ def _potential(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
     return np.asarray(heavy * run.states[:, rigid_links.POSITION + 2] + lift)
 
 
-def _averages(dataset: xr.Dataset, on: Sequence[Stretch]) -> dict[str, tuple[Any, ...]]:
+def _averages(dataset: xr.Dataset, on: Sequence[DutyInterval]) -> dict[str, tuple[Any, ...]]:
     """Averages of the run."""
     integrals = {
         "mean_forward_velocity": (dataset["position"].values[:, 0], "m/s"),

@@ -10,8 +10,6 @@ from spirillum.errors import InputError
 from spirillum.formats.tables import read_series
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["DUTY_COLUMNS", "Switch", "Window", "read_duty", "schedule", "windows_of"]
-
 DUTY_COLUMNS = ("time_s", "duty")
 """Columns of a duty file; each row holds until the next one."""
 _WHAT = "a duty file (CSV with the columns time_s and duty)"
@@ -32,11 +30,7 @@ class Switch(NamedTuple):
 
 
 def windows_of(on: Sequence[tuple[str | float, str | float]] | None) -> list[Window] | None:
-    """Times at which the motor is on, s; None: throughout.
-
-    Raises:
-        InputError: for what is no time.
-    """
+    """Times at which the motor is on, s; None: throughout."""
     if on is None:
         return None
     pairs = _listed(on) or []
@@ -60,9 +54,6 @@ def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float,
         table: duty file instead.
         duty: the drive's own duty.
         end: length of the run, s.
-
-    Raises:
-        InputError: for times that go back, both ways at once, or a wrong file.
     """
     if table is not None:
         if on is not None:
@@ -85,13 +76,6 @@ def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float,
 
 
 def read_duty(path: str | Path) -> list[Switch]:
-    """Read and check a duty file; before its first row the motor is off.
-
-    Args:
-        path: CSV with the columns `time_s` and `duty`; `#` starts a comment line.
-
-    Raises:
-        InputError: if the file or a cell is wrong; the sentence names file, row and column.
-    """
+    """Read and check a duty file; before its first row the motor is off."""
     switches = [Switch(*row) for row in read_series(path, _WHAT, _LIMITS, _LARGEST)]
     return switches if switches[0].time == 0 else [Switch(0.0, 0.0), *switches]

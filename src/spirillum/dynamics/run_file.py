@@ -20,8 +20,6 @@ from spirillum.units import Kind, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_increasing", "numbers_of", "open_run", "robot_of", "robot_of_settings"]
-
 _WHAT = "a run written by `spirillum simulate`"
 
 _LARGEST = 1e9
@@ -29,29 +27,12 @@ _LARGEST = 1e9
 
 
 def open_run(path: str | Path) -> xr.Dataset:
-    """A run from its file, loaded whole.
-
-    Args:
-        path: NetCDF file.
-
-    Raises:
-        InputError: if it is missing, no NetCDF file, too large, or damaged.
-    """
+    """A run from its file, loaded whole."""
     return loaded_netcdf(path, _WHAT)
 
 
 def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape: tuple[int, ...] = ()) -> Samples:
-    """Values, (n, ...), of a run's variable over `time` and further dimensions, finite and not huge.
-
-    Args:
-        dataset: a run, or some of its samples.
-        name: the variable.
-        more: its dimensions after `time`.
-        shape: sizes of these.
-
-    Raises:
-        InputError: if it is missing, has other dimensions, or holds anything else.
-    """
+    """Values, (n, ...), of a run's variable over `time` and further dimensions, finite and not huge."""
     if name not in dataset.variables:
         raise InputError(f"the run has no variable {name!r}; allowed: a run of `spirillum simulate`")
     variable = dataset[name]
@@ -77,9 +58,6 @@ def check_increasing(time: Samples) -> None:
 
     Args:
         time: times of its samples, s.
-
-    Raises:
-        InputError: if they are fewer than two, no series, or do not increase.
     """
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
         said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
@@ -87,11 +65,7 @@ def check_increasing(time: Samples) -> None:
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:
-    """The robot of a run, from the settings in its attributes, checked like a robot file.
-
-    Raises:
-        InputError: if there are none, or they describe no robot.
-    """
+    """The robot of a run, from the settings in its attributes, checked like a robot file."""
     settings = dataset.attrs.get("settings")
     if not isinstance(settings, str):
         raise InputError(f"the run has no attribute 'settings' with its robot; allowed: {_WHAT}")
@@ -110,9 +84,6 @@ def robot_of_settings(table: Any, whose: str) -> Robot:
     Args:
         table: the settings.
         whose: the dataset, for messages: ``the run's``.
-
-    Raises:
-        InputError: if they describe no robot.
     """
     if not isinstance(table, dict):
         raise InputError(f"{whose} attribute 'settings' is no table; allowed: one with a robot")

@@ -1,6 +1,12 @@
 """How a robot that is laid down in its tube settles: the way through its film, and where it comes to lie.
 
 It is the free motion of `spirillum.predict` with the way there: the same run, the same steady motion.
+
+The film under a level robot: what resists its sinking, and what pushes it sideways as it swims.
+In thin films the resistance to sinking approaches 3 sqrt(2) pi mu L (a_e/h)^(3/2), 1/a_e = 1/a - 1/R, for a cylinder
+of length L and radius a (the limit of Jeffrey and Onishi, Q. J. Mech. Appl. Math. 34:129, 1981), so that the gap of a
+level cylinder falls as 1/time^2. A body that turns is pushed along the wall the way that its lowest line moves, as a
+journal is in its bearing (W. J. Harrison, Trans. Cambridge Philos. Soc. 22:39, 1913).
 """
 
 from __future__ import annotations
@@ -8,29 +14,80 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.resting_film import Film, film_at, lubrication_resistance
 from spirillum.dynamics.tube_options import InTube
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
-from spirillum.swimming.lying import Lying
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady_state import SteadyState
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Settling", "settle"]
+_U, _SIDE, _UP, _ROLL, _JOINT = 0, 1, 2, 3, 6
+_PHASES = 8
+
+
+class LubricationFilm(NamedTuple):
+    """What the fluid does to a level robot that swims at one gap, held to its course; SI, means over phases."""
+
+    gap: float
+    """Smallest distance of body and wall, m."""
+    normal_resistance: float
+    """Resistance to sinking of a robot that is free along the tube and in its body's rotation, N s/m."""
+    sideways_force: float
+    """Along the wall, towards a positive azimuth, N."""
+
+
+def film_at(motion: Prediction, table: TubeTable, gap: float, offset: float) -> LubricationFilm:
+    """The film under a level robot.
+
+    Args:
+        motion: the robot as it swims at that gap, held level.
+        table: its table.
+        gap: of the body, m.
+        offset: e of its mid-length, m.
+    """
+    phases = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+    matrices = [table.at(offset, phase=float(phase))[0][:7, :7] for phase in phases]
+    full: Samples = motion.robot.fluid.viscosity * np.mean(matrices, axis=0)
+    free = [_U] if motion.batch.joint == "fixed" else [_U, _ROLL]
+    inner = np.linalg.solve(full[np.ix_(free, free)], full[np.ix_(free, [_UP])])
+    resistance = float(full[_UP, _UP] - (full[np.ix_([_UP], free)] @ inner)[0, 0])
+    rates = np.zeros(7)
+    rates[_U], rates[_ROLL], rates[_JOINT] = (
+        motion.forward_velocity,
+        motion.body_rotation_rate,
+        motion.motor_rotation_rate,
+    )
+    return LubricationFilm(gap, resistance, -float(full[_SIDE] @ rates))
+
+
+def lubrication_resistance(viscosity: float, length: float, radius: float, tube_radius: float, gap: float) -> float:
+    """S_z of a long cylinder in a thin film at the wall of a round tube, 3 sqrt(2) pi mu L (a_e/h)^(3/2), N s/m.
+
+    Args:
+        viscosity: Pa s.
+        length: of the cylinder, m.
+        radius: a of the cylinder, m.
+        tube_radius: R, m.
+        gap: h, m.
+    """
+    curvature = 1.0 / radius - 1.0 / tube_radius
+    return float(3.0 * np.sqrt(2.0) * np.pi * viscosity * length * (curvature * gap) ** -1.5)
+
 
 _SHARE = 0.2
 """Gap until which drainage is timed over that at the start, where none is given."""
@@ -41,14 +98,14 @@ _SAMPLES = 400
 
 
 @dataclass(frozen=True)
-class Settling(Shown):
+class Settling(DisplayMixin):
     """How a robot settles, SI; azimuths about +x from the lowest place."""
 
     prediction: Prediction
     """The steady motion that it comes to, means over a turn of the tail."""
     until: float
     """Gap to which the drainage is timed, m."""
-    films: tuple[Film, ...]
+    films: tuple[LubricationFilm, ...]
     """The film under the level robot, at gaps from the start to `until`; none where it starts on the axis."""
     _free: FreeMotion = field(repr=False)
 
@@ -58,7 +115,7 @@ class Settling(Shown):
         return self.prediction.robot
 
     @property
-    def lying(self) -> Lying:
+    def lying(self) -> SteadyState:
         """Where it comes to lie."""
         return self._free.run.lying
 
@@ -214,12 +271,12 @@ def settle(
     return Settling(free.prediction, last, _films(free, free.start_gap, last), free)
 
 
-def _films(free: FreeMotion, first: float, last: float) -> tuple[Film, ...]:
+def _films(free: FreeMotion, first: float, last: float) -> tuple[LubricationFilm, ...]:
     """The film at gaps of the way, where the model `tube` resolves it."""
     motion, robot = free.prediction, free.robot
     radius = float(robot.tube[kernel.RADIUS])
     table = find_table(RobotGeometry.of(motion.batch), radius)
-    found: list[Film] = []
+    found: list[LubricationFilm] = []
     if table is None:
         return ()
     for gap in np.geomspace(first, last, _FILMS):

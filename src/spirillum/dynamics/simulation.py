@@ -23,7 +23,7 @@ from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_fiel
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
-from spirillum.fitted.warnings import FITTED_HELD, fitted_of
+from spirillum.fitted.fit_notes import FITTED_HELD, fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
@@ -32,7 +32,7 @@ from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
@@ -45,8 +45,6 @@ from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["simulate"]
 
 
 def simulate(  # noqa: PLR0913 - the options of the command
@@ -203,11 +201,7 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[str]:
 def _table(
     robot: Robot, placed: Placement, asked: InTube, roughness: float | None, progress: Progress | None
 ) -> TubeTable:
-    """The robot's table, made if there is none, once all else is known to be right.
-
-    Raises:
-        InputError: for a robot or a place that no table knows.
-    """
+    """The robot's table, made if there is none, once all else is known to be right."""
     batch = RobotBatch.of(robot, placed)
     outside = broken(requirements(batch, TabledTube({})))
     if outside:
@@ -250,11 +244,7 @@ def _free_run(
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:
-    """Refuse settings of a free run in a tube for any other, and to continue one with draws of a posterior.
-
-    Raises:
-        InputError: if one is given.
-    """
+    """Refuse settings of a free run in a tube for any other, and to continue one with draws of a posterior."""
     if not walled and asked != InTube():
         name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
         given = "motion 'held'" if model == "tube" else f"model '{model}'"
@@ -274,11 +264,7 @@ def _check_held(
     *,
     weight: bool,
 ) -> None:
-    """Refuse what only a free run knows.
-
-    Raises:
-        InputError: if there is something.
-    """
+    """Refuse what only a free run knows."""
     if contact.friction_coefficient:
         raise InputError(
             f"{source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "

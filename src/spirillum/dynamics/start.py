@@ -12,11 +12,9 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import Seat, gap_of, largest_gap
+from spirillum.robot.tube_pose import Seat, gap_of, largest_gap
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
-
-__all__ = ["reach_of", "start_phase", "start_state", "turning_rate"]
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
@@ -27,9 +25,6 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
         placement: its `gap` or `eccentricity`, and `pitch`; what is left open is level, and where the gap is open the
             robot lies at a gap of `GAP_SHARE` of its radius, or in the middle.
         lying: whether a robot whose gap is open lies low.
-
-    Raises:
-        InputError: for a placement without a channel or for more than a run knows, or where the body does not fit.
     """
     _check(robot, placement)
     state = np.zeros(STATES)
@@ -100,11 +95,7 @@ def reach_of(robot: Robot) -> Reach:
 
 
 def turning_rate(steady: Prediction) -> float:
-    """Steady rate of the tail, or of the field, rad/s, positive.
-
-    Raises:
-        InputError: if nothing turns.
-    """
+    """Steady rate of the tail, or of the field, rad/s, positive."""
     rate = steady.tail_rotation_rate
     if steady.robot.magnetic is not None:
         rate = steady.robot.magnetic.rotation_rate

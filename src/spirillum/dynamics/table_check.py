@@ -13,8 +13,6 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import largest_yaw
 from spirillum.units import show
 
-__all__ = ["Checked", "held_against_check", "held_by_friction"]
-
 
 class Checked(NamedTuple):
     """What the stated error of a table says of a motion."""

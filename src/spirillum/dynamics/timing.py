@@ -7,16 +7,71 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
+import numpy as np
 from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch, Window, schedule, windows_of
-from spirillum.dynamics.sampling import check_samples, duration_of, sample_times, stated_duration
 from spirillum.errors import InputError
 from spirillum.robot.arguments import Options
 from spirillum.scalars import is_number, is_whole
+from spirillum.units import KINDS, parse_option
 
-__all__ = ["Timetable", "Timing"]
+_LARGEST_SAMPLES = 1_000_000
+_MOST_A_TURN = 10_000
+_SHORTEST = 1e-6
+"""Shortest run, in turns."""
+_ROUNDING = 1e-9
+"""Difference of two times that is rounding, over the distance of two samples."""
+
+
+def stated_duration(turns: float, duration: str | float | None) -> float | None:
+    """Length of a run as far as it is known without a rate: s, or None where it is in turns."""
+    if not _SHORTEST <= turns <= 1e5:
+        raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
+    return None if duration is None else parse_option("duration", duration, KINDS["time"])
+
+
+def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
+    """Length of a run, s."""
+    end = stated_duration(turns, duration)
+    if end is None:
+        return turns * turn
+    if end < _SHORTEST * turn:
+        raise InputError(f"duration = {end:g} s; allowed: at least {_SHORTEST * turn:.3g} s, a millionth of a turn")
+    return end
+
+
+def check_samples(samples_per_turn: int) -> None:
+    """Refuse a number of samples a turn that is none."""
+    if not 1 <= samples_per_turn <= _MOST_A_TURN:
+        raise InputError(f"samples-per-turn = {samples_per_turn}; allowed: 1 to {_MOST_A_TURN} a turn")
+
+
+def sample_times(end: float, turn: float, samples_per_turn: int, switches: Sequence[float] = ()) -> Samples:
+    """Evenly spaced times from 0 to `end`, s.
+
+    A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
+    which of the two is rounded up.
+
+    Args:
+        end: length of the run, s.
+        turn: time of a turn, s.
+        samples_per_turn: samples in it.
+        switches: times of switchings within the run, s.
+    """
+    check_samples(samples_per_turn)
+    count = math.ceil(end / turn * samples_per_turn)
+    if count > _LARGEST_SAMPLES:
+        raise InputError(
+            f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: at most {_LARGEST_SAMPLES} in all"
+        )
+    time = np.linspace(0.0, end, max(count, 1) + 1)
+    for switch in switches:
+        nearest = round(switch / end * (time.size - 1))
+        if 0 < nearest < time.size - 1 and abs(time[nearest] - switch) < _ROUNDING * time[1]:
+            time[nearest] = switch
+    return time
 
 
 def _whole(value: Any) -> Any:
@@ -82,12 +137,7 @@ class Timing(Options):
     """Duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next."""
 
     def check(self) -> None:
-        """Refuse what no run can have, before anything is known of the robot's own rate.
-
-        Raises:
-            InputError: for a length that is none or is given twice, no samples, times that go back, or a wrong duty
-                file.
-        """
+        """Refuse what no run can have, before anything is known of the robot's own rate."""
         end = stated_duration(self.turns, self.duration)
         if end is not None and "turns" in self.model_fields_set:
             raise InputError(f"turns = {self.turns:g} together with a duration; allowed: one of them")
@@ -95,15 +145,7 @@ class Timing(Options):
         schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
 
     def timetable(self, turn: float, duty: float) -> Timetable:
-        """The times of a run.
-
-        Args:
-            turn: time of a turn, s.
-            duty: the drive's own duty.
-
-        Raises:
-            InputError: for a length that is none, too many samples, times that go back, or a wrong duty file.
-        """
+        """The times of a run."""
         end = duration_of(self.turns, turn, self.duration)
         switches = schedule(self.on, self.duty, duty, end)
         time = sample_times(end, turn, self.samples_per_turn, [switch.time for switch in switches])

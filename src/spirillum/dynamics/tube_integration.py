@@ -21,19 +21,6 @@ from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links, tube_motion, tube_steps, tube_table
 
-__all__ = [
-    "INTEGRATOR",
-    "INTERRUPTED",
-    "TOLERANCE",
-    "Checkpoint",
-    "TubeTrajectory",
-    "integrate_in_tube",
-    "observed_at",
-    "range_left",
-    "step_sizes",
-    "watched_limits",
-]
-
 TOLERANCE = 1e-7
 """Error of a step over the sizes of the state's components: path and place of a minute in contact are then good to some
 parts in 1e7, energies to 1e-6; a tenth of it takes two and a half times as long."""

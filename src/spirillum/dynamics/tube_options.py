@@ -16,10 +16,8 @@ from spirillum.formats.tables import read_series
 from spirillum.robot.arguments import Options, in_range, refusal
 from spirillum.robot.fields import Angle, Time
 from spirillum.robot.load import with_resolution
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
-
-__all__ = ["FLOW_COLUMNS", "InTube", "check_not_resolved", "read_flow", "with_contact"]
 
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
@@ -71,15 +69,7 @@ def with_contact(contact: FittedContact, roughness: float | None, asked: InTube)
 
 
 def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:
-    """Refuse a resolution of free motion in the tube, which reads the robot's table at every phase.
-
-    Args:
-        robot: the robot.
-        resolution: what is asked for; that the answer comes from the `table` may be.
-
-    Raises:
-        InputError: if something else is given.
-    """
+    """Refuse a resolution of free motion in the tube, which reads the robot's table at every phase."""
     with_resolution(robot, resolution, "tube")  # a wrong value has a sentence of its own
     for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
         if (name, value) not in (("form", "auto"), ("form", "table")):
@@ -92,14 +82,8 @@ def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] 
 def read_flow(path: str | Path) -> Samples:
     """Read and check a flow file.
 
-    Args:
-        path: CSV with the columns `time_s` and `flow_mm_s`; `#` starts a comment line.
-
     Returns:
         Times, s, and velocities, m/s, (n, 2).
-
-    Raises:
-        InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
     found = read_series(path, _WHAT, _LIMITS, _LARGEST)
     return np.array(found) * (1.0, 1e-3)

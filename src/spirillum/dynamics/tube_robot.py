@@ -20,8 +20,6 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
 
-__all__ = ["FRICTION_COEFFICIENT", "Surroundings", "TubeRobot", "tube_robot"]
-
 FRICTION_COEFFICIENT = 0.1
 """Coefficient of dry friction mu_c where none is given. Assumed: with a lubricant between asperities it is 0.05 to 0.15
 (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950); a range to try is 0 to 0.3."""
@@ -99,9 +97,6 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
         around: tube ends, flow, roughness and dry friction.
         turn: time of a turn of the tail at its steady rate, s.
         weight: with weight and buoyancy, if the robot's masses are known.
-
-    Raises:
-        InputError: for a robot without a channel.
     """
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:

@@ -34,8 +34,6 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ENDS", "series_in_tube", "tube_run"]
-
 ENDS = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed flow"}
 """Ends of the channel in words."""
 
@@ -77,10 +75,6 @@ def tube_run(
         Dataset over `time`, as of a free run, with `offset`, `azimuth` (unwrapped), `wall_pitch`, `wall_yaw`,
         `wall_gap` (of the body), `tail_gap`, contact forces and energy, mean flow and its work. The attribute
         `checkpoint` is what it can be continued from.
-
-    Raises:
-        InputError: for a start at which something cuts into the wall, outside the table, or a run that cannot be
-            continued.
     """
     reach = reach_of(steady.robot)
     before: tuple[Event, ...] = ()
@@ -144,11 +138,7 @@ def _waited(
 
 
 def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
-    """Where a run can be continued.
-
-    Raises:
-        InputError: if it holds no checkpoint, or one that is not of its end.
-    """
+    """Where a run can be continued."""
     allowed = "allowed: a run in a tube as `spirillum simulate` wrote it"
     try:
         found = Checkpoint(**json.loads(str(dataset.attrs.get("checkpoint", ""))))

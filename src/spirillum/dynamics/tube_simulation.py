@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.earlier_run import earlier_run, weight_words
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.table_check import held_against_check, held_by_friction
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
-from spirillum.dynamics.tube_run import tube_run
+from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
@@ -25,7 +27,7 @@ from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
@@ -34,7 +36,107 @@ from spirillum.units import show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_in_tube", "links_in_tube", "run_in_tube"]
+
+def earlier_run(
+    path: str | Path, steady: Prediction, table: TubeTable, links: TubeRobot, switches: Sequence[Switch]
+) -> xr.Dataset:
+    """The run in a file that another one continues.
+
+    Args:
+        path: the file.
+        steady: the robot as it is now, with friction and drive.
+        table: its table.
+        links: what its rates in the tube follow from now.
+        switches: every switching of the remote, the first at 0.
+    """
+    found = open_run(path)
+    name, own, other = steady.robot.name, table.key, str(found.attrs.get("table", ""))
+    if other != own:
+        what = "no run in a tube" if not other else f"a run of another robot, tube or version than {name}'s"
+        raise InputError(f"in_tube.continued = {str(path)[:80]}: {what}; allowed: an earlier run of this robot")
+    for needed in ("time", "azimuth", "body_angle", "tail_phase", "tail_angle"):
+        numbers_of(found, needed)
+    if not found.sizes.get("time"):
+        raise InputError(f"in_tube.continued = {str(path)[:80]} has no samples; allowed: an earlier run of this robot")
+    if changed := _changed(found, steady, links) or _switched_otherwise(found, switches):
+        raise InputError(
+            f"in_tube.continued = {str(path)[:80]} is a run with {changed}; allowed: all as in that run, which is "
+            "continued as if it had not ended"
+        )
+    return found
+
+
+def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
+    """What was otherwise in an earlier run: there, and now; empty where nothing was."""
+    end = float(numbers_of(before, "time")[-1])
+    flow = float(np.interp(end, *links.flow.T))
+    weight = weight_words(links)
+    pairs: dict[str, tuple[str | float, str | float]] = {
+        "ends": (str(before.attrs.get("ends", "")), ENDS[float(links.tube[kernel.ENDS])]),
+        "friction": (str(before.attrs.get("friction", "")), steady.friction),
+        "weight": (str(before.attrs.get("weight", weight)), weight),
+        "roughness": (_number(before, "roughness"), links.roughness),
+        "friction coefficient": (_number(before, "friction_coefficient"), float(links.tube[kernel.COEFFICIENT])),
+    }
+    if pairs["ends"] == (ENDS[kernel.IMPOSED],) * 2:
+        pairs["mean flow at its end"] = (float(numbers_of(before, "mean_flow")[-1]), flow)
+    for what, (then, now) in pairs.items():
+        if not _alike(then, now):
+            return f"{what} {_said(then)}, and not {_said(now)}"
+    fields = _other_fields(robot_of(before).model_dump(), steady.robot.model_dump())
+    return f"another {fields[0]}" if fields else ""
+
+
+def weight_words(links: TubeRobot) -> str:
+    """Whether weight and buoyancy act on a robot, as a run's attribute `weight` says it."""
+    return "acts" if links.weight.any() else "left out"
+
+
+def _switched_otherwise(before: xr.Dataset, switches: Sequence[Switch]) -> str:
+    """The first sample of an earlier run at which the remote would now stand otherwise; empty where none is."""
+    times, then = numbers_of(before, "time"), numbers_of(before, "duty")
+    starts = np.array([switch.time for switch in switches])
+    now = np.array([switch.duty for switch in switches])[np.searchsorted(starts, times, side="right") - 1]
+    at_switch = np.any(np.isclose(times[:, None], starts, rtol=1e-9, atol=1e-9), axis=1)
+    other = np.flatnonzero((np.abs(then - now) > 1e-9) & ~at_switch & (times >= 0.0))
+    if not other.size:
+        return ""
+    first = other[0]
+    return f"duty {then[first]:.4g} at {times[first]:.4g} s, and not {now[first]:.4g}"
+
+
+def _alike(then: Any, now: Any) -> bool:
+    """Whether two values are the same, numbers to rounding."""
+    if isinstance(then, float) and isinstance(now, float):
+        return bool(np.isclose(then, now, rtol=1e-9, atol=1e-15, equal_nan=True))
+    return bool(then == now)
+
+
+def _said(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def _other_fields(then: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Dotted names of the fields in which two robots differ, but for rounding."""
+    found = []
+    for name, value in now.items():
+        old = then.get(name)
+        if isinstance(value, Mapping) and isinstance(old, Mapping):
+            found += _other_fields(old, value, f"{prefix}{name}.")
+        elif not _alike(old, value):
+            found.append(f"{prefix}{name}")
+    return found
+
+
+def _number(dataset: xr.Dataset, name: str) -> float:
+    """A number in a run's attributes."""
+    try:
+        return float(dataset.attrs[name])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the run has no number {name!r} among its attributes; allowed: a run by `simulate`"
+        ) from error
+
 
 _STARTS = ("gap", "eccentricity", "pitch", "yaw")
 """Fields of a placement that say where a robot is laid down."""
@@ -65,9 +167,6 @@ def run_in_tube(
         field: axis about which the field of a robot with a magnet turns.
         weight: let weight and buoyancy act, if the masses are known.
         progress: told what is being computed, how much is done, and of how much.
-
-    Raises:
-        InputError: for a tail that does not turn, or a place where the robot cannot lie.
     """
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
@@ -154,17 +253,7 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[str]:
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
-    """Refuse what a run in a tube cannot be told, before minutes go into a table.
-
-    Args:
-        robot: the robot.
-        placed: where it is laid down, ends, and a constant flow.
-        asked: azimuth, waiting time, dry friction, and a flow over time.
-        roughness: height of the asperities, m; None: 1e-4 of the body's radius.
-
-    Raises:
-        InputError: if there is something.
-    """
+    """Refuse what a run in a tube cannot be told, before minutes go into a table."""
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
@@ -180,11 +269,7 @@ def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: flo
 
 
 def _check_continued(placed: Placement, asked: InTube) -> None:
-    """Refuse another start of a run that begins where another one ended.
-
-    Raises:
-        InputError: if there is one.
-    """
+    """Refuse another start of a run that begins where another one ended."""
     given = {f"placement.{name}" for name in placed.model_fields_set if getattr(placed, name) is not None}
     given |= {f"in_tube.{name}" for name in asked.model_fields_set}
     for name in (*(f"placement.{field}" for field in _STARTS), "in_tube.azimuth", "in_tube.wait"):

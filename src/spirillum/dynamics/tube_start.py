@@ -14,10 +14,8 @@ from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import GAP_SHARE, Seat, largest_gap
+from spirillum.robot.tube_pose import GAP_SHARE, Seat, largest_gap
 from spirillum.units import show
-
-__all__ = ["StartPlace", "check_in_table", "check_roughness", "laid_down", "state_at"]
 
 
 @dataclass(frozen=True)
@@ -39,17 +37,7 @@ class StartPlace:
 
 
 def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
-    """The state of a robot at rest at a place, (19,).
-
-    Args:
-        robot: the robot.
-        links: what its rates follow from.
-        start: the place.
-
-    Raises:
-        InputError: if the robot does not fit there, touches deeper than the asperities are high, or lies outside the
-            table.
-    """
+    """The state of a robot at rest at a place, (19,)."""
     radius, a = float(links.tube[kernel.RADIUS]), 0.5 * robot.body.diameter
     if start.eccentricity is not None:
         state = state_at(start, start.eccentricity * (radius - a))
@@ -72,9 +60,6 @@ def check_roughness(roughness: float, gap: float, diameter: float) -> None:
         roughness: height of the asperities, m.
         gap: smallest gap of the robot at its start, m.
         diameter: of its body, m.
-
-    Raises:
-        InputError: for such asperities.
     """
     if roughness < THINNEST_GAP * diameter:
         raise InputError(
@@ -89,11 +74,7 @@ def check_roughness(roughness: float, gap: float, diameter: float) -> None:
 
 
 def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
-    """Refuse a start that the table does not hold.
-
-    Raises:
-        InputError: if it lies outside.
-    """
+    """Refuse a start that the table does not hold."""
     if outside:
         gap = float(links.gaps(state).min())
         raise InputError(

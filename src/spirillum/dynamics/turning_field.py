@@ -14,8 +14,6 @@ from spirillum.kernels import rigid_links
 from spirillum.robot.arguments import Options
 from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 
-__all__ = ["Field", "TurningField", "in_tilted_field"]
-
 _A = TypeVar("_A", bound=Acting)
 
 
@@ -89,9 +87,6 @@ def in_tilted_field(links: _A, asked: Field) -> _A:
     Args:
         links: what its rates follow from.
         asked: yaw and pitch of the axis; what is not given is 0.
-
-    Raises:
-        InputError: for another drive, or a rate or strength, which are the robot's own.
     """
     given = asked.model_dump(exclude_none=True)
     if not given:

@@ -22,8 +22,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
-__all__ = ["TwoLinks", "two_links"]
-
 
 @dataclass(frozen=True)
 class TwoLinks(Acting):

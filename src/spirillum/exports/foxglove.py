@@ -13,19 +13,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 
-__all__ = [
-    "SCHEMAS",
-    "cylinder",
-    "entity",
-    "nanoseconds",
-    "numbers_schema",
-    "place",
-    "pose_of",
-    "stamp",
-    "triangles",
-    "turn",
-]
-
 Json = dict[str, Any]
 _LATEST = 1e9
 """Latest time of a recording, s; seconds have 32 bits."""
@@ -77,20 +64,12 @@ SCHEMAS: Mapping[str, Json] = {
 
 
 def numbers_schema(meanings: Mapping[str, str]) -> Json:
-    """Schema of a message of plain numbers.
-
-    Args:
-        meanings: name of each number to what it is, with its unit.
-    """
+    """Schema of a message of plain numbers."""
     return _object(timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in meanings.items()})
 
 
 def nanoseconds(time: float) -> int:
-    """A time of a run, s, in whole nanoseconds.
-
-    Raises:
-        InputError: for a time that a recording cannot hold.
-    """
+    """A time of a run, s, in whole nanoseconds."""
     if not 0.0 <= time <= _LATEST:
         raise InputError(f"the run has something at {time:g} s; allowed: times from 0 to {_LATEST:g} s")
     return round(time * 1e9)

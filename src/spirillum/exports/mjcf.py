@@ -14,8 +14,6 @@ from spirillum.exports.urdf import numbers
 from spirillum.robot.links import Link, links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 
-__all__ = ["FLUID_WARNING", "check_inertia", "check_triangles", "mjcf_text"]
-
 FLUID_WARNING = (
     "MuJoCo's own fluid must stay off (density and viscosity 0): its model of ellipsoids gives a helix no thrust; "
     "the robot swims only if a program applies the forces of the resistance matrix at every step"
@@ -27,11 +25,7 @@ _STEP = 1e-4
 
 
 def check_inertia(robot: Robot) -> None:
-    """Both links are heavy enough for MuJoCo.
-
-    Raises:
-        InputError: if one is not.
-    """
+    """Both links are heavy enough for MuJoCo."""
     for name, link in zip(("body", "rotor"), links_of(robot), strict=True):
         least = min(link.mass, float(np.min(np.linalg.eigvalsh(link.inertia))))
         if not least > _LEAST:
@@ -43,11 +37,7 @@ def check_inertia(robot: Robot) -> None:
 
 
 def check_triangles(meshes: Iterable[MeshFile]) -> None:
-    """No mesh has more triangles than MuJoCo reads.
-
-    Raises:
-        InputError: if one has.
-    """
+    """No mesh has more triangles than MuJoCo reads."""
     most = max(meshes, key=lambda item: item.triangles)
     if most.triangles > _MOST_TRIANGLES:
         raise InputError(
@@ -64,9 +54,6 @@ def mjcf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: floa
         meshes: the mesh files.
         folder: where they lie, relative to the model.
         phase: phase of the tail at joint angle zero, rad.
-
-    Raises:
-        InputError: if a mesh has more triangles than MuJoCo reads.
     """
     files = list(meshes)
     check_triangles(files)

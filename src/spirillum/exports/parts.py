@@ -12,8 +12,6 @@ from spirillum.exports.solid import stl_bytes, united
 from spirillum.robot.mesh import STRIPE_COLOURS, RobotMesh
 from spirillum.robot.surface import Faces
 
-__all__ = ["MESH_SCALE", "MeshFile", "mesh_files"]
-
 MESH_SCALE = 1e-3
 """Mesh files are in mm: a program that merges vertices closer than some fixed length then spares a small robot."""
 

@@ -14,18 +14,12 @@ from spirillum.files import scratch_folder
 from spirillum.formats.vtk_image import add_comment
 from spirillum.robot.mesh import RobotMesh
 
-__all__ = ["vtp_bytes"]
-
 
 def vtp_bytes(pieces: Sequence[RobotMesh], attributes: Mapping[str, Any]) -> bytes:
     """All pieces as one surface; lengths in m.
 
     Cell arrays: `part` (0 body, 1 rotor), `piece` and `region` (numbers, named in the comment at the head of the
     file), `colour` (sRGB, 0 to 255).
-
-    Args:
-        pieces: of the robot.
-        attributes: what else the comment says, as JSON.
     """
     offset = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     points = np.concatenate([piece.vertices for piece in pieces])

@@ -13,23 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
-from spirillum.argument_kinds import as_number
+from spirillum.argument_validation import as_number
+from spirillum.display import DisplayMixin
 from spirillum.dynamics.poses import Poses, poses_of, rolled
 from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports import foxglove
-from spirillum.extras import required
 from spirillum.files import MARK, output_target, protected, whole_file
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.version import own_version
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["RECORDINGS", "Recording", "export_run"]
 
 RECORDINGS = {".mcap": "a recording for Foxglove"}
 """Endings of the files that can be written."""
@@ -48,7 +46,7 @@ Message = tuple[str, str, float, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Recording(Shown):
+class Recording(DisplayMixin):
     """What was written."""
 
     path: Path
@@ -94,7 +92,7 @@ def export_run(
     inputs = [run] if isinstance(run, (str, Path)) else []
     with protected(*inputs, film):
         target = output_target(path, RECORDINGS, "run.mcap")
-    required("mcap", "a recording in the format MCAP", "control")
+    import_optional("mcap", "a recording in the format MCAP", "control")
     dataset = open_run(run) if isinstance(run, (str, Path)) else run
     robot = robot_of(dataset)
     poses = poses_of(dataset)
@@ -233,7 +231,7 @@ def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[
     """Frames of a film while the run lasts."""
     from spirillum.vision.video.frames import open_video
 
-    pictures = required("PIL.Image", "a film in a recording", "video")
+    pictures = import_optional("PIL.Image", "a film in a recording", "video")
     for frame in open_video(film).frames():
         time = start + speed * frame.time
         if time > end + 1e-9:

@@ -6,16 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.links import Link, links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
-
-__all__ = ["FULL_MODELS", "joint_friction", "sidecar_of"]
 
 FULL_MODELS = tuple(name for name, model in SWIMMER_MODELS.items() if not (model.axial_only or model.placed))
 """Models that give the whole 12x12 matrix in unbounded fluid, for any motion of the robot."""
@@ -53,9 +51,6 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
         robot: a checked robot.
         model: `rft` or `slender`.
         phase: phase of the tail at joint angle zero, rad.
-
-    Raises:
-        InputError: for another model, or a robot outside the model's domain.
     """
     resistance = _resistance(robot, model)
     links = links_of(robot)
@@ -83,11 +78,7 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
 
 
 def _resistance(robot: Robot, model: str) -> _Resistance:
-    """The resistance by a model that knows all of it.
-
-    Raises:
-        InputError: for another model, or a robot outside the model's domain.
-    """
+    """The resistance by a model that knows all of it."""
     chosen = find_swimmer_model(model)
     if model not in FULL_MODELS:
         raise InputError(

@@ -13,8 +13,6 @@ from spirillum.files import MARK
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.surface import Faces, mass_properties
 
-__all__ = ["UnitedBody", "is_watertight", "is_watertight_file", "stl_bytes", "united"]
-
 _TRIANGLE = 900.0
 """Memory of a triangle while pieces are united, bytes."""
 _MERGED = (1e-6, 1e-5, 1e-4)
@@ -45,14 +43,7 @@ class UnitedBody(NamedTuple):
 
 
 def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
-    """The union of closed pieces; what lies inside another piece is gone.
-
-    Args:
-        pieces: pieces that overlap where they are joined.
-
-    Raises:
-        InputError: for more triangles than fit into memory.
-    """
+    """The union of closed pieces; what lies inside another piece is gone."""
     from manifold3d import Manifold, Mesh64, OpType
 
     chosen = list(pieces)
@@ -77,20 +68,12 @@ def is_watertight(vertices: Samples, faces: Faces) -> bool:
     """Whether each edge belongs to two triangles that run along it in opposite directions.
 
     Vertices at the same place in single precision count as one, as a reader of the file has to take them.
-
-    Args:
-        vertices: (n, 3).
-        faces: (m, 3).
     """
     return _is_closed(vertices.astype(np.float32), faces)
 
 
 def is_watertight_file(data: bytes) -> bool:
-    """Whether an STL file is watertight as programs read it: in single precision, close vertices taken as one.
-
-    Args:
-        data: of `stl_bytes`.
-    """
+    """Whether an STL file is watertight as programs read it: in single precision, close vertices taken as one."""
     corners = np.frombuffer(data, _RECORD, offset=_HEAD + 4)["corners"].reshape(-1, 3).astype(float)
     faces = np.arange(len(corners)).reshape(-1, 3)
     grids = (np.floor(corners / _READ_AS_ONE + shift) for shift in (0.0, 0.5))  # a program rounds one way or the other

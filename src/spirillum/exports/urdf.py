@@ -12,8 +12,6 @@ from spirillum.exports.sidecar import joint_friction
 from spirillum.robot.links import Link, links_of
 from spirillum.robot.robot import Robot
 
-__all__ = ["numbers", "urdf_text"]
-
 
 def urdf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
     """The description; lengths in m, the origin of both links on the motor axis at the body's mid-length.

@@ -3,30 +3,200 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from spirillum.answer import as_json, envelope, quantity
+import numpy as np
+
+from spirillum.display import DisplayMixin
 from spirillum.dynamics.held_model import PARAMETERS, HeldModel, check_steady, held_model
+from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError
-from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check_masses, contents_of, printable_solid
-from spirillum.exports.mjcf import FLUID_WARNING
+from spirillum.exports.mjcf import FLUID_WARNING, check_inertia, mjcf_text
+from spirillum.exports.parts import mesh_files
+from spirillum.exports.polydata import vtp_bytes
 from spirillum.exports.sidecar import sidecar_of
-from spirillum.exports.solid import is_watertight, is_watertight_file
-from spirillum.files import output_folder, output_target, protected, whole_files
+from spirillum.exports.solid import UnitedBody, is_watertight, is_watertight_file, stl_bytes, united
+from spirillum.exports.urdf import urdf_text
+from spirillum.files import MARK, output_folder, output_target, protected, whole_files
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
+from spirillum.robot.surface import corner_normals
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Export", "Written", "export"]
+_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+"""glTF's y points up, where ours is z."""
+_CREASE = np.deg2rad(40.0)
+"""Angle between triangles above which an edge stays sharp, rad."""
+_METAL = {"shaft": 0.9, "coupling": 0.9, "stub": 0.9, "arm": 0.9, "tail": 0.9}
+
+
+def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
+    """A scene with the nodes robot, body and rotor, in metres; turning rotor about its x axis turns the tail.
+
+    Args:
+        name: of the robot.
+        pieces: at phase 0 of the tail.
+        phase: phase of the tail, rad, to which the node of the rotor is turned.
+    """
+    from trimesh import Scene, Trimesh
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    cos, sin = np.cos(phase), np.sin(phase)
+    turned = np.eye(4)
+    turned[1:3, 1:3] = [[cos, -sin], [sin, cos]]
+    scene = Scene(base_frame="world")
+    scene.graph.update(frame_from="world", frame_to="robot", matrix=_Y_UP)
+    scene.graph.update(frame_from="robot", frame_to="body", matrix=np.eye(4))
+    scene.graph.update(frame_from="robot", frame_to="rotor", matrix=turned)
+    for piece in pieces:
+        normals = corner_normals(piece.vertices, piece.faces, _CREASE)
+        for index, region in enumerate(piece.regions):
+            chosen = piece.region == index
+            if not chosen.any():
+                continue
+            corners = np.concatenate([piece.vertices[piece.faces[chosen]], normals[chosen]], axis=-1).reshape(-1, 6)
+            unique, faces = np.unique(corners.astype(np.float32), axis=0, return_inverse=True)
+            colour = _linear(piece.colours[chosen][0])
+            material = PBRMaterial(
+                name=region,
+                baseColorFactor=[*np.round(255.0 * colour).astype(np.uint8), 255],
+                metallicFactor=_METAL.get(piece.name, 0.0),
+                roughnessFactor=0.45,
+            )
+            label = f"{piece.name}: {region}" if len(piece.regions) > 1 else piece.name
+            surface = Trimesh(
+                unique[:, :3],
+                faces.reshape(-1, 3),
+                vertex_normals=unique[:, 3:],
+                visual=TextureVisuals(material=material),
+                process=False,
+            )
+            scene.add_geometry(surface, node_name=f"{label} surface", geom_name=label, parent_node_name=piece.part)
+    scene.metadata |= {"robot": name, "unit": "m", "axes": "robot: x forward (nose), z up; joint: x axis of rotor"}
+    return bytes(scene.export(file_type="glb", include_normals=True, tree_postprocessor=_signed))
+
+
+def _linear(colour: np.ndarray) -> np.ndarray:
+    """Linear light from sRGB, both 0 to 1 (IEC 61966-2-1)."""
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+
+
+def _signed(tree: dict[str, Any]) -> None:
+    tree["asset"]["generator"] = MARK
+
+
+KINDS_OF_FILES = {
+    ".stl": "one closed body for a 3D printer",
+    ".glb": "a coloured scene",
+    ".vtp": "a surface for ParaView",
+    ".urdf": "a robot description",
+    ".mjcf": "a MuJoCo model",
+    ".xml": "a MuJoCo model",
+    ".fmu": "a co-simulation unit (FMI 3.0)",
+}
+"""Endings of the files that can be written."""
+STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
+"""Units of STL files, m."""
+
+
+class ExportFile(NamedTuple):
+    """One file."""
+
+    data: bytes
+    """Its bytes."""
+    holds: str
+    """What it holds, in words."""
+
+
+def check_masses(robot: Robot, target: Path) -> None:
+    """The masses that a robot description needs are known."""
+    for table, name in (("body", "mass"), ("tail", "density")):
+        if getattr(getattr(robot, table), name) is None:
+            raise InputError(
+                f"{robot.name}: {table}.{name} is missing; allowed: body.mass and tail.density, from which "
+                f"{target.suffix} takes masses and inertias"
+            )
+    if target.suffix != ".urdf":
+        check_inertia(robot)
+
+
+def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: float) -> dict[str, ExportFile]:
+    """Files by name relative to the target's folder, the target first; an STL file is `printable_solid`.
+
+    Args:
+        robot: a checked robot.
+        target: its ending is the format.
+        pieces: surfaces of the robot; at phase 0 but for `.vtp`.
+        phase: phase of the tail, rad.
+    """
+    holds = f"{KINDS_OF_FILES[target.suffix]}, in m"
+    if target.suffix == ".glb":
+        return {target.name: ExportFile(glb_bytes(robot.name, pieces, phase), holds)}
+    if target.suffix == ".vtp":
+        return {target.name: ExportFile(vtp_bytes(pieces, {"robot": robot.name, "phase": phase}), holds)}
+    folder, meshes = f"{target.stem}-meshes", mesh_files(pieces)
+    text = urdf_text if target.suffix == ".urdf" else mjcf_text
+    found = {target.name: ExportFile(text(robot, meshes, folder, phase).encode(), holds)}
+    for mesh in meshes:
+        kind = "closed body of the whole part" if mesh.colour is None else "surface to look at"
+        found[f"{folder}/{mesh.name}.stl"] = ExportFile(mesh.data, f"{mesh.part}: {kind}, in mm")
+    return found
+
+
+def printable_solid(
+    robot: Robot, pieces: Sequence[RobotMesh], unit: str | None
+) -> tuple[ExportFile, dict[str, Any], list[str]]:
+    """An STL file of the whole robot, the numbers of its solid, and what to be careful about.
+
+    Args:
+        robot: a checked robot.
+        pieces: its surfaces.
+        unit: of the file, a key of `STL_UNITS`; None: mm, or um where the file would not be watertight in mm.
+    """
+    body = united(pieces)
+    files = {name: _stl_of(robot, body, name) for name in ([unit] if unit else ["mm", "um"])}
+    chosen = next((name for name, data in files.items() if is_watertight_file(data)), next(iter(files)))
+    watertight = is_watertight_file(files[chosen])
+    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    found = {
+        "unit": chosen,
+        "triangles": len(body.faces),
+        "bodies": body.bodies,
+        "watertight": watertight,
+        "volume": quantity(body.volume, "m^3"),
+        "size": quantity(high - low, "m"),
+    }
+    return ExportFile(files[chosen], f"{KINDS_OF_FILES['.stl']}, in {chosen}"), found, _cautions(robot, body, found)
+
+
+def _stl_of(robot: Robot, body: UnitedBody, unit: str) -> bytes:
+    return stl_bytes(body.vertices / STL_UNITS[unit], body.faces, f"{robot.name}, unit {unit}")
+
+
+def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[str]:
+    """Why a program may refuse an STL file, a sentence each."""
+    unit = found["unit"]
+    sentences = []
+    if found["bodies"] != 1:
+        sentences.append(f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it")
+    if not found["watertight"]:
+        better = next((name for name in STL_UNITS if is_watertight_file(_stl_of(robot, body, name))), None)
+        remedy = f"use --unit {better}" if better else "repair it before printing"
+        sentences.append(
+            f"the STL file is not watertight in {unit}: programs that read it merge vertices closer than 1e-8 {unit}; "
+            f"{remedy}"
+        )
+    return sentences
+
 
 _DESCRIPTIONS = (".urdf", ".mjcf", ".xml")
 
@@ -42,7 +212,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Export(Shown):
+class Export(DisplayMixin):
     """What was written, and the numbers of its geometry."""
 
     robot: Robot
@@ -174,7 +344,7 @@ def _shape_of(
         contents = contents_of(robot, target, pieces, angle)
     if beside:
         holds = "masses, joint and 12x12 resistance"
-        contents[f"{target.stem}.resistance.json"] = Content(as_json(beside).encode(), holds)
+        contents[f"{target.stem}.resistance.json"] = ExportFile(as_json(beside).encode(), holds)
     _commit(target, {name: content.data for name, content in contents.items()})
     files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
     cautions += [
@@ -212,11 +382,7 @@ def _equations(held: HeldModel) -> dict[str, Any]:
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:
-    """Make all files, then put them in place; the target itself comes last, so that what it refers to is there.
-
-    Raises:
-        InputError: if one of them cannot be written.
-    """
+    """Make all files, then put them in place; the target itself comes last, so that what it refers to is there."""
     target = target.resolve()
     final = {target if name == target.name else target.parent / name: data for name, data in contents.items()}
     for folder in dict.fromkeys(path.parent for path in final):

@@ -11,41 +11,29 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.fluid_field import FluidField
-from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
+from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.domain import seat_of
 from spirillum.quantities import unit_of
 from spirillum.robot.load import load
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import Seat
-from spirillum.shown import Shown
-from spirillum.swimming.loading import prepared
+from spirillum.robot.tube_pose import Seat
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.robot_preparation import prepared
 from spirillum.units import KINDS, Kind, parse_option
 from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "FLOW_MODELS",
-    "PLANE_RESOLUTION",
-    "VOLUME_RESOLUTION",
-    "Flow",
-    "Frame",
-    "box_around",
-    "flow",
-    "plane_around",
-    "seat_in_tube",
-]
 
 FLOW_MODELS = ("slender", "tube")
 """The models whose tractions give a flow: in unbounded fluid, and in the channel."""
@@ -57,7 +45,7 @@ PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
 
 
 @dataclass(frozen=True)
-class Flow(Shown):
+class Flow(DisplayMixin):
     """The fluid around a swimming robot at one phase of its tail.
 
     SI; axes of the body, origin at its mid-length on the motor axis, x forward. The body's frame moves with the
@@ -220,7 +208,7 @@ class Flow(Shown):
         """
         return self._on(box_around(self.robot, extent, resolution, self.seat), progress)
 
-    def _on(self, grid: Grid, progress: Progress | None) -> xr.Dataset:
+    def _on(self, grid: PointGrid, progress: Progress | None) -> xr.Dataset:
         dataset = dataset_on(grid, self.inside, self.fields, self.frame, progress, self.seat)
         return dataset.assign_attrs(_attributes(self))
 
@@ -289,11 +277,7 @@ def flow(
 
 
 def _choice(model: str, robot: Robot, placement: Placement | Mapping[str, Any] | None) -> ModelChoice:
-    """One of `FLOW_MODELS`, and why it is taken.
-
-    Raises:
-        InputError: for another one.
-    """
+    """One of `FLOW_MODELS`, and why it is taken."""
     allowed = (AUTO, *FLOW_MODELS)
     if model not in allowed:
         raise InputError(
@@ -333,9 +317,6 @@ def seat_in_tube(
         model: `slender`, `tube` or `auto`.
         placement: where in the channel the robot lies.
         resolution: of the models; None: the robot's own.
-
-    Raises:
-        InputError: for wrong input, or a robot outside the domain of `tube`.
     """
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
@@ -350,12 +331,8 @@ def plane_around(
     extent: str | float | None = None,
     resolution: int = PLANE_RESOLUTION,
     seat: Seat | None = None,
-) -> Grid:
-    """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it.
-
-    Raises:
-        InputError: for an unknown plane, a wrong length, or a grid too small or too large.
-    """
+) -> PointGrid:
+    """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     plane = "".join(sorted(str(plane)))
     if plane not in PLANES:
         raise InputError(f"plane = {plane!r}{did_you_mean(str(plane), PLANES)}; allowed: {', '.join(PLANES)}")
@@ -368,12 +345,8 @@ def box_around(
     extent: str | float | None = None,
     resolution: int = VOLUME_RESOLUTION,
     seat: Seat | None = None,
-) -> Grid:
-    """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it.
-
-    Raises:
-        InputError: for a wrong length, or a grid too small or too large.
-    """
+) -> PointGrid:
+    """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     return volume_grid(robot, _margin(extent), resolution, seat)
 
 

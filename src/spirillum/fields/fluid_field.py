@@ -13,8 +13,6 @@ from spirillum.fluid.wire.revolution import Panels
 from spirillum.fluid.wire.stokeslets import Wire
 from spirillum.robot.outline import Outline
 
-__all__ = ["FluidField", "add_tractions", "checked_points", "name_parts"]
-
 _FARTHEST = 1e9
 
 
@@ -83,11 +81,7 @@ class FluidField(ABC):
 
 
 def checked_points(points: Samples) -> Samples:
-    """Points as floats, (n, 3).
-
-    Raises:
-        InputError: if they have another shape, are not finite or lie too far away.
-    """
+    """Points as floats, (n, 3)."""
     try:
         places = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:

@@ -12,13 +12,11 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import Seat
+from spirillum.robot.tube_pose import Seat
 from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["PLANES", "Grid", "Progress", "dataset_on", "plane_grid", "volume_grid"]
 
 Progress = Callable[[str, int, int], None]
 PLANES = {"xz": "y", "xy": "z", "yz": "x"}
@@ -33,7 +31,7 @@ _WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
 
 
 @dataclass(frozen=True)
-class Grid:
+class PointGrid:
     """Evenly spaced points along x, y, z, m; an axis with one point is the place of a plane."""
 
     axes: tuple[Samples, Samples, Samples]
@@ -59,7 +57,7 @@ class Grid:
 
 def plane_grid(
     robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: Seat | None = None
-) -> Grid:
+) -> PointGrid:
     """A grid on one of `PLANES`.
 
     Args:
@@ -69,9 +67,6 @@ def plane_grid(
         margin: how far it reaches beyond the robot, m; None: a default.
         resolution: points along the longer side.
         seat: the robot's place in a tube, beyond whose glass there is no grid.
-
-    Raises:
-        InputError: if the grid would be too small or too large, or the plane lies outside the tube.
     """
     box, across = _box(robot, margin, seat), PLANES[plane]
     if seat is not None and across != "x":
@@ -85,7 +80,7 @@ def plane_grid(
     return _grid(sides, {across: np.array([offset])}, resolution, "resolution")
 
 
-def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> Grid:
+def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> PointGrid:
     """A grid in a box around the robot.
 
     Args:
@@ -93,9 +88,6 @@ def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat 
         margin: how far it reaches beyond the robot, m; None: a default.
         resolution: points along the longest side.
         seat: the robot's place in a tube, beyond whose glass there is no grid.
-
-    Raises:
-        InputError: if the grid would be too small or too large.
     """
     return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
 
@@ -142,7 +134,7 @@ def _glass(ends: tuple[float, float], seat: Seat, reach: float) -> dict[str, tup
     return glass
 
 
-def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> Grid:
+def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> PointGrid:
     if not 2 <= resolution <= _LARGEST_RESOLUTION:
         raise InputError(
             f"{name} = {resolution}; allowed: 2 to {_LARGEST_RESOLUTION} points along the grid's longest side"
@@ -158,7 +150,7 @@ def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolu
         )
     even = {axis: _even(0.5 * (low + high), spacing, counts[axis]) for axis, (low, high) in box.items()}
     x, y, z = ({**even, **fixed}[axis] for axis in _AXES)
-    return Grid((x, y, z))
+    return PointGrid((x, y, z))
 
 
 def _sizes(box: dict[str, tuple[float, float]], resolution: int) -> tuple[float, dict[str, int], int]:
@@ -175,7 +167,7 @@ def _even(centre: float, spacing: float, count: int) -> Samples:
 
 
 def dataset_on(
-    grid: Grid,
+    grid: PointGrid,
     inside: Callable[[Samples], np.ndarray],
     fields: Callable[[Samples], tuple[Samples, Samples]],
     frame: str,
@@ -224,7 +216,7 @@ def dataset_on(
     return xr.Dataset(data, coords=dict(_coordinates(grid)))
 
 
-def _coordinates(grid: Grid) -> Iterator[tuple[str, Any]]:
+def _coordinates(grid: PointGrid) -> Iterator[tuple[str, Any]]:
     along = {"x": "forward, from the body's mid-length", "y": "to the left", "z": "up"}
     for axis, places in zip(_AXES, grid.axes, strict=True):
         attributes = {"units": "m", "long_name": f"{axis}, {along[axis]}"}

@@ -26,9 +26,7 @@ from spirillum.fluid.tube.wall import waves_between
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
-from spirillum.robot.seat import Seat
-
-__all__ = ["TubeFlowField", "tube_flow_field"]
+from spirillum.robot.tube_pose import Seat
 
 _DECAY = 2.5
 """Rate, times the radius, at which the flow of a force at least dies out along the tube."""

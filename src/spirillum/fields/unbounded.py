@@ -9,20 +9,18 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.algebra import axis_rotation
-from spirillum.fluid.wire.interaction import Solution
+from spirillum.fluid.wire.interaction import UnitTwistSolution
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import robot_solution
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
-
-__all__ = ["FlowField", "flow_field"]
 
 
 @dataclass(frozen=True)
 class FlowField(FluidField):
     """Flow at one instant in fluid that is at rest far away."""
 
-    solution: Solution = field(repr=False)
+    solution: UnitTwistSolution = field(repr=False)
     """Tractions for unit twists, at phase 0."""
     solids: tuple[tuple[str, Outline], ...]
     """Names and outlines of the solids of revolution."""

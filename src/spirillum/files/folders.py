@@ -7,14 +7,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import as_json
+from spirillum.envelope import as_json
 from spirillum.errors import InputError
 from spirillum.files.locks import LEFTOVER, Busy, locked
 from spirillum.files.names import checked_path
 from spirillum.files.reading import read_json
 from spirillum.files.writing import output_folder, write_text
-
-__all__ = ["claim_folder", "results_folder"]
 
 
 @contextmanager

@@ -2,24 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "LARGEST_NETCDF",
-    "LARGEST_PICTURE",
-    "LARGEST_TABLE",
-    "LARGEST_TEXT",
-    "LONGEST_CELL",
-    "LONGEST_NAME",
-    "LONGEST_PATH",
-    "MOST_CELLS",
-    "MOST_COLUMNS",
-    "MOST_IMAGES",
-    "MOST_LEVELS",
-    "MOST_PIXELS",
-    "MOST_ROWS",
-    "MOST_VARIABLES",
-    "SMALLEST_SIDE",
-]
-
 LARGEST_TEXT = 1 << 20
 """Robot, study, setup and calibration files, and marks of folders, bytes."""
 MOST_LEVELS = 24

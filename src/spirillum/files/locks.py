@@ -15,8 +15,6 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["LEFTOVER", "Busy", "locked", "private_folder", "scratch_folder", "sweep"]
-
 LEFTOVER = ".spirillum-part-"
 """Beginning of the names of hidden folders in which files are made before they take their place."""
 _TRIES = 20
@@ -82,9 +80,6 @@ def _is_at(handle: int | None, folder: Path) -> bool:
 def locked(folder: Path) -> Iterator[None]:
     """Keep a folder for this process while the block runs; leftovers of dead runs in it are removed.
 
-    Args:
-        folder: made if it is not there; links to it are followed.
-
     Raises:
         Busy: if another run is writing there.
         OSError: if it is no folder, or cannot be made or read.
@@ -141,12 +136,7 @@ def scratch_folder() -> AbstractContextManager[Path]:
 
 
 def sweep(parent: Path, *, again: bool = False) -> None:
-    """Remove what killed runs of this user have left in a folder, once for each folder and process.
-
-    Args:
-        parent: the folder.
-        again: look even if it was looked at before.
-    """
+    """Remove what killed runs of this user have left in a folder, once for each folder and process."""
     if sys.platform == "win32" or (parent in _swept and not again):
         return
     _swept.add(parent)

@@ -10,8 +10,6 @@ from pathlib import Path
 from spirillum.errors import InputError
 from spirillum.files.limits import LONGEST_NAME, LONGEST_PATH
 
-__all__ = ["checked_path", "file_name", "is_text", "text_cell"]
-
 _LONGEST_NAME = 100
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
 _FORMULAS = ("=", "+", "-", "@")

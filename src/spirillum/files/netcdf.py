@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import h5py
     import xarray as xr
 
-__all__ = ["loaded_netcdf", "netcdf_file", "open_netcdf", "write_dataset"]
-
 _BEGINS = b"\x89HDF\r\n\x1a\n"
 _DEEPEST = 6
 _LONGEST_TEXTS = 64 << 20
@@ -165,11 +163,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:
-    """Walk through all groups without reading a value.
-
-    Raises:
-        InputError: if there is too much, or something that no NetCDF file has.
-    """
+    """Walk through all groups without reading a value."""
     import h5py
 
     ahead: list[tuple[h5py.Group, int]] = [(stored, 0)]

@@ -36,10 +36,6 @@ def with_plain_numbers(rows: Sequence[Sequence[str]], separator: str) -> list[li
 
     Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabs
     separate, or some comma that cannot mark thousands. No number may have a point then. Else they stay.
-
-    Args:
-        rows: cells.
-        separator: the character between columns.
     """
     found = [[cell if cell.isascii() else _with_plain_minus(cell) for cell in cells] for cells in rows]
     with_comma = [cell for cells in found for cell in cells if "," in cell and _WITH_COMMA.fullmatch(cell)]

@@ -20,25 +20,6 @@ from spirillum.errors import InputError
 from spirillum.files.locks import LEFTOVER, private_folder
 from spirillum.files.names import checked_path
 
-__all__ = [
-    "MARK",
-    "PICTURES",
-    "Replace",
-    "check_replaceable",
-    "holds_own_only",
-    "is_own",
-    "netcdf_target",
-    "new_file",
-    "output_folder",
-    "output_target",
-    "protected",
-    "synced",
-    "whole_file",
-    "whole_files",
-    "whole_folder",
-    "write_text",
-]
-
 PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""
 MARK = "written by spirillum"
@@ -205,11 +186,7 @@ def whole_files(
 
 @contextmanager
 def _named(temporary: Mapping[Path, Path]) -> Iterator[None]:
-    """Say want of space of the file that is being made, for a user does not know the hidden ones.
-
-    Args:
-        temporary: files, and the hidden ones in their places.
-    """
+    """Say want of space of the file that is being made, for a user does not know the hidden ones."""
     try:
         yield
     except OSError as error:

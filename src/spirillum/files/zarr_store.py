@@ -23,17 +23,6 @@ from spirillum.files.writing import synced
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Stored",
-    "chunk_key",
-    "is_whole",
-    "opened_store",
-    "region_files",
-    "store_files",
-    "store_target",
-    "write_pieces",
-]
-
 _SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "async.concurrency": 1}
 _LEVEL = 1
 """Of compression: faster than a disk, and floats gain nothing from more."""

@@ -23,27 +23,10 @@ from spirillum.robot.fields import (
     TorqueConstant,
     Viscosity,
 )
-from spirillum.robot.options import Calibration, known_model
+from spirillum.robot.model_options import Calibration, known_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
-
-__all__ = [
-    "CalibrationFile",
-    "FittedContact",
-    "FittedFriction",
-    "FittedPlace",
-    "FittedValues",
-    "Provenance",
-    "calibrated_contact",
-    "calibrated_placement",
-    "calibrated_robot",
-    "friction_of_tails",
-    "nearest_channel",
-    "placement_in",
-    "read_calibration",
-    "with_calibration",
-]
 
 _WHAT = "a calibration file (TOML with [calibration.<model>] tables)"
 _SAME = 1e-6
@@ -193,11 +176,7 @@ class CalibrationFile(Section):
 
 
 def read_calibration(path: str | Path) -> CalibrationFile:
-    """Read and check a calibration file.
-
-    Raises:
-        InputError: if it cannot be read or a field is wrong.
-    """
+    """Read and check a calibration file."""
     table = read_toml(Path(path), _WHAT)
     checked = problems_in(CalibrationFile, table)
     if not isinstance(checked, list):
@@ -215,9 +194,6 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
     Args:
         robot: a checked robot.
         path: TOML file with `[calibration.<model>]` tables, as in a robot file, or as `spirillum calibrate` writes it.
-
-    Raises:
-        InputError: if the file cannot be read or a field is wrong.
     """
     return calibrated_robot(robot, read_calibration(path))
 
@@ -243,12 +219,7 @@ def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
 
 
 def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[float | None, tuple[float, ...]]:
-    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in its channel.
-
-    Args:
-        robot: the robot; open, or without motor, it has none.
-        entries: B_eff, tail by tail.
-    """
+    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in its channel."""
     if robot.channel is None or robot.motor is None or not entries:
         return None, ()
     diameter = robot.channel.diameter
@@ -258,20 +229,12 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
 
 
 def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
-    """Where a calibration file places a robot in its channel; None where it says nothing of that channel.
-
-    Raises:
-        InputError: if the file cannot be read or a field is wrong.
-    """
+    """Where a calibration file places a robot in its channel; None where it says nothing of that channel."""
     return placement_in(read_calibration(path), robot)
 
 
 def calibrated_contact(path: str | Path | None) -> FittedContact:
-    """Roughness and dry friction of a calibration file; nothing without one.
-
-    Raises:
-        InputError: if the file cannot be read or a field is wrong.
-    """
+    """Roughness and dry friction of a calibration file; nothing without one."""
     return FittedContact() if path is None else read_calibration(path).contact
 
 

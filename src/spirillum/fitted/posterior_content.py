@@ -8,8 +8,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Json
 
 from spirillum.fluid.registry import SWIMMER_MODELS
 
-__all__ = ["Content"]
-
 _Length = Annotated[float, Field(gt=1e-9, lt=1e3)]
 _Number = Annotated[float, Field(gt=-1e12, lt=1e12)]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -71,7 +69,7 @@ class _Robot(_Table):
     body: _Body
 
 
-class Content(_Table):
+class PosteriorAttributes(_Table):
     """Attributes of a posterior's file."""
 
     model: Annotated[str, AfterValidator(_fitted_model)]
@@ -87,7 +85,7 @@ class Content(_Table):
     tails: Json[Annotated[tuple[_Tail, ...], Field(max_length=100_000)]] = ()
 
     @classmethod
-    def of(cls, attributes: dict[str, Any]) -> Content:
+    def of(cls, attributes: dict[str, Any]) -> PosteriorAttributes:
         """Attributes as they were read.
 
         Raises:

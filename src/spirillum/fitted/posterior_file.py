@@ -24,15 +24,13 @@ from spirillum.fitted.calibration_file import (
     friction_of_tails,
     nearest_channel,
 )
-from spirillum.fitted.posterior_content import Content
-from spirillum.robot.options import Calibration, FittedTo
+from spirillum.fitted.posterior_content import PosteriorAttributes
+from spirillum.robot.model_options import Calibration, FittedTo
 from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["SCHEMA", "PosteriorFile", "posterior_checksum", "read_posterior", "write_posterior"]
 
 SCHEMA = "spirillum.posterior/1"
 _DRAWS = 1000
@@ -274,12 +272,7 @@ def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generato
 
 
 def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Samples]) -> str:
-    """Checksum over a posterior's draws and all that its file says of them.
-
-    Args:
-        attributes: attributes of the file; its checksum is left out.
-        values: draws by label.
-    """
+    """Checksum over a posterior's draws and all that its file says of them."""
     found = hashlib.sha256()
     for name in sorted(set(attributes) - {"checksum"}):
         found.update(f"{name}={attributes[name]}\n".encode(errors="surrogatepass"))
@@ -297,15 +290,7 @@ def _possible(name: str, values: Samples) -> bool:
 
 
 def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
-    """Read a posterior that a calibration has written.
-
-    Args:
-        path: the file.
-        models: models that are asked, of which it has to be one; none: any.
-
-    Raises:
-        InputError: if it is no such file, is damaged, has not converged, or is of another model.
-    """
+    """Read a posterior that a calibration has written."""
     path = Path(path)
     with open_netcdf(path, _WHAT) as file:
         attributes = {str(name): item for name, item in file.attrs.items()}
@@ -314,7 +299,7 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
         draws = group_of(file, "posterior")
         values = {str(name): np.asarray(item.values, float) for name, item in draws.data_vars.items()}
     try:
-        content = Content.of(attributes)
+        content = PosteriorAttributes.of(attributes)
         found = _read(path, content, values, hashlib.sha256(read_bytes(path, _WHAT, LARGEST_NETCDF)).hexdigest())
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         if isinstance(error, InputError):
@@ -333,7 +318,7 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     return found
 
 
-def _read(path: Path, content: Content, values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
+def _read(path: Path, content: PosteriorAttributes, values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
     flat = {name: array.reshape(-1) for name, array in values.items()}
     size = min(array.size for array in flat.values())
     kept = np.linspace(0, size - 1, min(size, _DRAWS)).round().astype(int)
@@ -370,12 +355,7 @@ def _read(path: Path, content: Content, values: Mapping[str, Samples], sha256: s
 
 
 def write_posterior(tree: xr.DataTree, path: Path) -> None:
-    """Write a posterior as NetCDF-4, whole or not at all.
-
-    Args:
-        tree: groups and attributes, see `spirillum.calibration.posterior_tree`.
-        path: the file.
-    """
+    """Write a posterior as NetCDF-4, whole or not at all."""
     from xarray.backends import H5NetCDFStore
 
     squeezed = {"zlib": True, "complevel": 4}

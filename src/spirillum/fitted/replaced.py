@@ -11,8 +11,6 @@ from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.robot.robot import Robot
 
-__all__ = ["check_kept", "check_not_replaced", "set_fields"]
-
 
 def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
     """Dotted names of the fields that overrides set, those of their tables one by one."""
@@ -37,9 +35,6 @@ def check_not_replaced(
         robot: the robot with them.
         calibration: calibration file; None without one.
         posterior: file of a posterior; None without one.
-
-    Raises:
-        InputError: for such a field, or a file that cannot be read.
     """
     asked = tuple(fields)
     if asked and calibration is not None:
@@ -49,17 +44,7 @@ def check_not_replaced(
 
 
 def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:
-    """Refuse set fields that are not the same in a robot before and after fitted values have replaced its own.
-
-    Args:
-        fields: dotted names of the fields that were set.
-        before: the robot with them.
-        after: the same robot with the fitted values.
-        source: file of the fitted values.
-
-    Raises:
-        InputError: for such a field.
-    """
+    """Refuse set fields that are not the same in a robot before and after fitted values have replaced its own."""
     asked = tuple(fields)
     if not asked or after is before:
         return

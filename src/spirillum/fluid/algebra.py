@@ -10,18 +10,6 @@ import numpy as np
 
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Vectors
 
-__all__ = [
-    "about_point",
-    "axial_entries",
-    "axis_rotation",
-    "both_parts",
-    "joint_locked",
-    "rotated",
-    "skew",
-    "transfer",
-    "two_parts_axial",
-]
-
 _AXIAL_BOTH = np.array([0, 3, 6, 9])
 
 

@@ -17,9 +17,7 @@ from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerR
 from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
-from spirillum.robot.options import ModelOptions
-
-__all__ = ["PARTS", "ResistanceModel", "SwimmerModel"]
+from spirillum.robot.model_options import ModelOptions
 
 PARTS = ("body", "coupling", "tail", "rotor", "robot")
 """Parts of a robot: body, coupling, the bare wire, coupling and wire together, and the whole with its joint locked."""

@@ -13,8 +13,6 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.placement import Placement
 
-__all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model", "quickest"]
-
 SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender(), Tube())}
 """Models that make a robot swim."""
 MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
@@ -22,26 +20,14 @@ MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
 
 
 def find_model(name: str) -> ResistanceModel:
-    """The model of that name.
-
-    Raises:
-        InputError: if there is none.
-    """
+    """The model of that name."""
     if str(name) not in MODELS:
         raise InputError(f"model = {name!r}{did_you_mean(str(name), MODELS)}; allowed: {', '.join(MODELS)}")
     return MODELS[name]
 
 
 def find_swimmer_model(name: str, *more: str) -> SwimmerModel:
-    """The model of that name that makes a robot swim.
-
-    Args:
-        name: of the model.
-        more: what is allowed where it was asked, besides the models.
-
-    Raises:
-        InputError: if there is none.
-    """
+    """The model of that name that makes a robot swim."""
     if str(name) not in SWIMMER_MODELS:
         allowed = [*more, *SWIMMER_MODELS]
         raise InputError(f"model = {name!r}{did_you_mean(str(name), allowed)}; allowed: {', '.join(allowed)}")
@@ -49,11 +35,7 @@ def find_swimmer_model(name: str, *more: str) -> SwimmerModel:
 
 
 def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
-    """The form of a model that answers first: `tube` from tables where they are, unless a resolution is asked for.
-
-    Raises:
-        InputError: where `model.tube.form` asks for a table that is not there, or for one with a resolution.
-    """
+    """The form of a model that answers first: `tube` from tables where they are, unless a resolution is asked for."""
     options = batch.options.tube
     if not isinstance(model, Tube) or options.form == "direct":
         return model
@@ -73,11 +55,7 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
 
 
 def check_placement(placement: Placement, *models: ResistanceModel) -> None:
-    """Refuse a placement in the channel that none of the models asks for.
-
-    Raises:
-        InputError: if something is placed and no model computes the walls.
-    """
+    """Refuse a placement in the channel that none of the models asks for."""
     if not placement.is_given or any(model.placed for model in models):
         return
     unset = type(placement)()

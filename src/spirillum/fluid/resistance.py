@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
@@ -18,13 +19,10 @@ from spirillum.fluid.registry import check_placement, find_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load, with_resolution
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.units import KINDS, parse_option
-
-__all__ = ["Resistance", "resistance"]
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
 _BOTH = "both"
@@ -33,7 +31,7 @@ _LINKS = ("body", "rotor")
 
 
 @dataclass(frozen=True)
-class Resistance(Shown):
+class Resistance(DisplayMixin):
     """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 
     robot: Robot

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
 from spirillum.kernels.colours import film_colours
-
-__all__ = ["ENCODERS", "H264Writer", "h264_writer"]
+from spirillum.optional_dependencies import import_optional
 
 ENCODERS = ("libx264", "libopenh264", "h264")
 """Encoders of H.264, best first; which are available depends on the build of PyAV."""
@@ -84,11 +82,8 @@ def h264_writer(
         tick: time base of the stamps, s; None: the duration of a frame.
         threads: of the encoder; their number changes the bytes of the file. 0: the encoder's choice.
         encoders: those that will do, the best first.
-
-    Raises:
-        InputError: if PyAV is missing, or has none of the encoders.
     """
-    av = required("av", "a film", extra)
+    av = import_optional("av", "a film", extra)
     av.logging.set_level(None)
     name = next((name for name in encoders if _is_there(av, name)), None)
     if name is None:

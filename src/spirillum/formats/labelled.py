@@ -13,8 +13,6 @@ from spirillum.files import netcdf_file
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Labelled", "Variable"]
-
 Variable: TypeAlias = tuple[tuple[str, ...], Any, Mapping[str, Any]]
 """Dimensions, values and attributes."""
 

@@ -8,14 +8,79 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.files import checked_path, csv_rows, read_text
-from spirillum.files.limits import LARGEST_TABLE, MOST_COLUMNS
+from spirillum.files import checked_path, csv_rows, opened, read_text
+from spirillum.files.limits import LARGEST_TABLE, LONGEST_CELL, MOST_CELLS, MOST_COLUMNS, MOST_ROWS
 from spirillum.files.numbers import number_hint, number_in
-from spirillum.formats.parquet import parquet_table
+from spirillum.optional_dependencies import installation_of
 
-__all__ = ["Row", "Table", "check_known", "check_present", "read_readings", "read_series", "read_table"]
+_BATCH = 4096
+
+
+def parquet_table(path: Path, what: str, largest: int = LARGEST_TABLE) -> list[tuple[int, list[str]]]:
+    """Header and rows as text, each with its number as it would stand in a CSV file: the header is line 1."""
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError as error:
+        raise InputError(f"{path} needs the package pyarrow; allowed: {installation_of('parquet')}, or CSV") from error
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        with opened(path, f"{what}, or the same in Parquet", largest) as stream:
+            names = _checked_names(path, parquet.ParquetFile(stream).metadata)
+            # Texts stay in their dictionary: written once, one may stand in a million rows.
+            file = parquet.ParquetFile(stream, read_dictionary=names)
+            for batch in file.iter_batches(_BATCH, use_threads=False):
+                columns = [_values(path, name, column) for name, column in zip(names, batch.columns, strict=True)]
+                rows += [
+                    (number, [_cell(path, number, name, value) for name, value in zip(names, cells, strict=True)])
+                    for number, cells in enumerate(zip(*columns, strict=True), 2 + len(rows))
+                ]
+    except InputError:
+        raise
+    except (OSError, ArrowException, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{path} cannot be read (not a Parquet file); allowed: {what}, or the same in Parquet"
+        ) from error
+    return [(1, [name.strip() for name in names]), *rows]
+
+
+def _checked_names(path: Path, metadata: Any) -> list[str]:
+    """Names of the columns, once it is known that they and the rows are not too many."""
+    rows, width = metadata.num_rows, metadata.num_columns
+    if not 0 < rows <= MOST_ROWS:
+        raise InputError(f"{path} holds {rows} observations; allowed: 1 to {MOST_ROWS}")
+    if width > MOST_COLUMNS or rows * width > MOST_CELLS:
+        raise InputError(f"{path} has {width} columns; allowed: at most {MOST_COLUMNS}, and {MOST_CELLS} cells in all")
+    if sum(metadata.row_group(number).num_rows for number in range(metadata.num_row_groups)) != rows:
+        raise InputError(f"{path} contradicts itself on its number of rows; allowed: a Parquet file")
+    columns = [metadata.schema.column(number) for number in range(width)]
+    nested = next(
+        (column.path for column in columns if column.path != column.name or column.max_repetition_level), None
+    )
+    if nested is not None:
+        raise InputError(f"{path}, column {nested[:60]}: a list or a table; allowed: numbers and text")
+    return [column.name for column in columns]
+
+
+def _values(path: Path, name: str, column: Any) -> list[Any]:
+    """Cells of a column."""
+    texts = column.dictionary if hasattr(column, "dictionary") else column
+    if texts.nbytes > LONGEST_CELL * max(len(texts), 1) + (1 << 16):
+        raise InputError(f"{path}, column {name[:60]}: texts of {texts.nbytes} bytes; allowed: short ones")
+    found: list[Any] = column.to_pylist()
+    return found
+
+
+def _cell(path: Path, number: int, name: str, value: object) -> str:
+    """A cell as CSV would hold it; empty where nothing was measured, which other programs write as NaN too."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        return str(value).strip()
+    raise InputError(f"{path}, row {number}, column {name}: a {type(value).__name__}; allowed: a number or text")
+
 
 _LARGEST_NUMBER = 1e12
 _WORD = re.compile(r"[^\W_]+")
@@ -26,7 +91,7 @@ _NOTES = ("note", "comment", "remark")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A row with its line number in the file."""
 
     path: Path
@@ -64,9 +129,6 @@ class Row:
             high: largest number.
             blank: texts, in lower case, of a cell that holds nothing.
             allowed: what the sentence says is allowed.
-
-        Raises:
-            InputError: if it is neither; the sentence names row and column.
         """
         text = self.text(column)
         if text.lower() in blank:
@@ -107,25 +169,17 @@ class Table:
         filled = [place for place in places if any(cells[place] for _, cells in self.below if len(cells) > place)]
         return [self.header[place] or "(without a name)" for place in filled]
 
-    def rows(self) -> list[Row]:
-        """All rows.
-
-        Raises:
-            InputError: if one has more or fewer cells than the header.
-        """
+    def rows(self) -> list[TableRow]:
+        """All rows."""
         for line, cells in [*((0, head) for head in self.headers[1:]), *self.below]:
             if len(cells) != len(self.header):
                 raise InputError(
                     f"{self.path}, row {line}: {len(cells)} cells; allowed: {len(self.header)}, one for each column"
                 )
-        return [Row(self.path, line, self.header, cells) for line, cells in self.below]
+        return [TableRow(self.path, line, self.header, cells) for line, cells in self.below]
 
     def trimmed(self, *, ragged: bool = False) -> Table:
-        """The table without blank cells beyond its named columns, as spreadsheets leave them.
-
-        Args:
-            ragged: rows that end early are filled up with blank cells.
-        """
+        """The table without blank cells beyond its named columns, as spreadsheets leave them."""
         heads = [list(head) for head in self.headers]
         width = max(len(_without_blanks(head)) for head in heads)
 
@@ -148,18 +202,7 @@ def _without_blanks(cells: Sequence[str]) -> list[str]:
 def read_table(
     path: str | Path, what: str, headers: int = 1, *, largest: int = LARGEST_TABLE, parquet: bool = False
 ) -> Table:
-    """Read a CSV file; lines that start with `#` are comments.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        headers: number of header rows; a file with fewer rows has empty ones.
-        largest: size of the file at most, bytes.
-        parquet: whether a file that ends in `.parquet` is read as such.
-
-    Raises:
-        InputError: if it cannot be read, or is not CSV.
-    """
+    """Read a CSV file; lines that start with `#` are comments."""
     path = checked_path(path, what)
     comments: list[str] = []
     if parquet and path.suffix == ".parquet":
@@ -173,17 +216,7 @@ def read_table(
 
 
 def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool = False) -> Table:
-    """Read a CSV file of readings, and check that it holds some. Blank cells at the ends of rows are left out.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        headers: number of header rows.
-        ragged: rows that end early are filled up with blank cells.
-
-    Raises:
-        InputError: if it cannot be read, is not CSV, has no rows, other separators, or too many columns.
-    """
+    """Read a CSV file of readings, and check that it holds some. Blank cells at the ends of rows are left out."""
     table = read_table(path, what, headers).trimmed(ragged=ragged)
     if not table.below:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
@@ -199,9 +232,6 @@ def check_known(table: Table, allowed: Sequence[str]) -> None:
     """Refuse columns that may be meant as one of the allowed ones, and names that stand twice.
 
     Other columns are free: those without a word that an allowed name has, or nearly has.
-
-    Raises:
-        InputError: if there is one; the sentence names the nearest allowed name.
     """
     words = {word for name in allowed for word in _words(name)} - {"s"}
     for name in table.header:
@@ -225,11 +255,7 @@ def _words(name: str) -> list[str]:
 
 
 def check_present(table: Table, needed: Sequence[str]) -> None:
-    """Refuse a table without all needed columns.
-
-    Raises:
-        InputError: if one is missing.
-    """
+    """Refuse a table without all needed columns."""
     missing = [name for name in needed if name not in table.header]
     if missing:
         raise InputError(
@@ -242,17 +268,8 @@ def read_series(
 ) -> list[tuple[float, ...]]:
     """Read a CSV file of values over time.
 
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        limits: name of each column, the time first, to its smallest and largest value.
-        largest: size of the file at most, bytes.
-
     Returns:
         The rows, in the order of `limits`.
-
-    Raises:
-        InputError: if the file or a cell is wrong, or time does not increase; the sentence names file, row and column.
     """
     table = read_table(path, what, largest=largest)
     if not set(limits) <= set(table.header):

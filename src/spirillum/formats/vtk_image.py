@@ -13,8 +13,6 @@ from spirillum.files import whole_file
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_comment", "write_vti"]
-
 _AXES = ("x", "y", "z")
 
 
@@ -23,10 +21,6 @@ def write_vti(dataset: xr.Dataset, path: Path) -> None:
 
     Point arrays `velocity` (3 components, m/s), `pressure` (Pa), both NaN inside solids, and `inside` (0 or 1); lengths
     in m. The dataset's attributes stand in a comment at the head of the file, as JSON.
-
-    Args:
-        dataset: over evenly spaced `x`, `y`, `z`, as `Flow.volume` returns.
-        path: the file, ending in `.vti`.
     """
     from pyevtk.hl import imageToVTK
 

@@ -8,41 +8,39 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, Task
-
-__all__ = ["RULES", "Scored", "baseline"]
+from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, TaskEnvironment
 
 _LEAD = 0.17
 """How far ahead `lead` looks, s: the usual latency of camera and remote together."""
 _GAIN = 1.0
 """Of `integral`: change of the duty per second for a relative error of 1."""
 
-Rule = Callable[[np.ndarray, Task], np.ndarray]
+Rule = Callable[[np.ndarray, TaskEnvironment], np.ndarray]
 
 
-def _off(seen: np.ndarray, task: Task) -> np.ndarray:
+def _off(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
     return np.zeros(len(seen) if task.on_off else (len(seen), 1))
 
 
-def _bang_bang(seen: np.ndarray, _task: Task) -> np.ndarray:
+def _bang_bang(seen: np.ndarray, _task: TaskEnvironment) -> np.ndarray:
     return (seen[:, 0] > 0).astype(np.int64)
 
 
-def _lead(seen: np.ndarray, _task: Task) -> np.ndarray:
+def _lead(seen: np.ndarray, _task: TaskEnvironment) -> np.ndarray:
     return (seen[:, 0] > _LEAD * seen[:, 1]).astype(np.int64)
 
 
-def _own(seen: np.ndarray, task: Task) -> np.ndarray:
+def _own(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
     return np.full((len(seen), 1), task.plants.held.duty)
 
 
-def _integral(seen: np.ndarray, task: Task) -> np.ndarray:
+def _integral(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
     wrong = 1.0 - seen[:, 1] / seen[:, 0]
     duty = seen[:, 3] + _GAIN * task.dt * np.clip(wrong, -1.0, 1.0)
     return np.asarray(np.clip(duty, 0.0, 1.0)[:, None])
 
 
-RULES: Mapping[type[Task], Mapping[str, Rule]] = {
+RULES: Mapping[type[TaskEnvironment], Mapping[str, Rule]] = {
     StopAt: {"nothing": _off, "bang-bang": _bang_bang, "lead": _lead},
     HoldSpeed: {"nothing": _off, "always-on": _own, "integral": _integral},
 }
@@ -63,18 +61,7 @@ class Scored(NamedTuple):
 
 
 def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **options: Any) -> Scored:
-    """What a rule scores, over robots, goals, flow and errors that a seed draws, alike for every rule.
-
-    Args:
-        task: name of an environment, such as `spirillum/StopAt-v0`.
-        rule: a key of `RULES`, of this task.
-        episodes: how many, at least 2.
-        seed: of the draws.
-        options: arguments of the task, as of its environment.
-
-    Raises:
-        InputError: for a name that is none.
-    """
+    """What a rule scores, over robots, goals, flow and errors that a seed draws, alike for every rule."""
     if task not in TASKS:
         raise InputError(f"task = {task[:60]!r}{did_you_mean(task, TASKS)}; allowed: {', '.join(TASKS)}")
     rules = RULES[TASKS[task]]

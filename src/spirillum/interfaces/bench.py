@@ -10,15 +10,13 @@ from contextlib import ExitStack
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import Senses
-from spirillum.controllers.signals import Command, Sight
-from spirillum.dynamics.plant import Moment, Plant
+from spirillum.controllers.signals import Command, Detection
+from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError
 from spirillum.files import scratch_folder
 from spirillum.interfaces.serial_remote import SerialRemote, VirtualRemote
 from spirillum.live.tracker import LiveTracker
 from spirillum.virtual.live_camera import VirtualCamera
-
-__all__ = ["VIRTUAL", "Bench"]
 
 VIRTUAL = "virtual"
 """Port of a remote that is made for the run, on a pseudo-terminal."""
@@ -86,7 +84,7 @@ class Bench(Senses):
         """Why nothing can be seen yet at a time, s; empty once the tracker knows the robot."""
         return self._reason if self._tracker is not None and not self._tracker.learnt else ""
 
-    def sight(self, moment: Moment) -> Sight | None:
+    def sight(self, moment: Snapshot) -> Detection | None:
         """What the tracker says of the next picture; None while it learns, and where frame or robot are lost."""
         modelled = super().sight(moment)
         if self._eye is None or self._tracker is None:
@@ -99,7 +97,9 @@ class Bench(Senses):
         self._reason = seen.reason or self._reason
         if not seen.seen:
             return None
-        return Sight(shot.time, seen.x - self._shift, seen.heading, seen.body_angle, seen.tail_phase - seen.body_angle)
+        return Detection(
+            shot.time, seen.x - self._shift, seen.heading, seen.body_angle, seen.tail_phase - seen.body_angle
+        )
 
     def deliver(self, command: Command) -> Command:
         """The command as the motor's end has taken it.

@@ -14,15 +14,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from spirillum.errors import InputError, clipped
-from spirillum.interfaces.tasks import TASKS, HoldSpeed, Task
+from spirillum.interfaces.tasks import TASKS, HoldSpeed, TaskEnvironment
 from spirillum.scalars import is_whole
-
-__all__ = ["BatchEnvironment", "Environment"]
 
 _BAR = 40
 
 
-def _spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
+def _spaces(task: TaskEnvironment) -> tuple[spaces.Box, spaces.Space[Any]]:
     """Observation and actions of one robot."""
     low, high = (np.array([getattr(item, end) for item in task.observed], dtype=np.float32) for end in ("low", "high"))
     actions = spaces.Discrete(2) if task.on_off else spaces.Box(0.0, 1.0, (1,), dtype=np.float32)
@@ -41,9 +39,6 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
             task: a key of `spirillum.interfaces.tasks.TASKS`.
             render_mode: `ansi`: a line of text; None.
             options: arguments of the task, see `spirillum.interfaces.tasks`.
-
-        Raises:
-            InputError: for wrong input.
         """
         if render_mode not in (None, "ansi"):
             raise InputError(f"render_mode = {clipped(render_mode)}; allowed: ansi or None")
@@ -52,22 +47,14 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
         self.render_mode = render_mode
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, Any]:
-        """A new robot, goal and flow; see `gymnasium.Env.reset`.
-
-        Raises:
-            InputError: for a seed that is no whole number.
-        """
+        """A new robot, goal and flow; see `gymnasium.Env.reset`."""
         _check_seed(seed)
         super().reset(seed=seed, options=options)
         self._task.reset(np.ones(1, dtype=bool), self.np_random)
         return self._task.observe(self.np_random)[0], self._info()
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One frame of the camera; see `gymnasium.Env.step`.
-
-        Raises:
-            InputError: for an action that is none.
-        """
+        """One frame of the camera; see `gymnasium.Env.step`."""
         reward = self._task.step(action, self.np_random)
         seen = self._task.observe(self.np_random)[0]
         return seen, float(reward[0]), False, bool(self._task.done[0]), self._info()
@@ -101,9 +88,6 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             num_envs: how many robots.
             render_mode: None.
             options: arguments of the task, see `spirillum.interfaces.tasks`.
-
-        Raises:
-            InputError: for wrong input.
         """
         if render_mode is not None:
             raise InputError(f"render_mode = {str(render_mode)[:40]} of a batch; allowed: None")
@@ -117,11 +101,7 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """New robots, goals and flow; see `gymnasium.vector.VectorEnv.reset`. One seed draws all of them.
-
-        Raises:
-            InputError: for a seed that is no whole number.
-        """
+        """New robots, goals and flow; see `gymnasium.vector.VectorEnv.reset`. One seed draws all of them."""
         if isinstance(seed, list):
             raise InputError("seed is a list; allowed: one whole number, from which all robots are drawn")
         _check_seed(seed)
@@ -131,11 +111,7 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._task.observe(self.np_random), {}
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One frame of the camera; see `gymnasium.vector.VectorEnv.step`.
-
-        Raises:
-            InputError: for an action that is none.
-        """
+        """One frame of the camera; see `gymnasium.vector.VectorEnv.step`."""
         began = self._ended
         reward = self._task.step(actions, self.np_random)
         info: dict[str, Any] = {}
@@ -154,7 +130,7 @@ def _check_seed(seed: Any) -> None:
         raise InputError(f"seed = {clipped(seed)}; allowed: a whole number from 0, or None")
 
 
-def _task(name: str, count: int, options: dict[str, Any]) -> Task:
+def _task(name: str, count: int, options: dict[str, Any]) -> TaskEnvironment:
     if name not in TASKS:
         raise InputError(f"task = {clipped(name)}; allowed: {', '.join(TASKS)}")
     try:

@@ -9,28 +9,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
-from spirillum.argument_kinds import as_number
+from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
+from spirillum.display import DisplayMixin
 from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
 from spirillum.dynamics.held_model import STATES, HeldModel, check_steady, held_model
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
     import control
 
-__all__ = ["LinearSystem", "control_system", "linear_system"]
-
 
 @dataclass(frozen=True)
-class LinearSystem(Shown):
+class LinearSystem(DisplayMixin):
     """A robot's equations linearised, and where."""
 
     system: control.StateSpace
@@ -82,7 +80,7 @@ def control_system(
         InputError: for wrong input, another drive, a motion far outside Stokes flow at full duty, or where
             python-control is not installed; in a response, for an input that is no number.
     """
-    library = required("control", "a system of python-control", "control")
+    library = import_optional("control", "a system of python-control", "control")
     held = held_model(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
@@ -125,7 +123,7 @@ def linear_system(
         InputError: for wrong input, another drive, a flow without one in the placement, or where python-control is not
             installed.
     """
-    library = required("control", "a system of python-control", "control")
+    library = import_optional("control", "a system of python-control", "control")
     held = held_model(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
@@ -166,11 +164,7 @@ def _inputs(held: HeldModel) -> list[str]:
 
 
 def _inputs_of(u: Samples) -> tuple[float, float]:
-    """Duty and flow from a system's inputs.
-
-    Raises:
-        InputError: if one is no number.
-    """
+    """Duty and flow from a system's inputs."""
     if not np.all(np.isfinite(u)):
         name = INPUTS[int(np.flatnonzero(~np.isfinite(u))[0])]
         raise InputError(f"{name} = {float(u[~np.isfinite(u)][0])}; allowed: a number")

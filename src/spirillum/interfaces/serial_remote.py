@@ -1,7 +1,13 @@
-"""The remote at a serial port: duties that go out, are confirmed, and end with the motor off; and a virtual far end."""
+"""The remote at a serial port: duties that go out, are confirmed, and end with the motor off; and a virtual far end.
+
+The line protocol of a remote at a serial port: how lines are written and read, and what the far end has to do.
+Every line is ASCII, ``BODY*HH`` and a line feed, HH the exclusive or of the bytes of BODY in hexadecimal, as in
+NMEA 0183. `docs/serial-remote.md` describes it. Nothing here knows a port.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import threading
@@ -9,17 +15,96 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import reduce
+from operator import xor
 from typing import Any, Self
 
-from spirillum.answer import envelope, quantity
-from spirillum.argument_kinds import as_number, checked
+from spirillum.argument_validation import as_number, validate_arguments
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
-from spirillum.extras import required
-from spirillum.interfaces.remote_protocol import LONGEST_LINE, WATCHDOG, Receiver, framed, unframed
-from spirillum.shown import Shown
+from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["RemoteRun", "SerialRemote", "VirtualRemote", "remote"]
+LONGEST_LINE = 80
+"""Bytes of a line, its end included; what is longer is thrown away."""
+WATCHDOG = 0.5
+"""Without a valid command for so long the receiver switches the motor off, s."""
+
+
+def framed(body: str) -> bytes:
+    """A line with its checksum."""
+    return f"{body}*{_checksum(body.encode('ascii')):02X}\n".encode("ascii")
+
+
+def unframed(line: bytes) -> str | None:
+    """The body of a line; None where it is damaged."""
+    body, star, checksum = line.rstrip(b"\r").rpartition(b"*")
+    if not star or len(checksum) != 2 or checksum.upper() != f"{_checksum(body):02X}".encode():
+        return None
+    return body.decode("ascii", "replace")
+
+
+def _checksum(body: bytes) -> int:
+    return reduce(xor, body, 0)
+
+
+class Receiver:
+    """The far end: what a microcontroller beside the motor does. Its caller gives it the time."""
+
+    def __init__(self, name: str = "spirillum", watchdog: float = WATCHDOG) -> None:
+        """A motor that is off.
+
+        Args:
+            name: what it calls itself, without spaces.
+            watchdog: time after which it switches off by itself, s.
+        """
+        if not name.isprintable() or len(name.split()) != 1 or " " in name:
+            raise InputError(f"name = {clipped(name)}; allowed: a word without spaces")
+        if not 0.0 < watchdog <= 10.0:
+            raise InputError(f"watchdog = {watchdog:g} s; allowed: above 0, at most 10 s")
+        self.name, self.watchdog = name, watchdog
+        self._duty, self._last_command, self._rest = 0.0, -math.inf, b""
+
+    def duty(self, now: float) -> float:
+        """Duty of the motor at a time, s; 0 once the last valid command is older than the watchdog allows."""
+        return self._duty if now - self._last_command <= self.watchdog else 0.0
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Take bytes as they come, and give the answer.
+
+        Args:
+            data: any piece of the stream.
+            now: time, s.
+        """
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if len(self._rest) > LONGEST_LINE:
+            self._rest = self._rest[-LONGEST_LINE:]  # cannot become a valid line again
+        return b"".join(self._answer(line, now) for line in lines if len(line) < LONGEST_LINE)
+
+    def _answer(self, line: bytes, now: float) -> bytes:
+        body = unframed(line)
+        if body is None:
+            return framed("NAK 0 damaged")
+        verb, number, *words = [*body.split(" "), ""]
+        if not (number.isascii() and number.isdigit() and len(number) <= 9):
+            return framed("NAK 0 number")
+        if verb == "WHO":
+            return framed(f"WHO {number} {self.name} {round(1e3 * self.watchdog)}")
+        duty = 0.0 if verb == "OFF" else _duty_of(words[0]) if verb == "DUTY" and words else None
+        if duty is None:
+            return framed(f"NAK {number} unknown")
+        self._duty, self._last_command = duty, now
+        return framed(f"ACK {number} {duty:.3f}")
+
+
+def _duty_of(word: str) -> float | None:
+    """A duty as the protocol writes it; None for anything else."""
+    if not (len(word) == 5 and word[1] == "." and (word[0] + word[2:]).isdigit() and word.isascii()):
+        return None
+    duty = float(word)
+    return duty if duty <= 1.0 else None
+
 
 _BAUD = 115_200
 _FASTEST = 100_000_000
@@ -34,7 +119,7 @@ _LONGEST_HOLD = 86_400.0
 class SerialRemote:
     """A remote at a serial port; leaving its `with` block switches the motor off, whatever happened inside."""
 
-    @checked
+    @validate_arguments
     def __init__(self, port: str, *, baud: int = _BAUD) -> None:
         """Open the port, and ask the far end for its name.
 
@@ -45,7 +130,7 @@ class SerialRemote:
         Raises:
             InputError: for wrong input, if pyserial is missing, the port is not there or is in use, or nobody answers.
         """
-        serial = required("serial", "a remote at a serial port", "control")
+        serial = import_optional("serial", "a remote at a serial port", "control")
         if not 1 <= baud <= _FASTEST:
             raise InputError(f"baud = {clipped(baud)}; allowed: 1 to {_FASTEST}")
         self.port = str(port)
@@ -135,11 +220,7 @@ class SerialRemote:
                 self.off()
 
     def _request(self, verb: str, more: str = "") -> str:
-        """Send a command until it is answered, and give the answer.
-
-        Raises:
-            InputError: for an unplugged port, no answer, or a refusal.
-        """
+        """Send a command until it is answered, and give the answer."""
         self._number = self._number % 999_999_999 + 1
         line, wanted = framed(f"{verb} {self._number}{more}"), "WHO" if verb == "WHO" else "ACK"
         try:
@@ -209,7 +290,7 @@ def _ports() -> str:
 
 
 @dataclass(frozen=True)
-class RemoteRun(Shown):
+class RemoteRun(DisplayMixin):
     """A motor that was on for a time, through a remote."""
 
     port: str
@@ -258,7 +339,7 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
 class VirtualRemote:
     """A remote without hardware: a pseudo-terminal with a receiver behind it, to try programs on; not on Windows."""
 
-    @checked
+    @validate_arguments
     def __init__(self, name: str = "virtual", watchdog: float = WATCHDOG) -> None:
         """Open a pseudo-terminal.
 

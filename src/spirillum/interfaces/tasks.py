@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from spirillum.argument_kinds import as_number
+from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.dynamics.held_plants import HeldPlants
@@ -25,8 +25,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["TASKS", "HoldSpeed", "StopAt", "Task"]
-
 _MM = 1e3
 _LARGEST_GOAL = 1e3
 """In m, and as a share of a speed."""
@@ -36,7 +34,7 @@ _LATEST_PULSE = 0.9
 """Share of an episode in which a pulse of flow may begin."""
 
 
-class Observed(NamedTuple):
+class ObservedNumber(NamedTuple):
     """One number of an observation."""
 
     name: str
@@ -66,10 +64,10 @@ class _Past:
         self._rows[:, which] = 0.0
 
 
-class Task(ABC):
+class TaskEnvironment(ABC):
     """Robots with camera, remote and flow; a task adds goal, actions, observation and score."""
 
-    observed: ClassVar[tuple[Observed, ...]]
+    observed: ClassVar[tuple[ObservedNumber, ...]]
     """The numbers of an observation."""
     goals: ClassVar[tuple[float, float]]
     """Least and largest goal, unless others are given."""
@@ -103,9 +101,6 @@ class Task(ABC):
             posterior: file of a calibration's posterior, from whose draws they are taken.
             goal: least and largest goal, between which goals are drawn evenly; None: those of the task.
             duration: of an episode, with its unit or a float in s.
-
-        Raises:
-            InputError: for wrong input.
         """
         self.lab = Lab.of(lab)
         self.duration = parse_option("duration", duration, KINDS["time"])
@@ -176,15 +171,7 @@ class Task(ABC):
         self.goal[which] = self._goal_scale() * rng.uniform(*self._goal_range, new)
 
     def step(self, actions: np.ndarray, rng: np.random.Generator) -> Samples:
-        """One frame; the reward of each robot: minus its score, times the step in s.
-
-        Args:
-            actions: of each robot.
-            rng: source of chance of camera and remote.
-
-        Raises:
-            InputError: for an action that is none; nothing has then moved.
-        """
+        """One frame; the reward of each robot: minus its score, times the step in s."""
         self._sent = self._duty(actions)
         lost = rng.random(self.count) < self.lab.remote.lost
         self._commands.append(np.where(lost, self._commands.ago(0), self._sent))
@@ -213,11 +200,7 @@ class Task(ABC):
         """The numbers of `observed`, each (count,), before they are cut off at their bounds."""
 
     def _duty(self, actions: Any) -> Samples:
-        """The duties that actions ask for.
-
-        Raises:
-            InputError: unless there is an allowed action for each robot.
-        """
+        """The duties that actions ask for."""
         try:
             values = np.asarray(actions, dtype=np.float64).reshape(-1)
         except (TypeError, ValueError, OverflowError):
@@ -252,14 +235,14 @@ class Task(ABC):
         return 1.0 - self.steps / self.length
 
 
-class StopAt(Task):
+class StopAt(TaskEnvironment):
     """Stop at a place, whose distance in m is drawn, with a remote that knows on and off."""
 
     observed = (
-        Observed("distance", "mm", -100.0, 100.0),
-        Observed("speed", "mm/s", -20.0, 20.0),
-        Observed("command", "1", 0.0, 1.0),
-        Observed("time_left", "1", 0.0, 1.0),
+        ObservedNumber("distance", "mm", -100.0, 100.0),
+        ObservedNumber("speed", "mm/s", -20.0, 20.0),
+        ObservedNumber("command", "1", 0.0, 1.0),
+        ObservedNumber("time_left", "1", 0.0, 1.0),
     )
     goals = (1e-3, 6e-3)
     on_off = True
@@ -276,15 +259,15 @@ class StopAt(Task):
         return [_MM * (self.goal - place), _MM * speed, (self._sent > 0).astype(float), self._time_left()]
 
 
-class HoldSpeed(Task):
+class HoldSpeed(TaskEnvironment):
     """Swim at a speed, drawn as a share of the steady speed of the robot as its file says, by the drive's duty."""
 
     observed = (
-        Observed("target", "mm/s", -20.0, 20.0),
-        Observed("speed", "mm/s", -20.0, 20.0),
-        Observed("current", "mA", -10.0, 10_000.0),
-        Observed("duty", "1", 0.0, 1.0),
-        Observed("time_left", "1", 0.0, 1.0),
+        ObservedNumber("target", "mm/s", -20.0, 20.0),
+        ObservedNumber("speed", "mm/s", -20.0, 20.0),
+        ObservedNumber("current", "mA", -10.0, 10_000.0),
+        ObservedNumber("duty", "1", 0.0, 1.0),
+        ObservedNumber("time_left", "1", 0.0, 1.0),
     )
     goals = (0.3, 0.8)
     on_off = False
@@ -302,7 +285,7 @@ class HoldSpeed(Task):
         return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._sent, self._time_left()]
 
 
-TASKS: dict[str, type[Task]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
+TASKS: dict[str, type[TaskEnvironment]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
 """Tasks by the names of their environments."""
 
 

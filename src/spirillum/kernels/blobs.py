@@ -15,20 +15,13 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["force_matrix", "moment_matrices"]
-
 Contracted: TypeAlias = tuple[Samples, Samples, Samples]
 """Of each moment m and a vector x: m x, x m, and x m x."""
 
 
 @compiled
 def force_matrix(points: Samples, e2: Samples) -> Samples:
-    """Velocities at points from unit forces at the same points, symmetric, (3 n, 3 n).
-
-    Args:
-        points: (n, 3), m.
-        e2: square of the blob radius of each point, (n,); a pair takes the mean.
-    """
+    """Velocities at points from unit forces at the same points, symmetric, (3 n, 3 n)."""
     n = points.shape[0]
     matrix = np.empty((3 * n, 3 * n))
     x = np.empty(3)

@@ -6,8 +6,6 @@ import numpy as np
 
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["film_colours"]
-
 _BITS = 16
 """Binary digits of fractions: sums are of whole numbers of 32 bits, which compilers turn into vector instructions."""
 _RED, _GREEN, _BLUE = 0.2126, 0.7152, 0.0722

@@ -17,8 +17,6 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
-__all__ = ["compiled", "compiled_by_rows", "in_one_thread", "rows_in_one_thread"]
-
 _THREADS: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _SHARES = 4
 """Shares of the rows for each thread: some rows take longer than others."""
@@ -55,9 +53,6 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
     """Compile a function that works row by row; threads share the rows.
 
     A loop that Numba parallelises itself takes twice as long to compile.
-
-    Args:
-        places: of the arguments that have one row for each item: arrays, or tuples of arrays.
     """
 
     def decorate(function: _F) -> _F:

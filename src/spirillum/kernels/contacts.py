@@ -23,8 +23,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.rigid_links import POSITION
 
-__all__ = ["asperity_energy", "asperity_load", "contact_rows", "crest", "ring_gap", "tail_reaches"]
-
 # A site on body or coupling: ring of radius rho (semi-axis b along the motor axis) at x, with a ball of radius beta.
 SITE_X, SITE_RING, SITE_HALF, SITE_BALL, SITE_ROTOR = 0, 1, 2, 3, 4  # m; last: 1 where it turns with the rotor
 SITE = 5

@@ -10,8 +10,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.snell import pixels_of_points
 
-__all__ = ["edge_places", "edge_points"]
-
 
 @compiled
 def edge_points(pose: Samples, factors: Samples, normals: Samples, reach: Samples, out: Samples) -> None:

@@ -15,8 +15,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.rigid_links import solved
 
-__all__ = ["balanced", "residual", "sliding_force"]
-
 _ROUNDS = 80
 """Steps of the iteration at most."""
 _BALANCED = 1e-13

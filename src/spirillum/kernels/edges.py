@@ -10,8 +10,6 @@ from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
 from spirillum.robust import MAD_TO_SIGMA
 
-__all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
-
 _RUN = 6
 """Neighbouring edge points whose gradients are averaged with their sign."""
 

@@ -14,8 +14,6 @@ from spirillum.kernels.compiled import compiled, compiled_by_rows
 from spirillum.kernels.panels import Panel, cardinals, is_near, next_piece
 from spirillum.kernels.rings import ring_b_v, ring_modes
 
-__all__ = ["add_blobs", "add_layer", "add_moments"]
-
 
 @compiled_by_rows(0, 4)
 def add_blobs(points: Samples, sources: Samples, forces: Samples, e2: Samples, field: Samples) -> None:

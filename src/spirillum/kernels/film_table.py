@@ -18,19 +18,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = [
-    "clearance",
-    "film_at",
-    "film_coordinates",
-    "film_is_whole",
-    "has_head",
-    "shape_of",
-    "smallest_gap",
-    "spline_weights",
-    "stretched",
-    "yaw_scale",
-]
-
 # Columns of the head of a packed table.
 TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
 REAR, REAR_ROUND, FRONT, FRONT_ROUND = 3, 4, 5, 6  # ends of the straight side, x, and the radii of the ends, m

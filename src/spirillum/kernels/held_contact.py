@@ -7,8 +7,6 @@ import math
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["contact_drag"]
-
 _HALVINGS = 80
 
 

@@ -19,8 +19,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = ["CHARGE", "CURRENT", "PARAMETERS", "POSITION", "STATES", "advance"]
-
 # Parameters of one robot, SI; torques and rates at the joint.
 TORQUE, EMF, INDUCTANCE = 0, 1, 2  # K_m, N m/A; K_b, V s/rad; L, H
 CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE = 3, 4, 5, 6, 7, 8  # R(I) of Table II

@@ -5,8 +5,6 @@ from __future__ import annotations
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["variance_of_sum"]
-
 
 @compiled
 def variance_of_sum(terms: Samples, reach: int) -> float:

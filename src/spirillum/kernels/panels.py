@@ -16,8 +16,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.rings import ring_modes
 
-__all__ = ["cardinals", "is_near", "layer_blocks", "next_piece"]
-
 Target: TypeAlias = tuple[float, float, float]
 """x, rho, and the square of the blob radius."""
 Panel: TypeAlias = tuple[Samples, Samples]

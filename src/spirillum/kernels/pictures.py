@@ -10,8 +10,6 @@ from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.newey_west import variance_of_sum
 
-__all__ = ["edge_misfits", "profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
-
 _CHANNELS = 3
 _STEPS, _LAST = 8, 2e-5
 """Most Gauss-Newton steps, and the step below which they end, rad."""

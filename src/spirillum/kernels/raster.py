@@ -11,9 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.sightlines import Backdrop, Camera
-
-__all__ = ["Lamps", "Materials", "Shading", "Shadow", "blend", "develop", "draw", "project", "shade"]
+from spirillum.kernels.sightlines import Backdrop, RefractingCamera
 
 _EMPTY = -1e30
 """Height of a sample that has met nothing."""
@@ -72,7 +70,7 @@ class Shadow(NamedTuple):
 
 
 @compiled
-def project(points: np.ndarray, camera: Camera, turn: np.ndarray, seen: np.ndarray) -> None:
+def project(points: np.ndarray, camera: RefractingCamera, turn: np.ndarray, seen: np.ndarray) -> None:
     """Pixels at which a camera above a flat surface of oil sees points, by Snell's law.
 
     Args:

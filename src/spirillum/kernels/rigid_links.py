@@ -11,19 +11,6 @@ import math
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = [
-    "assembled",
-    "axes",
-    "derivative",
-    "drive_torque",
-    "field_at",
-    "field_torque",
-    "powers",
-    "solved",
-    "turned",
-    "weight_loads",
-]
-
 # Columns of the arrays, by name on both sides: integers of the module are constants in compiled code.
 
 # The state.

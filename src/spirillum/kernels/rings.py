@@ -22,8 +22,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["ring_b_v", "ring_blocks", "ring_integrals", "ring_modes"]
-
 
 @compiled
 def _elliptic(complement: float) -> tuple[float, float]:

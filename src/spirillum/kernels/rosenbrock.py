@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["COEFFICIENTS", "DENSE", "GAMMA", "NODES", "STAGES", "TIMES", "WEIGHTS"]
-
 STAGES = 8
 GAMMA = 0.21193756319429014
 

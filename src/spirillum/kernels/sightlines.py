@@ -9,13 +9,11 @@ import numpy as np
 
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["Backdrop", "Camera", "Ray", "Ruler", "Tube", "Waves", "sightline", "still_picture"]
-
 _GROUND, _PAPER, _INK = 0, 1, 2
 """Rows of the colours."""
 
 
-class Camera(NamedTuple):
+class RefractingCamera(NamedTuple):
     """A camera above a flat surface of oil, at x = y = 0 with z towards it; m and pixels."""
 
     eye: float
@@ -62,7 +60,7 @@ class Ruler(NamedTuple):
     """Width of a line."""
 
 
-class Tube(NamedTuple):
+class GlassTube(NamedTuple):
     """A glass tube along x; m."""
 
     height: float
@@ -77,7 +75,7 @@ class Tube(NamedTuple):
     """Absorption coefficient of the glass, 1/m."""
 
 
-class Waves(NamedTuple):
+class FloorWaves(NamedTuple):
     """Sine waves of the floor's brightness, (w,) each."""
 
     kx: np.ndarray
@@ -103,7 +101,7 @@ class Backdrop(NamedTuple):
 
 
 @compiled
-def sightline(u: float, v: float, camera: Camera, turn: np.ndarray) -> Ray:
+def sightline(u: float, v: float, camera: RefractingCamera, turn: np.ndarray) -> Ray:
     """Line of sight of a pixel.
 
     Args:
@@ -135,7 +133,7 @@ def sightline(u: float, v: float, camera: Camera, turn: np.ndarray) -> Ray:
 
 
 @compiled
-def _glass(ray: Ray, height: float, tube: Tube) -> tuple[float, float]:
+def _glass(ray: Ray, height: float, tube: GlassTube) -> tuple[float, float]:
     """Transmission of half of a tube, and the light that it mirrors.
 
     Args:
@@ -158,13 +156,13 @@ def _glass(ray: Ray, height: float, tube: Tube) -> tuple[float, float]:
 
 @compiled
 def still_picture(
-    camera: Camera,
+    camera: RefractingCamera,
     turn: np.ndarray,
     spots: np.ndarray,
     colours: np.ndarray,
     ruler: Ruler,
-    tube: Tube,
-    waves: Waves,
+    tube: GlassTube,
+    waves: FloorWaves,
     oil: np.ndarray,
     still: Backdrop,
 ) -> None:

@@ -7,8 +7,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["pixels_of_points", "points_of_pixels", "surface_crossing"]
-
 _STEPS = 30
 _LAST = 1e-9
 """Relative step after which Newton's method is exact to rounding, as its convergence is quadratic."""

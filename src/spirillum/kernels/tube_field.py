@@ -15,8 +15,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled, compiled_by_rows
 from spirillum.kernels.tube_waves import _flows, _ratios, _wall_inverses, wall_layers
 
-__all__ = ["add_waves", "wave_amplitudes"]
-
 _TAPER = 0.4
 """Part of the waves over which they are faded out."""
 

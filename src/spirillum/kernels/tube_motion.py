@@ -67,8 +67,6 @@ from spirillum.kernels.rigid_links import OBSERVED as OF_LINKS
 from spirillum.kernels.rigid_links import STATES as STATES_OF_LINKS
 from spirillum.kernels.tube_table import resistance_at
 
-__all__ = ["gaps_of", "observe", "packed", "rates"]
-
 # The state of `rigid_links`, and behind it:
 CONTACT, FLOW = 17, 18  # work of dry friction, and of the imposed flow, J
 STATES = STATES_OF_LINKS + 2

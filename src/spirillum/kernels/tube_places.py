@@ -9,8 +9,6 @@ from spirillum.kernels.compiled import compiled
 from spirillum.kernels.film_table import smallest_gap
 from spirillum.kernels.tube_table import INSIDE, MOTIONS, film_start, mean_resistance_at
 
-__all__ = ["PHASES", "mean_resistances", "offset_at_gap"]
-
 PHASES = 9
 """Phases that a mean is taken over: what they leave of a table's four harmonics is below 1e-6, five up to 5e-4."""
 _STEPS = 30

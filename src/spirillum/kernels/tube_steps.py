@@ -17,8 +17,6 @@ from spirillum.kernels.rigid_links import ATTITUDE, CHARGE, CURRENT, FILM, PHASE
 from spirillum.kernels.rosenbrock import COEFFICIENTS, DENSE, GAMMA, NODES, STAGES, TIMES, WEIGHTS
 from spirillum.kernels.tube_motion import OUTSIDE, STATES, TAIL_GAP, gaps_of, rates
 
-__all__ = ["advance", "interpolate", "watched"]
-
 DONE, PAUSED, CROSSED, STUCK = 0, 1, 2, 3
 """The time was reached; the steps are used up; something watched has changed its sign in the last step; no step is
 small enough."""

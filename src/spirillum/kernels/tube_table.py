@@ -26,39 +26,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.film_table import film_at, film_is_whole, has_head
 
-__all__ = [
-    "INSIDE",
-    "MIRROR",
-    "MOTIONS",
-    "PARAMETERS",
-    "STEEPEST",
-    "TOO_FAR_PITCHED",
-    "TOO_FAR_YAWED",
-    "YAW_ORDERS",
-    "YAW_SHARES",
-    "YAW_SLACK",
-    "Parts",
-    "Range",
-    "contact_offset",
-    "contact_offset_of",
-    "cut_of_film",
-    "film_start",
-    "is_whole",
-    "largest_yaw",
-    "limited_yaw",
-    "mean_resistance_at",
-    "mirror_image",
-    "packed",
-    "parts_of",
-    "range_of",
-    "resistance_at",
-    "rest_coefficients",
-    "shapes_of",
-    "stretched_yaw",
-    "yaw_limit_of",
-    "yaw_parts_at_nodes",
-]
-
 MOTIONS = 8
 """U and Omega of the body, omega_m of the rotor against it, and the mean flow."""
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
@@ -382,11 +349,7 @@ def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Sa
 
 @compiled
 def stretched_yaw(share: float) -> float:
-    """What the rest is a polynomial of: what nears the glass varies as the logarithm of its clearance.
-
-    Args:
-        share: g, the yaw over the largest one.
-    """
+    """What the rest is a polynomial of: what nears the glass varies as the logarithm of its clearance."""
     return math.atanh(share / _BEYOND_YAW)
 
 
@@ -468,14 +431,6 @@ def film_start(table: Samples) -> int:
 @compiled
 def resistance_at(table: Samples, e: float, pitch: float, yaw: float, phase: float, out: Samples) -> int:
     """Fill the symmetric 8x8 of a place, viscosity 1, in the robot's axes without roll; how the table's range was left.
-
-    Args:
-        table: from `packed`.
-        e: offset of the body's mid-length from the tube's axis, m.
-        pitch: nose up, away from the near wall, rad.
-        yaw: nose to the side, rad.
-        phase: of the tail, rad.
-        out: to be filled, (8, 8).
 
     Returns:
         `INSIDE`, or which range was left; then the answer is that of the nearest place inside.

@@ -19,8 +19,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["circle_waves", "station_waves", "wall_layers", "wave_extensions"]
-
 
 @compiled
 def _ratios(z: float, r: Samples) -> None:
@@ -161,11 +159,6 @@ def wall_layers(z: float, first: float, orders: int) -> Samples:
     """Single layer S on a cylinder in unbounded fluid: velocities (X, u_rho, v) from densities (F, f_rho, g).
 
     In units of 4 pi R/(8 pi mu), symmetric, (orders, 3, 3).
-
-    Args:
-        z: k R.
-        first: K_1(z)/K_0(z).
-        orders: number of orders p.
     """
     r, q, w = np.empty(orders + 3), np.empty(orders + 3), np.empty(orders + 3)
     _ratios(z, r)

@@ -43,8 +43,6 @@ from spirillum.kernels.rigid_links import (
     weight_loads,
 )
 
-__all__ = ["film_of", "observe", "packed", "rates", "thinnest_film"]
-
 # Columns of the arrays, by name on both sides; those of the links are in `rigid_links`.
 
 # The wall.

@@ -17,8 +17,6 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.newey_west import variance_of_sum
 
-__all__ = ["ridge_of", "wave_fit", "wave_scores"]
-
 _STEPS = 8
 """Most Gauss-Newton steps."""
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.live.observation import Observation
-from spirillum.live.watch import CameraWatch, Readings, motion_flags
 from spirillum.live.windows import Window, periodic_error
 from spirillum.measurement.flags import SYNTHETIC, says_synthetic
 from spirillum.measurement.statistics import NORMAL
@@ -32,13 +34,105 @@ from spirillum.vision.track.body import Placed
 from spirillum.vision.track.causal_angle import CausalAngle
 from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.direction import along_its_way
-from spirillum.vision.track.learning import Learnt
+from spirillum.vision.track.initial_detection import Start
+from spirillum.vision.track.learning import InitialDetection
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.size import checked_scale
-from spirillum.vision.track.steps import Follower
+from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
+from spirillum.vision.track.steps import FrameTracker
+from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
+from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
-__all__ = ["Following"]
+_BETWEEN = 1.0
+"""Time between two pictures that are kept, s."""
+_TOGETHER = 5
+"""Pictures from which a background is made."""
+
+
+@dataclass
+class RecentDetections:
+    """What was read in the last seconds: on each frame time, x, continuous angles, and both angles as read."""
+
+    length: float
+    """Time that is kept, s."""
+    rows: deque[tuple[float, ...]] = field(default_factory=deque)
+    """Time, x, body angle, tail phase; body angle modulo its period with its error, tail phase modulo 2 pi with its."""
+
+    def add(self, row: tuple[float, ...]) -> None:
+        """Take a frame; those that are older leave."""
+        self.rows.append(row)
+        while self.rows[0][0] < row[0] - self.length:
+            self.rows.popleft()
+
+    def columns(self) -> Samples:
+        """The rows as columns, (8, n)."""
+        return np.array(self.rows).T
+
+
+def motion_flags(
+    readings: RecentDetections, robot: Robot, period: float, hand: int, readable: float
+) -> tuple[Flag, ...]:
+    """Flags on the motion in the last seconds.
+
+    Args:
+        readings: of the last seconds.
+        robot: the robot.
+        period: of the stripes, rad.
+        hand: handedness by perspective, as of `TailWave.handedness`.
+        readable: share of a turn in which something of the stripes faces the camera.
+    """
+    if len(readings.rows) < 4:
+        return ()
+    time, x, body, tail, roll, roll_error, phase, phase_error = readings.columns()
+    of_body = unwrapped(time, roll, roll_error, period, readable=readable)[1]
+    of_tail = unwrapped(time, phase, phase_error, 2.0 * np.pi, "tail")[1]
+    motion = RobotMotion(time, x, body, tail)
+    odd = (*nothing_moves(motion, robot), *contradictions(motion, robot, hand))
+    return (*of_body, *of_tail, *odd, *no_stripe_passes(motion, robot, readable=readable))
+
+
+class CameraWatch:
+    """Compares what stands still in the last pictures with what stood still when the robot was learnt."""
+
+    def __init__(self, start: Start, *, ruled: bool) -> None:
+        """Begin."""
+        self._start, self._ruled = start, ruled
+        self._first: StillPicture | None = None
+        self._pictures: list[np.ndarray] = []
+        self._next = -np.inf
+        self._aside = ThreadPoolExecutor(1)  # a picture's rows take longer than a frame
+        self._coming: Future[tuple[Flag, ...]] | None = None
+
+    def look(self, frame: Frame) -> tuple[Flag, ...]:
+        """Flags on the pictures until a second ago; empty where nothing moved, and on most frames."""
+        if frame.time < self._next:
+            return ()
+        self._next = frame.time + _BETWEEN
+        flags = () if self._coming is None else self._coming.result()
+        self._coming = None
+        self._pictures.append(frame.image.copy())
+        if len(self._pictures) == _TOGETHER:
+            self._coming = self._aside.submit(self._compared, self._pictures)
+            self._pictures = []
+        return flags
+
+    def _compared(self, pictures: list[np.ndarray]) -> tuple[Flag, ...]:
+        """Flags on some pictures, against the first ones."""
+        now = view_of(pictures, self._start, ruled=self._ruled)
+        if self._first is None:
+            self._first = now
+            return ()
+        shift, moved = shift_of(self._first, now)
+        if not moved:
+            return ()
+        sentence = (
+            f"the camera or the ruler was moved: the picture lies {abs(shift):.1f} pixels along the channel from where "
+            "it lay when the robot was learnt; nothing is given: begin anew"
+        )
+        return (Flag("camera-moved", sentence, EVERYTHING),)
+
 
 _CHECKED = 1.0
 """Time between two looks at the last seconds for what is odd, s."""
@@ -54,7 +148,7 @@ _NOT_WHOLE = "the robot is partly out of view"
 class Following:
     """A robot that is known, and what was seen of it."""
 
-    def __init__(self, video: Video, setup: Setup, robot: Robot, learnt: Learnt, window: float) -> None:
+    def __init__(self, video: Video, setup: Setup, robot: Robot, learnt: InitialDetection, window: float) -> None:
         """Begin.
 
         Args:
@@ -66,10 +160,10 @@ class Following:
         """
         self.video, self.setup, self.robot, self.learnt = video, setup, robot, learnt
         ruled = setup.markers.spacing is not None
-        self.follower = Follower(learnt.known, learnt.still, ahead=False)
+        self.follower = FrameTracker(learnt.known, learnt.still, ahead=False)
         self.body, self.tail = CausalAngle(learnt.known.stripes.period), CausalAngle(2.0 * math.pi)
         self.windows = {name: Window(window) for name in RATE_NAMES}
-        self.readings = Readings(_LOOKED_BACK)
+        self.readings = RecentDetections(_LOOKED_BACK)
         self.camera = CameraWatch(learnt.known.start, ruled=ruled)
         known, tail_size = learnt.known, learnt.known.tail_size(learnt.sight.optics)
         self.scale, size_flags, _ = checked_scale(
@@ -226,14 +320,7 @@ class Following:
             del column[:count]
 
     def trial(self, name: str) -> Trial:
-        """The measurement of all frames that are kept.
-
-        Args:
-            name: of the source.
-
-        Raises:
-            InputError: if there is none.
-        """
+        """The measurement of all frames that are kept."""
         flags = (*self.moved, *self.learnt.sight.flags, *self.learnt.flags)
         if not self.follower.record.time:
             raise InputError(f"{name} has no frame after the robot was learnt; allowed: a longer one")

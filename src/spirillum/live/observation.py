@@ -7,19 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.measurement.trials import Measured
-from spirillum.shown import Shown
 from spirillum.vision.flag import Flag
-
-__all__ = ["Observation", "State"]
 
 State = Literal["learning", "tracking", "lost"]
 """`learning`: the robot's appearance is not yet known; `lost`: it is not where it should be, or not in full view."""
 
 
 @dataclass(frozen=True)
-class Observation(Shown):
+class Observation(DisplayMixin):
     """A robot on one frame, from this frame and those before it; SI, NaN where it was not seen."""
 
     frame: int

@@ -9,8 +9,6 @@ from typing import Any
 
 from spirillum.errors import InputError
 
-__all__ = ["Datagrams", "line_of"]
-
 _LOOPBACK = "127.0.0.1"
 _DIGITS = 5
 _WHAT = "PORT or HOST:PORT, a port from 1 to 65535; without a host, this computer"
@@ -25,14 +23,7 @@ class Datagrams:
     """Sends each line as one datagram; one that nobody takes is lost, as the next one is newer."""
 
     def __init__(self, address: str) -> None:
-        """Find the receiver.
-
-        Args:
-            address: `PORT` on this computer, or `HOST:PORT`.
-
-        Raises:
-            InputError: for anything else, or a host that is not known.
-        """
+        """Find the receiver."""
         host, colon, port = address.rpartition(":")
         number = port.isascii() and port.isdigit() and len(port) <= _DIGITS
         if not number or not 1 <= int(port) <= 65535 or (colon and not host):

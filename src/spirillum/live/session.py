@@ -4,24 +4,73 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Condition, Event, Thread
 from typing import Any
 
-from spirillum.answer import quantity
+from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.live.answer import Tracked
-from spirillum.live.handover import at_own_pace, newest
 from spirillum.live.observation import Observation
 from spirillum.live.sending import Datagrams, line_of
 from spirillum.live.sources import Arrived, Source, source_of
 from spirillum.live.tracker import LiveTracker, seconds
+from spirillum.live.tracking_summary import Tracked
 from spirillum.robot.load import load
 from spirillum.vision.setup import load_setup
 
-__all__ = ["observation_line", "track"]
+_WAITING = 2
+"""Pictures that may wait: more would only make them old."""
+
+
+def at_own_pace(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
+    """A film's pictures, each when it is due."""
+    start = None
+    for frame in frames:
+        start = time.perf_counter() - frame.time if start is None else start
+        due = start + frame.time
+        if (wait := due - time.perf_counter()) > 0.0:
+            time.sleep(wait)
+        yield frame._replace(clock=due)
+
+
+def newest(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
+    """Pictures as they come, taken by a thread of their own; the oldest are dropped where they come too fast."""
+    waiting: deque[Arrived] = deque(maxlen=_WAITING)
+    ready, stopped, ended = Condition(), Event(), list[BaseException | None]()
+
+    def take() -> None:
+        error: BaseException | None = None
+        try:
+            for frame in frames:
+                with ready:
+                    waiting.append(frame)
+                    ready.notify()
+                if stopped.is_set():
+                    return
+        except BaseException as raised:  # handed over to the thread that takes the pictures
+            error = raised
+        with ready:
+            ended.append(error)
+            ready.notify()
+
+    Thread(target=take, name="pictures", daemon=True).start()
+    try:
+        while True:
+            with ready:
+                ready.wait_for(lambda: waiting or ended)
+                if not waiting:
+                    if ended[0] is not None:
+                        raise ended[0]
+                    return
+                frame = waiting.popleft()
+            yield frame
+    finally:
+        stopped.set()
+
 
 PACES = ("real", "fast")
 _CLOCK_ERROR, _CLOCK_JITTER = 0.02, 0.3

@@ -11,16 +11,14 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from spirillum.argument_kinds import as_number
+from spirillum.argument_validation import as_number
 from spirillum.errors import InputError, clipped
-from spirillum.extras import required
 from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import CameraSetup
 from spirillum.vision.video.display import converter, display_flags, frame_display, stated_aspect
 from spirillum.vision.video.frames import open_video
-
-__all__ = ["Arrived", "Source", "source_of"]
 
 Kind = Literal["film", "camera", "stream"]
 
@@ -70,11 +68,7 @@ class Source:
     """What was odd about its pictures while they were read."""
 
     def frames(self) -> Generator[Arrived, None, None]:
-        """Its pictures until it ends.
-
-        Raises:
-            InputError: if it cannot be opened, stops in the middle, or changes its format or size.
-        """
+        """Its pictures until it ends."""
         if self.kind == "film":
             start, end = self.options["between"]
             for number, frame in enumerate(self.options["video"].frames(start, end)):
@@ -104,9 +98,6 @@ def source_of(
         fps: frames a second that it is asked for.
         camera: of the setup, for the rate of a folder's images, and for what replaces a film's own times or pixels.
         between: first and last time of a film that count, s.
-
-    Raises:
-        InputError: for another word, or options that the source does not have.
     """
     pace, aspect = (None, None) if camera is None else (camera.frames_per_second, camera.pixel_aspect_ratio)
     scheme = word.partition("://")[0].lower() if "://" in word else ""
@@ -140,7 +131,7 @@ def _without_secrets(word: str) -> str:
 
 def _pictures(source: Source) -> Generator[Arrived, None, None]:
     """Pictures of a camera or stream, with the least delay."""
-    av = required("av", "tracking a camera", "video")
+    av = import_optional("av", "tracking a camera", "video")
     count, last, origin, size = 0, -1.0, None, source.options["size"]
     rgb, start = None, 0.0
     try:
@@ -192,9 +183,6 @@ def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | 
         name: of the source.
         size: of a picture, width and height.
         expected: size that was requested, or of the pictures before; None: any.
-
-    Raises:
-        InputError: for another size than the expected one, or one that no camera has.
     """
     if size == expected:
         return size

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.argument_kinds import as_number, checked
+from spirillum.argument_validation import as_number, validate_arguments
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import SMALLEST_SIDE
 from spirillum.live.following import Following
@@ -20,10 +20,8 @@ from spirillum.units import KINDS, parse_option
 from spirillum.vision.camera.camera import opened, samples_of
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.learning import learnt_from
-from spirillum.vision.track.warnings import EVERYTHING
+from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
-
-__all__ = ["LiveTracker", "seconds"]
 
 _SAMPLES = 24
 """Frames from which the robot is learnt, as for a film."""
@@ -37,7 +35,7 @@ class LiveTracker:
     Nothing looks ahead: what is said of a frame follows from it and those before it.
     """
 
-    @checked
+    @validate_arguments
     def __init__(
         self,
         setup: str | Path | Setup,
@@ -114,7 +112,7 @@ class LiveTracker:
         self._collect(now)
         return Observation(now.index, now.time, "learning", self._reason)
 
-    @checked
+    @validate_arguments
     def left_out(self, frames: int) -> None:
         """Count frames that were not handed over, as the tracker was busy.
 
@@ -188,9 +186,6 @@ def seconds(name: str, value: str | float, most: float = 600.0) -> float:
         name: of the option.
         value: with its unit, or a float in s.
         most: the longest one, s.
-
-    Raises:
-        InputError: if it is none, shorter than 0.1 s, or too long.
     """
     found = parse_option(name, value, KINDS["time"])
     if not 0.1 <= found <= most:

@@ -11,8 +11,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.measurement.statistics import student_t_quantile
 
-__all__ = ["Window", "periodic_error", "slope_of"]
-
 _FEWEST = 8
 """Fewest readings of a rate."""
 _LEAST_SPAN = 0.5

@@ -15,8 +15,6 @@ from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.setup import INDICES
 from spirillum.vision.track.colours import colours_named
 
-__all__ = ["across", "length_per_pixel_between", "nose_side", "spacing_between", "stripe_names", "stripes_in_order"]
-
 _SURE = 0.25
 """Largest distance of the number of spacings between two clicks from a whole number."""
 _FEWEST = 4
@@ -40,9 +38,6 @@ def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, 
         one: pixel (u, v) of a mark.
         other: pixel of another one.
         length: length between the marks, m.
-
-    Raises:
-        InputError: if the clicks are too close to each other, or no whole number of spacings lies between them.
     """
     labels = np.unique(lines.strip)
     away = [
@@ -89,9 +84,6 @@ def length_per_pixel_between(
         camera: height of the lens, m.
         surface: height of the oil's surface, m; None: nothing refracts.
         index: refractive index below it, within `INDICES`.
-
-    Raises:
-        InputError: if the clicks are too close to each other, for another index, or what lies above the lens.
     """
     pixels = float(np.hypot(other[0] - one[0], other[1] - one[1]))
     if pixels < _SHORTEST:
@@ -115,9 +107,6 @@ def nose_side(nose: tuple[float, float], rear: tuple[float, float]) -> str:
     Args:
         nose: pixel (u, v) of the nose.
         rear: pixel of the body's rear end.
-
-    Raises:
-        InputError: if the clicks are too close to each other.
     """
     along, down = nose[0] - rear[0], nose[1] - rear[1]
     if max(abs(along), abs(down)) < _SHORTEST:
@@ -133,9 +122,6 @@ def across(points: Sequence[tuple[float, float]], direction: str) -> list[tuple[
     Args:
         points: pixels (u, v).
         direction: where the nose points.
-
-    Raises:
-        InputError: for another direction than those of `nose_side`.
     """
     right = _RIGHT.get(str(direction))
     if right is None:
@@ -167,15 +153,8 @@ def stripes_in_order(seen: Sequence[str], stated: Sequence[str]) -> tuple[tuple[
 
     Whichever side of the body is seen, they follow each other as `across` puts their places.
 
-    Args:
-        seen: names in that order.
-        stated: stripes of the robot file in their order.
-
     Returns:
         The stripes in their order, empty where those of the robot file are right, and that in a sentence.
-
-    Raises:
-        InputError: if the clicks do not say it.
     """
     seen = [name for k, name in enumerate(seen) if k == 0 or name != seen[k - 1]]
     if not stated:

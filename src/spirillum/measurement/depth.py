@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from spirillum.vision.setup import Setup
 
-__all__ = ["apparent_distance", "depth_shares", "spacing_at_axis"]
-
 _STEP = 1e-3
 
 
@@ -44,11 +42,7 @@ def spacing_at_axis(setup: Setup, changed: str = "", by: float = 0.0) -> float:
 
 
 def depth_shares(setup: Setup) -> dict[str, float]:
-    """Relative standard uncertainty of lengths at the height of the axis by what it comes from.
-
-    Args:
-        setup: the setup.
-    """
+    """Relative standard uncertainty of lengths at the height of the axis by what it comes from."""
     markers = setup.markers
     if markers.length_per_pixel is not None:
         share = markers.length_per_pixel_uncertainty / markers.length_per_pixel

@@ -17,8 +17,6 @@ from spirillum.measurement.statistics import NORMAL
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.track import Track
 
-__all__ = ["Elongation", "elongation_of"]
-
 _CLEAR = 0.2
 """Change beyond the ends of its interval from which on it is flagged, pixels. On clean films of bodies that do not tilt
 it is below 0.1."""
@@ -64,11 +62,7 @@ class Elongation(NamedTuple):
 
 
 def elongation_of(track: Track) -> Elongation:
-    """The change of a track; none where its edges were not fitted on enough frames, or there is no scale.
-
-    Args:
-        track: the track.
-    """
+    """The change of a track; none where its edges were not fitted on enough frames, or there is no scale."""
     pixel = track.scale.length_per_pixel
     if track.elongation.size != track.time.size or not math.isfinite(pixel):
         return Elongation(0.0, 0.0, pixel)

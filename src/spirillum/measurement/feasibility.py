@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.measurement.depth import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.units import KINDS, Hz, parse_option
 from spirillum.vision.setup import Setup, load_setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.constants import UNWRAPPING
-
-__all__ = ["Check", "Feasibility", "feasibility"]
 
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
@@ -80,7 +78,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Feasibility(Shown):
+class Feasibility(DisplayMixin):
     """The feasibility of an experiment."""
 
     robot: Robot
@@ -206,11 +204,7 @@ def feasibility(
 
 
 def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
-    """Refuse what a film states itself.
-
-    Raises:
-        InputError: naming the film and the option.
-    """
+    """Refuse what a film states itself."""
     for name, value in (("view-width", view_width), ("width", picture_width)):
         if video is not None and value is not None:
             raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")

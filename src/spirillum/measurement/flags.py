@@ -16,8 +16,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.track import Track
 
-__all__ = ["BY_HAND", "IMPORTED", "SEEN", "SYNTHETIC", "flags_of", "says_synthetic"]
-
 SEEN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
 """Rates measured directly; that of the motor follows from them."""
 BY_HAND = "by-hand"
@@ -62,14 +60,7 @@ _ONCE = {"stripes-unreadable", "tail-unreadable"}
 
 
 def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: Elongation) -> tuple[Flag, ...]:
-    """All flags of a trial, without duplicates and without those that another flag implies.
-
-    Args:
-        fits: the fitted lines, by the names of `SEEN` at least.
-        track: the track, with the flags of the tracker.
-        robot: the robot, for its stripes.
-        elongation: how nose and rear drift apart.
-    """
+    """All flags of a trial, without duplicates and without those that another flag implies."""
     both = (*track.flags, *elongation.flags(), *_own_flags(fits, track, robot))
     flags: list[Flag] = []
     for flag in both:
@@ -144,11 +135,7 @@ def _how(rate: Rate, name: str) -> str:
 
 
 def says_synthetic(words: str) -> bool:
-    """Whether the metadata of a file declare it synthetic.
-
-    Args:
-        words: title and comment of the file.
-    """
+    """Whether the metadata of a file declare it synthetic."""
     return SYNTHETIC in words.lower()
 
 

@@ -14,14 +14,12 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.files.limits import LARGEST_TABLE
-from spirillum.formats.tables import Row, Table, read_readings
+from spirillum.formats.tables import Table, TableRow, read_readings
 from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.track import Track
-
-__all__ = ["read_track"]
 
 _WHAT = "a track of trackpy, DeepLabCut or Tracker in pixels (CSV)"
 _NEEDED = "x, y and frame (trackpy) or t (Tracker), or DeepLabCut's table"
@@ -61,9 +59,6 @@ def read_track(
         ruled: turns pixels into lengths.
         time_of: takes numbers of frames to times, s.
         frame_of: takes times, s, to the numbers of the frames that were taken then; NaN where there is none.
-
-    Raises:
-        InputError: if it is none of them, or a cell is wrong; the sentence names row and column.
     """
     path = Path(path)
     first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()
@@ -94,12 +89,8 @@ def read_track(
     )  # fmt: skip
 
 
-def _check_inside(rows: Sequence[Row], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
-    """Refuse points from outside the picture.
-
-    Raises:
-        InputError: if there is one; the sentence names row and column.
-    """
+def _check_inside(rows: Sequence[TableRow], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
+    """Refuse points from outside the picture."""
     for name, values, pixels in zip(names, points.T, size, strict=True):
         for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
             raise rows[int(place)].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")
@@ -139,7 +130,7 @@ def _trackpy(path: Path, size: tuple[int, int], frame_of: Callable[[Samples], Sa
 
 
 def _frame_numbers(
-    rows: Sequence[Row], values: Samples, timed: str | None, frame_of: Callable[[Samples], Samples] | None
+    rows: Sequence[TableRow], values: Samples, timed: str | None, frame_of: Callable[[Samples], Samples] | None
 ) -> Samples:
     """Numbers of frames, from a column of them or, with its name, from one of times."""
     for row, value in zip(rows, values, strict=True):
@@ -189,12 +180,8 @@ def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
     return frame, *(missing if item is None else item for item in (nose, rear, centre))  # type: ignore[return-value]
 
 
-def _columns(heads: dict[str, list[str]], rows: Sequence[Row], path: Path) -> dict[tuple[str, str], int]:
-    """Columns by point and coordinate, of the one individual that has points.
-
-    Raises:
-        InputError: if several have some.
-    """
+def _columns(heads: dict[str, list[str]], rows: Sequence[TableRow], path: Path) -> dict[tuple[str, str], int]:
+    """Columns by point and coordinate, of the one individual that has points."""
     parts, coordinates = heads["bodyparts"], heads["coords"]
     places = [place for place, cell in enumerate(coordinates) if place > 0 and cell]
     owners = heads.get(_OWNERS, [""] * len(parts))
@@ -209,7 +196,7 @@ def _columns(heads: dict[str, list[str]], rows: Sequence[Row], path: Path) -> di
     return {(parts[place], coordinates[place]): place for place in places if owners[place] in kept}
 
 
-def _frames(rows: Sequence[Row], coordinates: Sequence[str]) -> Samples:
+def _frames(rows: Sequence[TableRow], coordinates: Sequence[str]) -> Samples:
     """Numbers of frames, by the first column; where labels are of images, by the numbers that end their names."""
     last = next((place for place, cell in enumerate(coordinates) if place > 0 and cell), 1) - 1
     if last == 0 and "." not in "".join(row.text(0) for row in rows[:1]):

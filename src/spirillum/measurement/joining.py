@@ -11,23 +11,14 @@ from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, protected, whole_file
 from spirillum.measurement.observations import COLUMNS, observation_table, read_observations
 
-__all__ = ["join_observations"]
-
 _TABLES = {".csv": "an observations file"}
 
 
 def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     """Write the rows of several observation files to one, with all their comments.
 
-    Args:
-        files: observation files (CSV or Parquet), two or more.
-        output: the new file (.csv); it may not be one of them.
-
     Returns:
         Number of rows.
-
-    Raises:
-        InputError: if a file is wrong, or the files contradict each other, as by a trial that stands twice.
     """
     paths = [Path(file) for file in files]
     if len(paths) < 2:

@@ -16,8 +16,6 @@ import numpy as np
 from spirillum.robust import mad_scale
 from spirillum.vision.track.track import Track
 
-__all__ = ["LEADING", "without_lead"]
-
 LEADING = 6
 """First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave."""
 _FEWEST = 40
@@ -31,11 +29,7 @@ _MOST = 4.0
 
 
 def without_lead(track: Track) -> Track:
-    """The track without its first frames, where the first one is ahead of what the next ones say.
-
-    Args:
-        track: the track; its flags, errors and picture stay what they are.
-    """
+    """The track without its first frames, where the first one is ahead of what the next ones say."""
     if track.time.size < _FEWEST or not _leads(track):
         return track
     first = np.arange(track.time.size) < LEADING

@@ -11,25 +11,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.formats.tables import Row, Table, check_known, read_readings
+from spirillum.formats.tables import Table, TableRow, check_known, read_readings
 from spirillum.measurement.flags import BY_HAND
 from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.track import Track
-
-__all__ = [
-    "EDGE",
-    "MARK_COLUMNS",
-    "Marks",
-    "Ruled",
-    "check_pixels",
-    "check_times",
-    "corrected",
-    "frames_read",
-    "read_marks",
-    "track_of_marks",
-]
 
 _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
@@ -119,13 +106,10 @@ def read_marks(path: str | Path) -> dict[str, Marks]:
 
     Returns:
         The readings by video; the key is empty where the table has no such column.
-
-    Raises:
-        InputError: if a column is unknown, one is missing, or a cell is wrong; the sentence names row and column.
     """
     table = read_readings(path, _WHAT)
     _check_columns(table)
-    rows: dict[str, list[Row]] = {}
+    rows: dict[str, list[TableRow]] = {}
     place = table.column("video")
     for row in table.rows():
         rows.setdefault("" if place is None else row.text(place), []).append(row)
@@ -140,7 +124,7 @@ def _check_columns(table: Table) -> None:
         raise InputError(f"{table.path} holds no readings; allowed: at least one column of {', '.join(_READINGS)}")
 
 
-def _marks(table: Table, rows: list[Row]) -> Marks:
+def _marks(table: Table, rows: list[TableRow]) -> Marks:
     def column(name: str, factor: float = 1.0) -> Samples:
         place = table.column(name)
         return np.array([math.nan if place is None else factor * row.number(place, name) for row in rows])
@@ -195,9 +179,6 @@ def check_times(marks: Marks, duration: float | None) -> None:
     Args:
         marks: the readings.
         duration: duration of the video, s; None where unknown.
-
-    Raises:
-        InputError: if there is one; the sentence names its row.
     """
     if duration is None:
         return
@@ -209,15 +190,7 @@ def check_times(marks: Marks, duration: float | None) -> None:
 
 
 def check_pixels(marks: Marks, size: tuple[int, int]) -> None:
-    """Refuse readings outside the picture.
-
-    Args:
-        marks: the readings.
-        size: width and height of the picture, pixels.
-
-    Raises:
-        InputError: if there is one; the sentence names its row.
-    """
+    """Refuse readings outside the picture."""
     for name, values, pixels in zip(("x_px", "y_px"), marks.pixels.T, size, strict=True):
         for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
             row = f"row {marks.lines[place]}" if marks.lines else f"reading {place + 1}"
@@ -260,9 +233,6 @@ def track_of_marks(
         video: name of the video.
         ruled: maps pixels to lengths; None where no reading is in pixels.
         time_of: maps frame numbers to times, s; None where unknown.
-
-    Raises:
-        InputError: if a reading has no time.
     """
     time = marks.time.copy()
     missing = ~np.isfinite(time)
@@ -328,9 +298,6 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
         track: the automatic track.
         marks: the readings.
         ruled: maps pixels to lengths.
-
-    Raises:
-        InputError: if a reading belongs to no frame of the track; the sentence names its row.
     """
     index = _frames_of(track, marks)
     frames = "1 frame carries a reading" if index.size == 1 else f"{index.size} frames carry readings"
@@ -354,15 +321,7 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
 
 
 def frames_read(track: Track, marks: Marks) -> np.ndarray:
-    """Mask of the frames of a track that were read by hand, (n,).
-
-    Args:
-        track: the track.
-        marks: the readings.
-
-    Raises:
-        InputError: if a reading belongs to no frame of the track; the sentence names its row.
-    """
+    """Mask of the frames of a track that were read by hand, (n,)."""
     found = np.zeros(track.time.size, dtype=bool)
     found[_frames_of(track, marks)] = True
     return found

@@ -8,7 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spirillum.answer import envelope
+import numpy as np
+
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, file_name
 from spirillum.measurement.imported import read_track
@@ -21,21 +24,100 @@ from spirillum.measurement.marks import (
     read_marks,
     track_of_marks,
 )
+from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
 from spirillum.measurement.setup_template import setup_remarks
-from spirillum.measurement.summary import Summary, compared, summary_of
+from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.track_check import check_track
-from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
+from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
 from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.follow import Watcher, follow
 from spirillum.vision.track.track import Track
 from spirillum.vision.video.frames import Video
 
-__all__ = ["TABLE", "Asked", "Measurement", "Progress", "asked_of", "measured_trial", "measurement_of"]
+_LENGTHS = ("forward_velocity", "lateral_position")
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Means over trials."""
+
+    quantities: Mapping[str, Measured]
+    """Means by the names of `MEASURED`."""
+    counts: Mapping[str, int]
+    """Number of trials that entered each mean."""
+    trials: int
+    """Number of all trials."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of lengths, common to all trials."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        found = {name: item.to_dict(n=self.counts[name]) for name, item in self.quantities.items()}
+        return {"n": self.trials, **found, "scale_uncertainty": self.scale_uncertainty}
+
+
+def summary_of(trials: Sequence[Trial]) -> Summary:
+    """Means over trials with Student's t intervals; that of a single trial is its own.
+
+    The uncertainty of the scale is common to all trials: averaging does not reduce it.
+    """
+    shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
+    quantities, counts = {}, {}
+    for name in MEASURED:
+        measured = [trial.quantities[name] for trial in trials if math.isfinite(trial.quantities[name].value)]
+        counts[name] = len(measured)
+        quantities[name] = _mean(name, measured, trials, shared)
+    return Summary(quantities, counts, len(trials), shared)
+
+
+def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shared: float) -> Measured:
+    if not measured:
+        first = trials[0].quantities[name]
+        return replace(first, reason=first.reason or "no trial measured it")
+    if len(measured) == 1:
+        return measured[0]
+    mean = mean_with_interval([item.value for item in measured], LEVEL)
+    reach = mean.half_width
+    if name in _LENGTHS:
+        reach = math.hypot(reach, NORMAL * shared * mean.value)
+    if name in WOBBLES:  # the error of tracking is common to all trials
+        reach = max(reach, float(np.mean([item.high - item.value for item in measured])))
+    low = mean.value - reach
+    if name in WOBBLES:
+        low = max(low, 0.0)  # an amplitude
+    return Measured(mean.value, low, mean.value + reach, measured[0].unit)
+
+
+def compared(trials: Sequence[Trial]) -> list[Trial]:
+    """All trials, with flags on outliers (Grubbs' test) and on copies of another trial."""
+    found = [_copy_flagged(trial, trials[:place]) for place, trial in enumerate(trials)]
+    for name in RATE_NAMES:
+        worst = outlying_trial([trial.quantities[name].value for trial in trials])
+        if worst is None:
+            continue
+        sentence = (
+            f"its {name.replace('_', ' ')} does not fit in with the other trials (Grubbs' test, {100 * GRUBBS_LEVEL:g} "
+            "%); it still counts in the means"
+        )
+        found[worst] = found[worst].flagged(Flag(f"outlier-{name.replace('_', '-')}", sentence))
+    return found
+
+
+def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
+    """The trial, flagged if its track equals that of another one."""
+    x = trial.track.position[:, 0]
+    twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
+    if twin is None or not np.isfinite(x).any():
+        return trial
+    sentence = (
+        f"it shows the same as {twin.name}, frame by frame: a copy is no second trial, yet it counts in the means"
+    )
+    return trial.flagged(Flag("copy-of-a-trial", sentence))
+
 
 Progress = Callable[[str, int, int], None]
 TABLE = "observations.csv"
@@ -43,7 +125,7 @@ TABLE = "observations.csv"
 
 
 @dataclass(frozen=True)
-class Measurement(Shown):
+class Measurement(DisplayMixin):
     """What was measured of a robot in one or several trials."""
 
     trials: tuple[Trial, ...]
@@ -158,9 +240,6 @@ def asked_of(
         start: time in the video from which on to measure, s, instead of the setup's.
         end: time until which to measure, s.
         overrides: dotted fields of the robot, as for `spirillum.load`.
-
-    Raises:
-        InputError: if setup, robot, a name or a table is wrong.
     """
     given = [videos] if isinstance(videos, (str, Path)) else list(videos)
     words = [*(("video", video) for video in given), ("marks", marks), ("track", track)]
@@ -182,18 +261,7 @@ def measured_trial(
     progress: Callable[[int, int | None], None] | None = None,
     on_frame: Watcher | None = None,
 ) -> Trial:
-    """Speed, rates and wobble from one video.
-
-    Args:
-        asked: what is measured.
-        number: place of the video among them.
-        video: its path, or the video opened.
-        progress: called with frames done and, where it is known, frames in all.
-        on_frame: called with every frame and what was found on it.
-
-    Raises:
-        InputError: if the video cannot be measured.
-    """
+    """Speed, rates and wobble from one video."""
     path, name, marks = asked.videos[number], asked.names[number], asked.readings[number]
     if asked.tracking and asked.track is None:
         track = follow(video, asked.setup, asked.robot, folder=asked.folder, progress=progress, on_frame=on_frame)
@@ -233,14 +301,7 @@ def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Asked) -
 def measurement_of(
     asked: Asked, trials: Sequence[Trial], failures: Sequence[tuple[str, str]] = (), *, interrupted: bool = False
 ) -> Measurement:
-    """All trials compared with each other, and their summary.
-
-    Args:
-        asked: what was measured.
-        trials: the trials, one at least.
-        failures: videos that could not be measured, each with a sentence.
-        interrupted: whether it was interrupted before the last video.
-    """
+    """All trials compared with each other, and their summary."""
     compared_trials = compared(trials)
     return Measurement(
         tuple(compared_trials),
@@ -303,11 +364,7 @@ def _clash(one: str, other: str) -> bool:
 def _readings(
     paths: Sequence[Path], marks: str | Path | None, track: str | Path | None, *, tracking: bool
 ) -> list[Marks | None]:
-    """The readings by hand of each video.
-
-    Raises:
-        InputError: if the table is wrong, or names no video or another one.
-    """
+    """The readings by hand of each video."""
     if track is not None and len(paths) != 1:
         raise InputError(f"track = {track} with {len(paths)} videos; allowed: one video")
     if marks is None:

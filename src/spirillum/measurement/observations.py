@@ -11,33 +11,18 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.files.numbers import number_in
-from spirillum.formats.tables import Row, Table, check_known, check_present, read_table
-from spirillum.measurement.rate_checks import Rates, check_motor_rates, first_of, rows_in_words, wrong_signs
+from spirillum.formats.tables import Table, TableRow, check_known, check_present, read_table
+from spirillum.measurement.rate_checks import RateTriples, check_motor_rates, first_of, rows_in_words, wrong_signs
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
 from spirillum.robot.robot import Robot
 from spirillum.units import Hz
-
-__all__ = [
-    "COLUMNS",
-    "RATES",
-    "Observation",
-    "Observed",
-    "all_rates",
-    "check_driven",
-    "check_signs",
-    "driven_sense",
-    "observation_table",
-    "read_observations",
-    "summarised",
-    "unread_columns",
-]
 
 _MM = 1e-3
 _KEYS = {"channel_diameter_mm": _MM, "wavelength_mm": _MM, "amplitude_mm": _MM}
 RATES = {"forward_velocity_mm_s": _MM, "tail_rate_Hz": Hz, "body_rate_Hz": Hz, "motor_rate_Hz": Hz}
 """Measured columns and their factor to SI."""
 _FIELDS = tuple(name.rpartition("_")[0].removesuffix("_mm") for name in RATES)
-"""Fields of an `Observation` for the measured columns."""
+"""Fields of an `ObservationRow` for the measured columns."""
 _INTERVALS = {f"{name}_ci95": factor for name, factor in RATES.items()}
 COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 """All columns; those after the trial number may be left out or left empty."""
@@ -50,7 +35,7 @@ _SMALLEST_RATE = 1e-6 * Hz
 
 
 @dataclass(frozen=True)
-class Observation:
+class ObservationRow:
     """One row: a trial, or a mean over trials, SI."""
 
     row: int
@@ -81,7 +66,7 @@ class Observation:
 
 
 @dataclass(frozen=True)
-class Observed:
+class RobotObservations:
     """All that was observed of one robot, with 95 % intervals, SI."""
 
     forward_velocity: Mean
@@ -90,16 +75,8 @@ class Observed:
     motor_rate: Mean
 
 
-def read_observations(path: str | Path) -> list[Observation]:
-    """Read and check an observations file.
-
-    Args:
-        path: tidy CSV, in which `#` starts a comment line, or the same columns in a Parquet file (`.parquet`). Columns
-            of other names are notes.
-
-    Raises:
-        InputError: if the file or a cell is wrong; the sentence names file, row and column.
-    """
+def read_observations(path: str | Path) -> list[ObservationRow]:
+    """Read and check an observations file."""
     table = observation_table(path)
     _check_header(table)
     found = [_observation(row) for row in table.rows()]
@@ -108,23 +85,16 @@ def read_observations(path: str | Path) -> list[Observation]:
     return found
 
 
-def all_rates(observations: Iterable[Observation]) -> Rates:
+def all_rates(observations: Iterable[ObservationRow]) -> RateTriples:
     """The rows that hold tail, body and motor rate."""
     rows = [item for item in observations if not item.motor_derived and math.isfinite(item.tail_rate - item.body_rate)]
     columns = [(item.tail_rate, item.body_rate, item.motor_rate, math.hypot(*item.intervals[1:])) for item in rows]
     tail, body, motor, half_width = np.array(columns, dtype=float).reshape(-1, 4).T
-    return Rates([item.row for item in rows], tail, body, motor, half_width / NORMAL)
+    return RateTriples([item.row for item in rows], tail, body, motor, half_width / NORMAL)
 
 
 def observation_table(path: str | Path) -> Table:
-    """Header, rows and comments of an observations file, not yet checked.
-
-    Args:
-        path: CSV, or Parquet, which has no comments.
-
-    Raises:
-        InputError: if the file cannot be read as a table, or has no rows.
-    """
+    """Header, rows and comments of an observations file, not yet checked."""
     table = read_table(path, _WHAT, largest=_LARGEST, parquet=True)
     if not table.below:
         raise InputError(f"{path} holds no observations; allowed: a header line and at least one row")
@@ -148,7 +118,7 @@ def _check_header(table: Table) -> None:
         raise InputError(f"{path} has no measured column; allowed: at least one of {', '.join(RATES)}")
 
 
-def _observation(row: Row) -> Observation:
+def _observation(row: TableRow) -> ObservationRow:
     place = row.place
     channel_diameter, wavelength, amplitude = (_number(row, name, _MM, least=1e-6) for name in _KEYS)
     rates = [_number(row, name, factor) for name, factor in RATES.items()]
@@ -165,7 +135,7 @@ def _observation(row: Row) -> Observation:
     trials = _trials(row)
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
         d = math.hypot(b, c) if trials == 1 else b + c
-    return Observation(
+    return ObservationRow(
         row=row.line,
         robot=row.text("robot"),
         channel_diameter=channel_diameter,
@@ -182,14 +152,14 @@ def _observation(row: Row) -> Observation:
     )
 
 
-def _check_trial(row: Row) -> None:
+def _check_trial(row: TableRow) -> None:
     """A trial has a name or a whole number: a fraction has slipped in from another column."""
     number = number_in(row.text("trial"))
     if not math.isnan(number) and not number.is_integer():
         raise row.error("trial", row.text("trial"), "a whole number, or a name")
 
 
-def _number(row: Row, name: str, factor: float, least: float | None = None) -> float:
+def _number(row: TableRow, name: str, factor: float, least: float | None = None) -> float:
     """One cell in SI; NaN where it is empty and may be.
 
     Args:
@@ -204,7 +174,7 @@ def _number(row: Row, name: str, factor: float, least: float | None = None) -> f
     return factor * row.number(name, name, low=low, high=_LARGEST_NUMBER, blank=blank, allowed=wanted)
 
 
-def _trials(row: Row) -> int:
+def _trials(row: TableRow) -> int:
     text = row.text("trials")
     if not text:
         return 1
@@ -213,9 +183,9 @@ def _trials(row: Row) -> int:
     return int(text)
 
 
-def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
+def _check_duplicates(path: Path, observations: Iterable[ObservationRow]) -> None:
     """A robot's mean stands alone, and a trial stands once: else something would count twice."""
-    seen: dict[tuple[float, float, float], Observation] = {}
+    seen: dict[tuple[float, float, float], ObservationRow] = {}
     trials: dict[tuple[object, ...], int] = {}
     for item in observations:
         first = trials.setdefault((item.tail, item.trial or item.row), item.row)
@@ -232,20 +202,9 @@ def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
 
 
 def check_signs(
-    path: str | Path, observations: Sequence[Observation], columns: Iterable[str], expected: float, allowed: str
+    path: str | Path, observations: Sequence[ObservationRow], columns: Iterable[str], expected: float, allowed: str
 ) -> None:
-    """Refuse values whose sign contradicts the physics by more than their own error.
-
-    Args:
-        path: the file, for the sentence of an error.
-        observations: the rows of one robot.
-        columns: the columns to look at, of `RATES`.
-        expected: sign that the values should have.
-        allowed: what the sentence says is allowed.
-
-    Raises:
-        InputError: if there are some; the sentence names column and rows.
-    """
+    """Refuse values whose sign contradicts the physics by more than their own error."""
     for column in columns:
         place = list(RATES).index(column)
         values = [getattr(item, _FIELDS[place]) for item in observations]
@@ -265,26 +224,22 @@ def driven_sense(robot: Robot) -> float:
     return float(-robot.hand if reverse else robot.hand)
 
 
-def check_driven(path: str | Path, observations: Sequence[Observation], robot: Robot) -> None:
-    """Refuse rates of a tail that turns against the sense in which it is driven, see `check_signs`.
-
-    Raises:
-        InputError: if there are some; the sentence names column and rows.
-    """
+def check_driven(path: str | Path, observations: Sequence[ObservationRow], robot: Robot) -> None:
+    """Refuse rates of a tail that turns against the sense in which it is driven, see `check_signs`."""
     sense = driven_sense(robot)
     allowed = f"{'positive' if sense > 0 else 'negative'}, as the {robot.tail.handedness}-handed tail is driven"
     check_signs(path, observations, ("tail_rate_Hz", "motor_rate_Hz"), sense, allowed)
 
 
-def summarised(observations: Iterable[Observation]) -> dict[tuple[float, float, float], Observed]:
+def summarised(observations: Iterable[ObservationRow]) -> dict[tuple[float, float, float], RobotObservations]:
     """Mean and 95 % interval of every robot, by (channel diameter, wavelength, amplitude)."""
-    groups: dict[tuple[float, float, float], list[Observation]] = {}
+    groups: dict[tuple[float, float, float], list[ObservationRow]] = {}
     for item in observations:
         groups.setdefault(item.tail, []).append(item)
     return {tail: _observed(items) for tail, items in groups.items()}
 
 
-def _observed(items: Sequence[Observation]) -> Observed:
+def _observed(items: Sequence[ObservationRow]) -> RobotObservations:
     columns = [
         [item.forward_velocity for item in items],
         [item.tail_rate for item in items],
@@ -293,5 +248,7 @@ def _observed(items: Sequence[Observation]) -> Observed:
     ]
     if len(items) == 1:
         only = items[0]
-        return Observed(*(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True)))
-    return Observed(*(mean_with_interval(column) for column in columns))
+        return RobotObservations(
+            *(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True))
+        )
+    return RobotObservations(*(mean_with_interval(column) for column in columns))

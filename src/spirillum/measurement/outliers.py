@@ -10,8 +10,6 @@ from spirillum.arrays import Samples
 from spirillum.measurement.statistics import student_t_quantile
 from spirillum.robust import mad_scale, repeated_median_line, running_median
 
-__all__ = ["GRUBBS_LEVEL", "outlying_frames", "outlying_trial"]
-
 GRUBBS_LEVEL = 0.01
 """Significance level of Grubbs' test: the probability that it names one of trials of one distribution."""
 _WINDOW = 9
@@ -73,9 +71,6 @@ def _far(residual: Samples, least: Samples) -> np.ndarray:
 
 def outlying_trial(values: Sequence[float]) -> int | None:
     """The trial that does not fit in with the others, by Grubbs' test (1950), two-sided, at 1 %.
-
-    Args:
-        values: one value a trial; NaN is left out.
 
     Returns:
         Its index; None if all fit, or with fewer than three.

@@ -10,21 +10,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from spirillum.answer import envelope
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, new_file, output_target
 from spirillum.measurement.setup_template import KNOWN, setup_text, toml_value
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.track.constants import IDENTITY, SCOUTING, SIZE
-from spirillum.vision.track.scouting import Scouted, scouted
+from spirillum.vision.track.setup_free_detection import Scouted, scouted
 from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.video.frames import Video, open_video
-
-__all__ = ["Finding", "Proposal", "propose_setup"]
 
 Confidence = Literal["clear", "doubtful", "not found"]
 _OUTER = 1.1
@@ -67,7 +65,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Proposal(Shown):
+class Proposal(DisplayMixin):
     """A setup as far as a film tells it."""
 
     film: str

@@ -33,7 +33,7 @@ _AGREE, _CONTRADICT = 0.2, 0.8
 _MOST_NAMED = 6
 
 
-class Rates(NamedTuple):
+class RateTriples(NamedTuple):
     """Rows of a file that hold all three rates, rad/s, each (n,)."""
 
     rows: Sequence[int]
@@ -59,12 +59,8 @@ def rows_in_words(rows: Iterable[int]) -> str:
     return f"{'row' if len(numbers) == 1 else 'rows'} {', '.join(parts[:_MOST_NAMED])}{more}"
 
 
-def check_motor_rates(path: str | Path, rates: Rates) -> None:
-    """Refuse motor rates that are tail plus body rate throughout, or that contradict tail less body rate.
-
-    Raises:
-        InputError: if the rows together say so; the sentence names them.
-    """
+def check_motor_rates(path: str | Path, rates: RateTriples) -> None:
+    """Refuse motor rates that are tail plus body rate throughout, or that contradict tail less body rate."""
     if not rates.rows:
         return
     if convention_evidence(rates) > math.log(_DECISIVE):
@@ -77,7 +73,7 @@ def check_motor_rates(path: str | Path, rates: Rates) -> None:
     _check_contradictions(path, rates)
 
 
-def convention_doubt(rates: Rates) -> tuple[str, ...]:
+def convention_doubt(rates: RateTriples) -> tuple[str, ...]:
     """A sentence where motor rates fit tail plus body rate better than tail less body rate, but not decisively."""
     if not rates.rows or not math.log(_DOUBTFUL) < convention_evidence(rates) <= math.log(_DECISIVE):
         return ()
@@ -87,7 +83,7 @@ def convention_doubt(rates: Rates) -> tuple[str, ...]:
     )
 
 
-def convention_evidence(rates: Rates) -> float:
+def convention_evidence(rates: RateTriples) -> float:
     """Logarithm of the likelihood ratio of tail plus body rate to tail less body rate as the motor's.
 
     Errors are normal, relative to the motor's rate. Their standard deviation is the stated one, or `_TYPICAL`, times a
@@ -113,7 +109,7 @@ def _log_likelihood(residuals: Samples, spread: Samples, width: float) -> float:
     return float(np.logaddexp.reduce(-0.5 * (np.square(exponents / width) + squares + determinants)))
 
 
-def _check_contradictions(path: str | Path, rates: Rates) -> None:
+def _check_contradictions(path: str | Path, rates: RateTriples) -> None:
     difference = rates.tail - rates.body
     size = np.maximum(np.abs(rates.motor), np.abs(difference))
     off = (rates.motor - difference) / size

@@ -19,8 +19,6 @@ from spirillum.arrays import Samples
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.statistics import student_t, student_t_quantile
 
-__all__ = ["PeriodicError", "Rate", "mean_of", "rate_of"]
-
 _MOST_BLOCKS = 100
 """Most blocks into which frames are averaged: a slope is a low-frequency quantity; the cost is cubic in blocks."""
 _SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)
@@ -435,10 +433,6 @@ def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
 
     The last coefficient of a parabola, which tells a steady change, or of a cubic is tested against 0. As its standard
     error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no change.
-
-    Args:
-        blocks: the series.
-        curves: polynomials of rising degree.
     """
     if blocks.s.size < _FEWEST_BLOCKS or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False

@@ -12,8 +12,6 @@ from spirillum.measurement.observations import RATES
 from spirillum.measurement.trials import Measured, Trial
 from spirillum.robot.robot import Robot
 
-__all__ = ["observation_rows"]
-
 _KEYS = ("robot", "channel_diameter_mm", "wavelength_mm", "amplitude_mm", "trial")
 _SEEN = {
     "forward_velocity": "forward_velocity_mm_s",
@@ -25,11 +23,6 @@ _SEEN = {
 
 def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str | None:
     """Text of an observations file, a row a trial with its own intervals, as `spirillum calibrate` reads it.
-
-    Args:
-        trials: the trials.
-        robot: the robot; channel and tail are its own.
-        setup: name of the setup file, for the comment.
 
     Returns:
         The text; None if the robot swims in no channel, or nothing was measured.

@@ -14,18 +14,11 @@ from spirillum.version import versions
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 
-__all__ = ["movement_of", "series_of"]
-
 _RESIDUAL_UNITS = ("m", "rad", "rad", "rad")
 
 
 def series_of(trial: Trial, robot: Robot) -> Labelled:
-    """Pose, angles, standard errors and residuals on every frame; SI units, rates in rad/s.
-
-    Args:
-        trial: the trial.
-        robot: the robot, for the settings in the attributes.
-    """
+    """Pose, angles, standard errors and residuals on every frame; SI units, rates in rad/s."""
     track = trial.track
     stripes = stripes_of(track.setup, robot)
     frame = np.round(track.frame).astype(np.int64) if np.isfinite(track.frame).all() else track.frame
@@ -99,10 +92,6 @@ def movement_of(trial: Trial, robot: Robot) -> Labelled:
     """The track as a poses data set of the `movement` project: one individual with two keypoints, in pixels.
 
     Dimensions are time, space, keypoints and individuals; variables `position` and `confidence`; x is u, y is v.
-
-    Args:
-        trial: the trial.
-        robot: the robot, for its name.
     """
     track = trial.track
     points = track.picture.reshape(-1, 2, 2)  # frame, point, coordinate

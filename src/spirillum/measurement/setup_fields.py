@@ -10,18 +10,12 @@ from spirillum.measurement.setup_template import setup_text, toml_value
 from spirillum.robot.problems import problems_in
 from spirillum.vision.setup import WHAT, Setup
 
-__all__ = ["setup_fields", "setup_file", "setup_problems"]
-
 Fields = Mapping[str, Any]
 """Texts with their unit, numbers and lists of names by dotted field."""
 
 
 def setup_file(fields: Fields) -> str:
-    """The text of a setup file.
-
-    Args:
-        fields: what is known.
-    """
+    """The text of a setup file."""
     return setup_text({name: (toml_value(value), "") for name, value in fields.items()})
 
 
@@ -41,15 +35,7 @@ def setup_problems(fields: Fields) -> list[str]:
 
 
 def setup_fields(text: str, source: str) -> dict[str, Any]:
-    """The fields that the text of a setup file gives, as it gives them.
-
-    Args:
-        text: the file.
-        source: its name, for messages.
-
-    Raises:
-        InputError: if it is no TOML.
-    """
+    """The fields that the text of a setup file gives, as it gives them."""
     found: dict[str, Any] = {}
 
     def walk(table: Mapping[str, Any], above: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import envelope, quantity
+from spirillum.envelope import envelope, quantity
 from spirillum.files import new_file, output_target
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.fields import field_values
@@ -19,8 +19,6 @@ from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
-
-__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_remarks", "setup_text", "toml_value"]
 
 _HEAD = """\
 # A setup: what is known of camera, tank, ruler and robot. Heights count from the reference plane: the tank's floor
@@ -124,15 +122,7 @@ def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: 
 
 
 def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
-    """Write a setup file to fill in.
-
-    Args:
-        path: file to write, `.toml`.
-        overwrite: replace a file that is there.
-
-    Raises:
-        InputError: if the file is there or cannot be written.
-    """
+    """Write a setup file to fill in."""
     new_file(
         output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), setup_text(), overwrite=overwrite
     )
@@ -144,9 +134,6 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     Args:
         path: the setup file.
         film: a film that was taken with it; None: none is looked at.
-
-    Raises:
-        InputError: if the file or the robot that it names is wrong, or ruler or robot are not found in the film.
     """
     setup, robot = load_setup(path)
     fields = {
@@ -173,11 +160,7 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
 
 
 def setup_remarks(setup: Setup) -> list[str]:
-    """What a setup says of its uncertainties that whoever uses its lengths has to know, a sentence each.
-
-    Args:
-        setup: the setup.
-    """
+    """What a setup says of its uncertainties that whoever uses its lengths has to know, a sentence each."""
     found = []
     if not depth_shares(setup):
         found.append(

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from spirillum.units import for_people, shown_in
 
-__all__ = ["ShownNumber", "shown"]
-
 _MOST_DIGITS = 7
 """Digits of a value at most, however narrow its interval is."""
 _MOST_DECIMALS = 9

@@ -12,8 +12,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = ["NORMAL", "Mean", "mean_with_interval", "student_t", "student_t_quantile"]
-
 NORMAL = 1.959964
 """Half width of a 95 % interval over its standard deviation, of a normal distribution."""
 

@@ -4,19 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = [
-    "AMPLITUDE_ERROR",
-    "DRIFT_ANGLE",
-    "DRIFT_BARE",
-    "DRIFT_PIXELS",
-    "HEADING_ERROR",
-    "LONG",
-    "PHASE_ERROR",
-    "PIXEL_ERROR",
-    "POSITION_ERROR",
-    "STRIPE_ERROR",
-]
-
 PIXEL_ERROR = 0.03
 """Least expected amplitude of periodic errors of the position, by an angle or by the pixel grid, pixels."""
 AMPLITUDE_ERROR = 0.12

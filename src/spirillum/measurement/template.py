@@ -6,19 +6,17 @@ import math
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import envelope
+from spirillum.envelope import envelope
 from spirillum.files import new_file, output_target
 from spirillum.measurement.observations import (
     COLUMNS,
-    Observation,
+    ObservationRow,
     all_rates,
     observation_table,
     read_observations,
     unread_columns,
 )
 from spirillum.measurement.rate_checks import convention_doubt
-
-__all__ = ["new_observations_file", "observations_answer"]
 
 _TEMPLATE = """\
 # Observed speeds and rates, one row for each trial. Lines that start with # are comments.
@@ -35,25 +33,13 @@ _TEMPLATE = """\
 
 
 def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
-    """Write an empty observations file: comments and the header.
-
-    Args:
-        path: file to write, `.csv`.
-        overwrite: replace a file that is there.
-
-    Raises:
-        InputError: if the file is there or cannot be written.
-    """
+    """Write an empty observations file: comments and the header."""
     target = output_target(path, {".csv": "an observations file"}, "observations.csv", replace="none")
     new_file(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n", overwrite=overwrite)
 
 
 def observations_answer(path: str | Path) -> dict[str, Any]:
-    """The answer of `spirillum observations check`.
-
-    Raises:
-        InputError: if the file is wrong.
-    """
+    """The answer of `spirillum observations check`."""
     items = read_observations(path)
     names = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
     content = {
@@ -68,6 +54,6 @@ def observations_answer(path: str | Path) -> dict[str, Any]:
     return envelope("observations", content, (*unread_columns(observation_table(path)), *doubts))
 
 
-def _measured(item: Observation, name: str) -> bool:
+def _measured(item: ObservationRow, name: str) -> bool:
     """Whether a row holds a quantity itself: a motor rate may be tail less body rate."""
     return math.isfinite(getattr(item, name)) and not (name == "motor_rate" and item.motor_derived)

@@ -16,8 +16,6 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.track import Track
 
-__all__ = ["check_track"]
-
 _BESIDE = 0.5
 """Distance from the robot's axis from which on a track is not the robot's, body lengths."""
 _OTHERWISE = 0.25
@@ -28,19 +26,7 @@ _PIXELS = "pixels of the stored picture from its upper left corner, y downwards,
 
 
 def check_track(track: Track, table: Path, video: Path, setup: Setup, robot: Robot, folder: Path) -> tuple[Flag, ...]:
-    """Flags on a track that cannot be, or does not stand, compared with the robot that the first look finds.
-
-    Args:
-        track: the track.
-        table: where it is from.
-        video: the film or folder.
-        setup: its setup.
-        robot: the robot in front of the camera.
-        folder: folder of the setup file.
-
-    Raises:
-        InputError: if the robot is clearly somewhere else.
-    """
+    """Flags on a track that cannot be, or does not stand, compared with the robot that the first look finds."""
     film = opened(video, setup)
     try:
         known = learnt_from(film, samples_of(film, setup.start, setup.end), setup, robot, folder).known

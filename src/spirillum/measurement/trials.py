@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import Samples
+from spirillum.envelope import quantity
 from spirillum.measurement.elongation import elongation_of
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.lead import without_lead
@@ -34,16 +34,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.track import Track
-
-__all__ = [
-    "LEVEL",
-    "MEASURED",
-    "RATE_NAMES",
-    "WOBBLES",
-    "Measured",
-    "Trial",
-    "trial_of",
-]
 
 LEVEL = 0.95
 """Confidence level of all intervals."""

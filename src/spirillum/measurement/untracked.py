@@ -15,8 +15,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Video, open_video
 
-__all__ = ["Untracked", "untracked"]
-
 
 @dataclass(frozen=True)
 class Untracked:
@@ -46,9 +44,6 @@ def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) ->
         setup: the setup.
         folder: folder of the setup file.
         needed: whether pixels are to be turned into lengths.
-
-    Raises:
-        InputError: if the video cannot be read or shows no ruler, and that is needed.
     """
     from spirillum.vision.track.follow import scale_of
 
@@ -80,11 +75,7 @@ class _Stamps:
         self._read: tuple[Samples, Samples] | None = None
 
     def time_of(self, frames: Samples) -> Samples:
-        """Times of frames, s.
-
-        Raises:
-            InputError: for a frame that is not there.
-        """
+        """Times of frames, s."""
         if self._rate is not None:
             return np.asarray(frames / self._rate)
         numbers, times = self._all()

@@ -8,8 +8,6 @@ from contextlib import suppress
 from threading import Thread
 from typing import Any, TypeVar
 
-__all__ = ["run_in_background"]
-
 _Answer = TypeVar("_Answer")
 
 
@@ -18,10 +16,6 @@ async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _A
 
     The threads of `asyncio.to_thread` are joined when the loop closes: a film that is being searched would keep the
     process alive for as long as it takes.
-
-    Args:
-        work: the function.
-        arguments: its arguments.
 
     Raises:
         BaseException: what the function raises.

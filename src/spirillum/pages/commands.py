@@ -10,9 +10,7 @@ from typing import Any
 
 from spirillum.errors import InputError, clipped
 from spirillum.robot.load import load
-from spirillum.robot.text import robot_text
-
-__all__ = ["number_of", "refusal_of", "report_fault", "robot_tables", "text_of"]
+from spirillum.robot.toml_writer import robot_text
 
 _SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
 """What a sentence about a field says of where the robot comes from: here it stands at the knob."""
@@ -32,9 +30,6 @@ def text_of(command: Mapping[str, Any], name: str, unset: str | None = None) -> 
         command: what a browser has sent.
         name: of the text.
         unset: what stands for a text that is missing; None: it may not be.
-
-    Raises:
-        InputError: if it is none, or holds half a letter (a lone surrogate), which no file can keep.
     """
     value = command.get(name, unset)
     if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
@@ -43,11 +38,7 @@ def text_of(command: Mapping[str, Any], name: str, unset: str | None = None) -> 
 
 
 def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
-    """The number that a command asks for, within limits.
-
-    Raises:
-        InputError: if it is none, or beyond them.
-    """
+    """The number that a command asks for, within limits."""
     value = command.get("value")
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
         raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
@@ -55,11 +46,7 @@ def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
 
 
 def report_fault(error: BaseException) -> None:
-    """Print the traceback of a fault of the program, from a thread or process that goes on; the client gets a sentence.
-
-    Args:
-        error: what was raised; bad input and want of memory are no faults, and a sentence says all of them.
-    """
+    """Print the traceback of an internal error in a thread or process that goes on; the client gets a sentence."""
     if not isinstance(error, (InputError, MemoryError)):
         traceback.print_exception(error)
 

@@ -16,8 +16,6 @@ import socket
 import time
 from collections.abc import Mapping
 
-__all__ = ["HEADERS", "LARGEST_MESSAGE", "Guard", "MessageRate"]
-
 HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -40,12 +38,7 @@ class Guard:
     """What a request has to show."""
 
     def __init__(self, host: str, port: int) -> None:
-        """A new key.
-
-        Args:
-            host: address on which the server listens.
-            port: its port.
-        """
+        """A new key."""
         self.key = secrets.token_urlsafe(_KEY_BYTES)
         self._port = port
         self._names = {"localhost", host.lower()}

@@ -14,23 +14,15 @@ from typing import Any
 from spirillum.errors import InputError, failure_sentence
 from spirillum.pages.commands import report_fault
 
-__all__ = ["Job", "worker"]
-
 Tell = Callable[..., None]
 """Called with what is told, by name."""
 
 
-class Job:
+class BackgroundJob:
     """A module at work: what it told last, and whether it goes on."""
 
     def __init__(self, module: str, request: Mapping[str, Any], tell: Callable[[], None] = lambda: None) -> None:
-        """Begin.
-
-        Args:
-            module: name of the module that is run; its `__main__` part calls `worker`.
-            request: what it is asked for, as JSON on its standard input.
-            tell: called from a thread when there is progress.
-        """
+        """Begin."""
         self._tell, self._stopped = tell, False
         self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
         self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments
@@ -77,9 +69,6 @@ def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Map
     """Do what standard input asks for, and tell how it goes.
 
     The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
-
-    Args:
-        work: called with the request and with what is to be told of progress; what it returns is told at the end.
     """
 
     def tell(**said: Any) -> None:

@@ -12,8 +12,6 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option, parse_quantity
 
-__all__ = ["KNOBS", "Knob", "Settings"]
-
 _LONGEST = 80
 """Characters of a value that is typed."""
 
@@ -110,31 +108,15 @@ class Settings:
     """Model that was asked for."""
 
     def robot(self) -> Robot:
-        """The robot, checked.
-
-        Raises:
-            InputError: where a field is wrong.
-        """
+        """The robot, checked."""
         return load(self.source, **self.overrides)
 
     def placement(self) -> Placement:
-        """Where it is laid down.
-
-        Raises:
-            InputError: where a field is wrong.
-        """
+        """Where it is laid down."""
         return Placement.of(dict(self.run))
 
     def changed(self, name: str, value: str) -> Settings:
-        """With another value of one knob.
-
-        Args:
-            name: field of the knob, or `run.model`.
-            value: with its unit, a word, or nothing: back to what an empty field means.
-
-        Raises:
-            InputError: for a field that is no knob, or a value that it does not take.
-        """
+        """With another value of one knob."""
         if len(value) > _LONGEST:
             raise InputError(f"a value of {len(value)} characters; allowed: at most {_LONGEST}")
         value = value.strip()
@@ -157,11 +139,7 @@ class Settings:
         return replace(self, overrides={**self.overrides, name: value})
 
     def shown(self, robot: Robot) -> list[dict[str, Any]]:
-        """The knobs of this robot with their values, in their units.
-
-        Args:
-            robot: what `robot` has returned.
-        """
+        """The knobs of this robot with their values, in their units."""
         return [_shown(knob, self, robot) for knob in KNOBS if not knob.needs or getattr(robot, knob.needs) is not None]
 
 

@@ -12,22 +12,20 @@ from pathlib import Path
 from threading import Timer
 from typing import TYPE_CHECKING, Any
 
-from spirillum.argument_kinds import checked
+from spirillum.argument_validation import validate_arguments
 from spirillum.errors import InputError, clipped
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["page"]
 
 _LARGEST_PORT = 65_535
 _LABEL = "[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?"
 _HOST_NAME = re.compile(rf"(?=.{{1,253}}$)({_LABEL}\.)*{_LABEL}\.?", re.IGNORECASE)
 
 
-@checked
+@validate_arguments
 def page(
     robot: str | Path | Mapping[str, Any] | Robot | None = None,
     *,
@@ -58,7 +56,7 @@ def page(
     if not _is_host(host):
         raise InputError(f"host = {clipped(host)}; allowed: the name of a host, or an address such as 127.0.0.1")
     for name in ("starlette", "uvicorn", "websockets"):
-        required(name, "the page", "page")
+        import_optional(name, "the page", "page")
     if not 0 <= port <= _LARGEST_PORT:
         raise InputError(f"port = {port}; allowed: 0 (a free one) to {_LARGEST_PORT}")
     import uvicorn
@@ -119,11 +117,7 @@ def _is_host(host: str) -> bool:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """A socket that listens.
-
-    Raises:
-        InputError: if the address is not this machine's, or the port is taken.
-    """
+    """A socket that listens."""
     found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

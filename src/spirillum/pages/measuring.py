@@ -8,17 +8,11 @@ from typing import Any
 
 from spirillum.pages.job import worker
 
-__all__ = ["calibration_shown", "measurement_shown"]
-
 _Tell = Callable[[str, int, int], None]
 
 
 def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """A measurement as the page shows it: rows of quantities with their interval, as texts and in SI.
-
-    Args:
-        answer: JSON of `spirillum.measure`.
-    """
+    """A measurement as the page shows it: rows of quantities with their interval, as texts and in SI."""
     from spirillum.measurement.trials import MEASURED, RATE_NAMES
 
     def rows(items: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -46,11 +40,7 @@ def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def calibration_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """A calibration as the page shows it.
-
-    Args:
-        answer: JSON of `spirillum.calibrate`.
-    """
+    """A calibration as the page shows it."""
     return {
         "model": answer["model"],
         "method": answer["method"],

@@ -12,8 +12,6 @@ from spirillum.units import display_unit, shown_in
 if TYPE_CHECKING:
     from spirillum.swimming.prediction import Prediction
 
-__all__ = ["SERIES", "TABLE", "axial_forces_of", "prediction_answer", "quantity_list"]
-
 TABLE = (
     "forward_velocity",
     "advance_per_radian",

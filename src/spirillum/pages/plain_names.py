@@ -9,8 +9,6 @@ from pathlib import Path
 
 from spirillum.errors import InputError
 
-__all__ = ["plain", "plain_names"]
-
 
 def plain(sentence: str, folder: Path) -> str:
     """A sentence without the folder, or one of the folders in it, before the names of files."""
@@ -19,11 +17,7 @@ def plain(sentence: str, folder: Path) -> str:
 
 @contextmanager
 def plain_names(folder: Path) -> Iterator[None]:
-    """What is wrong is said in such a sentence.
-
-    Raises:
-        InputError: with that sentence.
-    """
+    """What is wrong is said in such a sentence."""
     try:
         yield
     except InputError as error:

@@ -10,9 +10,7 @@ import numpy as np
 from spirillum.pages.numbers import SERIES
 
 if TYPE_CHECKING:
-    from spirillum.dynamics.plant import Moment
-
-__all__ = ["MOST", "Recording", "thinned"]
+    from spirillum.dynamics.plant import Snapshot
 
 MOST = 12_000
 """Samples that are kept; beyond it every other one is dropped."""
@@ -20,18 +18,18 @@ _DRAWN = 900
 """Samples of a plot's past, at most."""
 
 
-class Recording:
+class SampleRecording:
     """Samples in their order; its memory is bounded."""
 
     def __init__(self) -> None:
-        self._rows: list[Moment] = []
+        self._rows: list[Snapshot] = []
         self._duties: list[float] = []
         self._every, self._count = 1, 0
 
     def __len__(self) -> int:
         return len(self._rows)
 
-    def add(self, moment: Moment, duty: float) -> None:
+    def add(self, moment: Snapshot, duty: float) -> None:
         """Keep a moment."""
         self._count += 1
         if self._count % self._every:

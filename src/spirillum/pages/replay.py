@@ -10,15 +10,13 @@ from spirillum.dynamics.poses import poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError
 from spirillum.files import scratch_folder
-from spirillum.pages.lane import Lane
 from spirillum.pages.numbers import SERIES
+from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.recording import finite, thinned
 from spirillum.pages.shapes import shape_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["LARGEST_RUN", "replay_of_lane", "replay_of_run", "replay_of_upload"]
 
 LARGEST_RUN = 64 << 20
 """Bytes of a run that is dropped on the page."""
@@ -27,14 +25,7 @@ _MOST = 6_000
 
 
 def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
-    """A run to replay; the samples are the file's own.
-
-    Args:
-        dataset: what `spirillum.simulate` returns.
-
-    Raises:
-        InputError: for a run that cannot be shown.
-    """
+    """A run to replay; the samples are the file's own."""
     robot = robot_of(dataset)
     shape = shape_of(robot)
     level = 0.0 if shape["tube_radius"] is None else shape["radius"] - shape["tube_radius"]
@@ -59,11 +50,7 @@ def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def replay_of_upload(content: bytes) -> dict[str, Any]:
-    """A run to replay from the bytes of its file.
-
-    Raises:
-        InputError: if they are no run.
-    """
+    """A run to replay from the bytes of its file."""
     if len(content) > LARGEST_RUN:
         raise InputError(f"the file has {len(content) >> 20} MB; allowed: at most {LARGEST_RUN >> 20} MB")
     with scratch_folder() as folder:
@@ -75,7 +62,7 @@ def replay_of_upload(content: bytes) -> dict[str, Any]:
             raise InputError(str(error).replace(str(path), "the file")) from error
 
 
-def replay_of_lane(lane: Lane, run: dict[str, Any]) -> dict[str, Any]:
+def replay_of_lane(lane: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
     """What a robot of the page has done so far, to replay.
 
     Args:

@@ -19,17 +19,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
 from spirillum.pages.background import run_in_background
-from spirillum.pages.bench import Bench
-from spirillum.pages.bench_routes import bench_routes
+from spirillum.pages.downloads import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
-from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
+from spirillum.pages.measurement_routes import bench_routes
+from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
+from spirillum.pages.simulation_thread import SimulationThread
 from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
-from spirillum.pages.theatre import Theatre
 from spirillum.pages.uploads import TooLargeError, Uploads
-
-__all__ = ["application"]
 
 _MOST_CLIENTS = 32
 _MOST_REFUSALS = 20
@@ -122,8 +120,8 @@ class _House:
     """The theatre and those who look."""
 
     def __init__(self, source: Any) -> None:
-        self.theatre = Theatre(source, self._publish)
-        self.bench = Bench()
+        self.theatre = SimulationThread(source, self._publish)
+        self.bench = MeasurementSession()
         self._clients: set[_Client] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -184,17 +182,7 @@ class _House:
 def application(
     source: Any, guard: Guard, *, strangers: Strangers | None = None, first_run: dict[str, Any] | None = None
 ) -> ASGIApp:
-    """The page's application.
-
-    Args:
-        source: robot to start with.
-        guard: who may talk to it.
-        strangers: connections that have not shown the key yet.
-        first_run: a run to replay at once, see `spirillum.pages.replay`.
-
-    Raises:
-        InputError: if the robot cannot be loaded.
-    """
+    """The page's application."""
     house, uploads = _House(source), Uploads()
     routes = [
         Route("/", _file("index.html")),
@@ -224,7 +212,7 @@ async def _said(request: Request, error: Exception) -> Response:
     return Response(status_code=400)
 
 
-async def _tell(socket: WebSocket, client: _Client, theatre: Theatre) -> None:
+async def _tell(socket: WebSocket, client: _Client, theatre: SimulationThread) -> None:
     """Send the newest state whenever there is one; a slow client misses those between."""
     with suppress(WebSocketDisconnect, RuntimeError):
         while True:
@@ -241,7 +229,7 @@ async def _tell(socket: WebSocket, client: _Client, theatre: Theatre) -> None:
             client.news.clear()
 
 
-def _heard(text: str, client: _Client, theatre: Theatre, loop: asyncio.AbstractEventLoop) -> None:
+def _heard(text: str, client: _Client, theatre: SimulationThread, loop: asyncio.AbstractEventLoop) -> None:
     """Hand on what a client asks for, if it is an object of JSON."""
 
     def refuse(sentence: str) -> None:
@@ -278,7 +266,7 @@ def _file(name: str) -> Handler:
 _KEPT = ("robot.toml", "commands.txt", "robot.py", "run.html", "run.json", "words.json")
 
 
-def _kept(name: str, theatre: Theatre) -> Handler:
+def _kept(name: str, theatre: SimulationThread) -> Handler:
     def made(lane_text: str) -> Response:
         found = theatre.recording(int(lane_text)) if lane_text in ("0", "1") else None
         if found is None:
@@ -304,7 +292,7 @@ def _kept(name: str, theatre: Theatre) -> Handler:
     return serve
 
 
-def _flow(theatre: Theatre) -> Handler:
+def _flow(theatre: SimulationThread) -> Handler:
     async def serve(request: Request) -> Response:
         lane = request.query_params.get("lane", "")
         found = theatre.flow(int(lane)) if lane in ("0", "1") else None
@@ -324,7 +312,7 @@ def _first(run: dict[str, Any] | None) -> Handler:
     return serve
 
 
-def _study(theatre: Theatre) -> Callable[[bytes], dict[str, Any]]:
+def _study(theatre: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
     """A study's dataset is dropped on the page, or with nothing in it the paper's is computed; its picture."""
 
     def picture(content: bytes) -> dict[str, Any]:

@@ -10,8 +10,6 @@ from typing import Any
 
 from spirillum.errors import InputError, clipped
 
-__all__ = ["FORM", "form_fields", "form_list"]
-
 _LONGEST = 200
 """Characters of a field."""
 
@@ -131,15 +129,7 @@ def form_list() -> list[dict[str, Any]]:
 
 
 def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, Any]:
-    """Fields of a setup from what stands in the form, or in a file; empty ones are left out.
-
-    Args:
-        given: texts, numbers and lists by dotted field.
-        robots: names that `robot.file` may have.
-
-    Raises:
-        InputError: for a field that the form has not, as one that names a file, or a value that is too long.
-    """
+    """Fields of a setup from what stands in the form, or in a file; empty ones are left out."""
     found: dict[str, Any] = {}
     for name, value in given.items():
         if name != "robot.file" and name not in _KNOWN:

@@ -13,8 +13,6 @@ from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
 
-__all__ = ["shape_of"]
-
 _CREASE = np.radians(40.0)
 """Edges sharper than this stay sharp."""
 _FINENESS = 0.75

@@ -7,8 +7,6 @@ from typing import Any
 
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-__all__ = ["Strangers", "protocol_for"]
-
 _MOST = 64
 """Connections without a key; for another one the oldest is closed."""
 _PATIENCE = 10.0
@@ -51,11 +49,7 @@ class Strangers:
 
 
 def protocol_for(strangers: Strangers) -> type[asyncio.Protocol]:
-    """Return the server's HTTP protocol, which reports every new connection.
-
-    Args:
-        strangers: to whom.
-    """
+    """Return the server's HTTP protocol, which reports every new connection."""
 
     class Reporting(AutoHTTPProtocol):  # type: ignore[misc, valid-type]  # which one it is follows from what is installed
         def connection_made(self, transport: Any) -> None:

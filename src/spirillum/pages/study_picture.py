@@ -17,8 +17,6 @@ from spirillum.robot.robot import Robot
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LARGEST_STUDY_SENT", "StudyPicture", "sent_study"]
-
 LARGEST_STUDY_SENT = 64 << 20
 """Bytes of a study that is dropped on the page."""
 _MOST_TAILS = 400
@@ -30,14 +28,7 @@ class StudyPicture:
     """Tails of a study with their speeds."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
-        """Read what is shown.
-
-        Args:
-            dataset: what `spirillum.study` returns.
-
-        Raises:
-            InputError: for a study that is not over wavelength and amplitude, or too large to point into.
-        """
+        """Read what is shown."""
         needed = ("wavelength", "amplitude", "model", "channel")
         if "forward_velocity" not in dataset or any(name not in dataset.dims for name in needed):
             raise InputError(f"this dataset has not the dimensions {', '.join(needed)}; allowed: {_WHAT}")
@@ -74,14 +65,7 @@ class StudyPicture:
         }
 
     def tail(self, command: Mapping[str, Any]) -> tuple[Robot, dict[str, str]]:
-        """The robot that was pointed at, and the fields of its tail.
-
-        Args:
-            command: `channel`, `wavelength` and `amplitude` as their places in the picture.
-
-        Raises:
-            InputError: if there is no such tail.
-        """
+        """The robot that was pointed at, and the fields of its tail."""
         places = []
         for name in ("channel", "wavelength", "amplitude"):
             place, size = command.get(name), self._speed.sizes[name]
@@ -94,11 +78,7 @@ class StudyPicture:
 
 
 def sent_study(content: bytes) -> StudyPicture:
-    """A study from the bytes of its file.
-
-    Raises:
-        InputError: if they are none.
-    """
+    """A study from the bytes of its file."""
     with scratch_folder() as folder:
         path = folder / "dataset.nc"
         path.write_bytes(content)

@@ -9,8 +9,6 @@ from starlette.requests import Request
 
 from spirillum.errors import InputError
 
-__all__ = ["TooLargeError", "Uploads", "stated_size"]
-
 _LARGEST_TOGETHER = 128 << 20
 """Bytes of all files and messages that are held in memory at once. Films go to the disk."""
 
@@ -20,11 +18,7 @@ class TooLargeError(InputError):
 
 
 def stated_size(request: Request) -> int:
-    """Bytes that a request is about to send; the server takes no more of it.
-
-    Raises:
-        InputError: if it does not state them.
-    """
+    """Bytes that a request is about to send; the server takes no more of it."""
     size = request.headers.get("content-length", "")
     if not size.isdecimal():
         raise InputError("a request without its size; allowed: one with a Content-Length")
@@ -41,10 +35,6 @@ class Uploads:
     @asynccontextmanager
     async def received(self, request: Request, largest: int) -> AsyncIterator[bytes]:
         """What a request sends, counted until the block ends.
-
-        Args:
-            request: of some client.
-            largest: bytes that it may send.
 
         Raises:
             TooLargeError: if it is too large, by itself or with all that others are sending.

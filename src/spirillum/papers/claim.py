@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-__all__ = ["Claim", "PredictedVerdict", "Verdict"]
-
 Verdict = Literal["agrees", "disagrees", "undecidable"]
 
 PredictedVerdict = Literal["predicted-agrees", "predicted-disagrees", "depends"]

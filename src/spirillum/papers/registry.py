@@ -19,8 +19,6 @@ from spirillum.view.figures.study_view import PaperFigure
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["claims_of", "figures_of", "predictions_of"]
-
 
 class Paper(NamedTuple):
     """What a paper adds to a study that names it."""

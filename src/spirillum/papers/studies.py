@@ -8,8 +8,6 @@ from typing import Any
 
 from spirillum.papers.biorob2012.study import paper_study
 
-__all__ = ["study_of"]
-
 _STUDIES: dict[str, Callable[[], dict[str, Any]]] = {"biorob2012": paper_study}
 
 

@@ -12,15 +12,9 @@ from spirillum.files import PICTURES, output_target, write_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_targets", "write_flow"]
-
 
 def check_targets(plane: Path | None, volume: Path | None) -> None:
-    """Check the files before any work is done.
-
-    Raises:
-        InputError: if there is none, both are one, or one of them cannot be written.
-    """
+    """Check the files before any work is done."""
     netcdf = {".nc": "a NetCDF file"}
     if plane is None and volume is None:
         raise InputError("no file is asked for; allowed: -o flow.png for a plane, --volume flow.vti for a box, or both")

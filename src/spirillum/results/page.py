@@ -12,8 +12,6 @@ from spirillum.files import output_folder
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import save
 
-__all__ = ["EmbeddedPicture", "data_uri", "draw_pictures", "page"]
-
 
 @dataclass(frozen=True)
 class EmbeddedPicture:
@@ -42,9 +40,6 @@ def draw_pictures(
         folder: existing folder of the report.
         tell: called with the name of the next figure and the number of figures drawn.
         largest_svg: a vector picture up to this size is embedded as it is, bytes; others as pixels.
-
-    Raises:
-        InputError: if the folder cannot be written to.
     """
     figures = output_folder(folder / "figures", folder)
     found = []

@@ -2,32 +2,133 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope
-from spirillum.crews import checked_crew
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.files import output_folder, protected, results_folder, write_dataset
-from spirillum.papers.registry import claims_of, predictions_of
+from spirillum.files import output_folder, protected, results_folder, write_dataset, write_text
+from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
-from spirillum.results.study_report import write_report
+from spirillum.results.page import draw_pictures, page
+from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
+from spirillum.robot.actuation import Drive, Motor
+from spirillum.robot.parts import Body, Channel, Coupling, Fluid, Tail
+from spirillum.robot.robot import Robot
 from spirillum.studies.dataset import read_dataset
-from spirillum.studies.loading import LARGEST_STUDY, load_study
 from spirillum.studies.observed import observed_arrays
-from spirillum.studies.ranking import ranking_of
+from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
 from spirillum.studies.run import Progress, computed_study, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
+from spirillum.studies.study_loader import LARGEST_STUDY, load_study
+from spirillum.view.figures.laid_down import laid_down_picture
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.ranking import ranking_picture
+from spirillum.view.figures.robot import robot_figure, robot_words
+from spirillum.worker_pool import checked_crew
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["study", "study_answer"]
+
+def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
+    """Side view of the study's fastest robot, else of its first; None if the dataset carries no settings of robots."""
+    dumps = json.loads(dataset.attrs.get("settings", "{}")).get("robots") or []
+    if not dumps:
+        return None
+    place = ranking.robots[0].place if ranking.robots else 0
+    if "channel" in dataset.dims:  # of a grid the settings name a robot for each channel
+        grid = robot_dims(dataset)
+        channel, *tail = np.unravel_index(place, [dataset.sizes[name] for name in grid])
+        table = dict(dumps[int(channel)])
+        own = {name: float(dataset[name].values[at]) for name, at in zip(grid[1:], tail, strict=True)}
+        table["tail"] = {**table["tail"], **own}
+    else:
+        table = dumps[place]
+    robot = _rebuilt(table)
+    words = robot_words(robot)
+    first = f"the first of the ranking: {ranking.robots[0].name}" if ranking.robots else "the study's first robot"
+    return Picture("The robot", f"{words} Drawn is {first}.", words, lambda: robot_figure(robot))
+
+
+def _rebuilt(table: Mapping[str, Any]) -> Robot:
+    """A robot from its SI settings, which were checked when the study was loaded."""
+    channel, drive, motor = table.get("channel"), table.get("drive"), table.get("motor")
+    return Robot.model_construct(
+        name=str(table["name"]),
+        body=Body.model_construct(**table["body"]),
+        coupling=Coupling.model_construct(**table["coupling"]),
+        tail=Tail.model_construct(**table["tail"]),
+        fluid=Fluid.model_construct(**table["fluid"]),
+        channel=Channel.model_construct(**channel) if channel else None,
+        drive=Drive.model_construct(**drive) if drive else None,
+        motor=Motor.model_construct(**motor) if motor else None,
+    )
+
+
+_LARGEST_SVG = 2_000_000
+"""A larger vector picture is embedded as pixels, bytes."""
+
+
+def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, int], None]) -> None:
+    """Write `figures/` (PNG and SVG), `claims.json`, `ranking.csv` and a self-contained `report.html`."""
+    pictures = _pictures(dataset)
+    steps = len(pictures) + 1
+    embedded = draw_pictures(
+        pictures, folder, lambda name, done: tell(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
+    )
+    tell("report", len(pictures), steps)
+    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
+    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(folder / "claims.json", text + "\n", replace="any")
+    ranking = ranking_of(dataset)
+    write_text(folder / "ranking.csv", _ranking_rows(ranking), replace="any")
+    names = {
+        "ranking": shown_ranking(ranking),
+        "pictures": embedded,
+        "claims": claims,
+        "predictions": predictions,
+        **content(dataset),
+    }
+    write_text(folder / "report.html", page("report.html.jinja", **names))
+    tell("report", steps, steps)
+
+
+def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
+    """The ranking first, then the robot and the figures of the study."""
+    ranking = ranking_of(dataset)
+    robot = robot_picture(dataset, ranking)
+    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
+    laid_down = laid_down_picture(dataset, ranking)
+    drawn = {"robot": robot, "laid-down": laid_down}
+    return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
+
+
+def _ranking_rows(ranking: StudyRanking) -> str:
+    """The ranking as CSV, all of its robots; SI."""
+    names = ranking.quantities
+    header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of_ranked(name)]}" for name in names for end in _ENDS)]
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow([title.rstrip("_") for title in header])
+    for rank, robot in enumerate(ranking.robots, start=1):
+        values = [of[name] for name in names for of in (robot.values, robot.low, robot.high)]
+        writer.writerow([rank, robot.name, *("" if math.isnan(value) else repr(value) for value in values)])
+    return table.getvalue()
+
+
+_ENDS = ("", "_low", "_high")
+_COLUMN = {"m/s": "m_s", "1": "", "A": "A", "W": "W"}
+
 
 _RESULTS = ("dataset.nc", "figures", "report.html", "claims.json", "ranking.csv")
 """What a folder without the mark of a study may not hold, for it would be replaced."""
@@ -122,12 +223,7 @@ def study(  # noqa: PLR0913 - the options of the command
 
 
 def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
-    """What a study has found and written, as `spirillum study` prints it.
-
-    Args:
-        dataset: the study.
-        output: its folder.
-    """
+    """What a study has found and written, as `spirillum study` prints it."""
     claims = claims_of(dataset)
     verdicts = {
         verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from spirillum.citations import REFERENCES
+from spirillum.display import counted
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
-from spirillum.shown import counted
+from spirillum.robot.model_options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 from spirillum.studies.ranking import (
     ENDS,
     RANKED,
@@ -26,8 +26,6 @@ from spirillum.units import among, display_unit, in_unit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FRICTION_MEANINGS", "MOST_RANKED", "content", "shown_ranking"]
-
 FRICTION_MEANINGS = {
     "none": "no friction: the tail turns against the fluid alone, so that a motor's rates and speeds are upper bounds",
     "rotor": "B_eff acts inside the joint, which gives (18); the body feels the tail's hydrodynamic torque only",
@@ -42,12 +40,7 @@ MOST_WARNINGS = 100
 
 
 def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
-    """The ranking as people read it: what it rests on, the best robots, a row for each of the first.
-
-    Args:
-        ranking: the ranking.
-        most: rows.
-    """
+    """The ranking as people read it: what it rests on, the best robots, a row for each of the first."""
     sizes = {name: [robot.values[name] for robot in ranking.robots] for name in ranking.quantities}
     units = {name: _unit_among(name, values) for name, values in sizes.items() if values}
     first = ranking.robots[:most]

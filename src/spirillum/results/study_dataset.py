@@ -10,8 +10,6 @@ import xarray as xr
 from spirillum.results.study_content import shown_ranking
 from spirillum.studies.ranking import can_be_ranked, ranking_of
 
-__all__ = ["StudyDataset"]
-
 
 # xarray leaves __init_subclass__ without types.
 class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -21,11 +19,7 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> StudyDataset:
-        """A study's values, coordinates and attributes in a dataset that shows its ranking.
-
-        Args:
-            dataset: a study.
-        """
+        """A study's values, coordinates and attributes in a dataset that shows its ranking."""
         return cls(dataset.data_vars, dataset.coords, dataset.attrs)
 
     def __str__(self) -> str:

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from spirillum.answer import envelope
-from spirillum.crews import Crew, shared_out
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.extras import required
 from spirillum.files import (
     is_whole,
     opened_store,
@@ -26,19 +24,19 @@ from spirillum.files import (
     store_target,
     write_pieces,
 )
+from spirillum.optional_dependencies import import_optional
 from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
-from spirillum.studies.estimate import Estimate, Pace, estimate_of, is_large
-from spirillum.studies.loading import LoadedStudy
+from spirillum.studies.estimate import CostEstimate, Pace, estimate_of, is_large
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import Region, layout_of
+from spirillum.studies.regions import RobotBlock, layout_of
 from spirillum.studies.run import warnings_of, warnings_of_calibrations
 from spirillum.studies.stored import Plan, encoded_region, plan_of, region_jobs
+from spirillum.studies.study_loader import LoadedStudy
+from spirillum.worker_pool import WorkerPool, map_tasks
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["store_answer", "stored_study"]
 
 _MARK = "study.json"
 _NOTES = "notes"
@@ -53,24 +51,11 @@ def stored_study(
     observed: ObservedArrays | None,
     fingerprint: str,
     store: str | Path,
-    crew: Crew,
+    crew: WorkerPool,
     tell: Tell,
 ) -> xr.Dataset:
-    """Compute what a store lacks of a study, and open it.
-
-    Args:
-        loaded: the study with its robots.
-        observed: observed rates and speeds of its robots, if any.
-        fingerprint: hash of question and program.
-        store: folder that ends in `.zarr`.
-        crew: who computes; this process alone writes.
-        tell: called with what is being done, regions done and regions in all.
-
-    Raises:
-        InputError: for a band or robots laid down, which need all regions at once; a folder of something else; a
-            cluster that is not there, or is lost; a missing library.
-    """
-    required("zarr", "a store", "cluster")
+    """Compute what a store lacks of a study, and open it."""
+    import_optional("zarr", "a store", "cluster")
     option = next((name for name in ("band", "predicted", "settled") if getattr(loaded.study, name)), None)
     if option is not None:
         raise InputError(f"{option} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
@@ -120,10 +105,10 @@ class _Outcome(NamedTuple):
     unanswered: int
 
 
-def _missing(plan: Plan, folder: Path, *, finished: bool) -> list[Region]:
+def _missing(plan: Plan, folder: Path, *, finished: bool) -> list[RobotBlock]:
     """Regions of which a file is not there as it was written; until the study is finished, their note is one."""
 
-    def lacks(region: Region) -> bool:
+    def lacks(region: RobotBlock) -> bool:
         note = plan.note(region)
         chunks = [key for key in reversed(plan.pieces(region)) if key != note]
         return not (all(is_whole(folder / key) for key in chunks) and (finished or _has_note(folder / note)))
@@ -139,11 +124,7 @@ def _has_note(path: Path) -> bool:
 
 
 def _note_of(path: Path) -> _Note:
-    """What a region has to say.
-
-    Raises:
-        InputError: if it cannot be read, or is not what this program writes.
-    """
+    """What a region has to say."""
     what = "a note of a study"
     found = read_json(path, what)
     try:
@@ -176,7 +157,9 @@ def _holds(path: Path, content: bytes) -> bool:
     return False
 
 
-def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tell, estimate: Estimate | None) -> None:
+def _write_regions(
+    work: _Work, missing: Sequence[RobotBlock], crew: WorkerPool, tell: Tell, estimate: CostEstimate | None
+) -> None:
     """Compute and write regions; what that takes is told once their pace is known."""
     plan, total = work.plan, work.plan.layout.count
     models = ", ".join(work.loaded.study.models)
@@ -189,7 +172,7 @@ def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tel
 
     pace = None if estimate is None else Pace(sum(region.size for region in missing), estimate.workers)
     jobs = region_jobs(work.loaded, work.observed, plan, _spread(missing))
-    for job, files in shared_out(encoded_region, jobs, crew, besides="; what was written is kept", tell=at_work):
+    for job, files in map_tasks(encoded_region, jobs, crew, besides="; what was written is kept", tell=at_work):
         write_pieces(work.folder, files)
         done += 1
         seconds = None if pace is None or done == total else pace.seconds(job.region.size)
@@ -199,7 +182,7 @@ def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tel
         tell(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
 
 
-def _spread(regions: Sequence[Region]) -> list[Region]:
+def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
     """Regions in an order in which the first ones stand for all: long tails cost more than short ones."""
     step = max(round(len(regions) * _GOLDEN), 1)
     while gcd(step, len(regions)) > 1:
@@ -216,12 +199,7 @@ def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
 
 
 def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
-    """What a study has written into a store, as `spirillum study --store` prints it.
-
-    Args:
-        dataset: the study.
-        store: its folder.
-    """
+    """What a study has written into a store, as `spirillum study --store` prints it."""
     sizes = {**dataset["outside"].sizes, **dataset.sizes}  # in the order of the results
     content = {
         "title": dataset.attrs["title"],

@@ -30,8 +30,6 @@ from spirillum.robot.fields import (
 )
 from spirillum.units import KINDS
 
-__all__ = ["Battery", "Drive", "DriveKind", "Friction", "FrictionReading", "Magnetic", "Motor", "MotorResistance"]
-
 DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
 
 FrictionReading = Literal["none", "rotor", "body", "paper"]

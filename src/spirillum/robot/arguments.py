@@ -14,8 +14,6 @@ from spirillum.robot.problems import problems_in, refused_table
 from spirillum.scalars import is_number, is_whole
 from spirillum.units import float_note
 
-__all__ = ["Options", "in_range", "one_of", "refusal", "whole", "within"]
-
 
 class Options(Section):
     """Options that belong together: frozen, closed to unknown fields, quantities in SI.

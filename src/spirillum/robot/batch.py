@@ -9,17 +9,15 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_
 
 import numpy as np
 
-from spirillum.argument_kinds import checked, number_array, whole_array
+from spirillum.argument_validation import number_array, validate_arguments, whole_array
 from spirillum.arrays import Flags, PerRobot, Values
 from spirillum.errors import InputError, clipped
 from spirillum.robot import geometry
 from spirillum.robot.actuation import DriveKind, FrictionReading
-from spirillum.robot.options import ModelOptions
+from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.parts import End, Shape
 from spirillum.robot.placement import Placement
 from spirillum.robot.tables import RobotTables
-
-__all__ = ["CalibrationFactors", "Electrics", "RobotBatch", "batches"]
 
 
 class Column(NamedTuple):
@@ -147,7 +145,7 @@ class RobotBatch:
     placement: Placement
 
     @classmethod
-    @checked
+    @validate_arguments
     def of(cls, robots: RobotTables | Sequence[RobotTables], placement: Placement | None = None) -> RobotBatch:
         """Stack robots that differ in numbers only.
 
@@ -208,12 +206,12 @@ class RobotBatch:
             raise InputError(f"rows[{place}] = {chosen[place]}; allowed: {allowed}")
         return _cut(self, chosen) if self.size > 1 else self
 
-    @checked
+    @validate_arguments
     def placed(self, placement: Placement) -> RobotBatch:
         """Return the same robots placed otherwise."""
         return replace(self, placement=placement)
 
-    @checked
+    @validate_arguments
     def with_values(self, values: Mapping[str, np.ndarray | Sequence[float] | float]) -> RobotBatch:
         """Return the batch with columns replaced, SI.
 
@@ -234,7 +232,7 @@ class RobotBatch:
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
 
-    @checked
+    @validate_arguments
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
         """Cut the batch into blocks of at most `size` robots; each comes with its place in the batch.
 
@@ -312,11 +310,7 @@ def _cut(struct: _S, cut: slice | np.ndarray) -> _S:
 
 
 def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float) -> PerRobot:
-    """One column of a batch.
-
-    Raises:
-        InputError: if it is not one axis of numbers that the field may have.
-    """
+    """One column of a batch."""
     path = source.path
     values = np.atleast_1d(number_array(path, value, "numbers in SI units"))
     if values.ndim != 1 or values.size == 0:

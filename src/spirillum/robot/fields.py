@@ -147,23 +147,13 @@ def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
 
 
 def kind_of(section: Section, path: str) -> Kind | None:
-    """What kind of quantity a field is; None for anything else.
-
-    Args:
-        section: the section.
-        path: dotted name of a field in it, whose tables are all given.
-    """
+    """What kind of quantity a field is; None for anything else."""
     kinds = [item for item in _all_metadata(_info_of(section, path)) if isinstance(item, Kind)]
     return kinds[0] if kinds else None
 
 
 def default_of(section: Section, path: str) -> Any:
-    """What a field is where its file does not name it.
-
-    Args:
-        section: the section.
-        path: dotted name of a field in it, whose tables are all given.
-    """
+    """What a field is where its file does not name it."""
     return _info_of(section, path).default
 
 

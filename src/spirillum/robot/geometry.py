@@ -9,18 +9,6 @@ import numpy as np
 from spirillum.arrays import Values, Vectors
 from spirillum.robot.parts import End, Shape
 
-__all__ = [
-    "Centreline",
-    "amplitude_envelope",
-    "arc_fraction",
-    "arc_length",
-    "body_volume",
-    "centreline",
-    "coil_spacing",
-    "pitch_angle",
-    "shortest_body",
-]
-
 
 def arc_fraction(wavelength: Values, amplitude: Values) -> Values:
     """Alpha = [1 + (2 pi B_o/lambda)^2]^(-1/2): axial over arc length of a plain helix (Section II-B)."""

@@ -13,8 +13,6 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
 from spirillum.units import show_apart
 
-__all__ = ["Limit", "all_hold", "assembly_limits", "broken", "within"]
-
 
 @dataclass(frozen=True)
 class Limit:

@@ -21,10 +21,8 @@ import numpy as np
 from spirillum.arrays import Samples, Tensors, Vectors
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
-from spirillum.robot.outline import Arc, Line, Outline, body_outline, solid_outlines
+from spirillum.robot.outline import Arc, Outline, Segment, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
-
-__all__ = ["Link", "Links", "Solid", "links_of", "outlines_of", "revolution_solid", "robot_solids", "wire_solid"]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4
@@ -32,7 +30,7 @@ _ROOT_LENGTHS = 60.0
 """Number of lengths L_t/c after which the amplitude of a tapered wire is complete to rounding."""
 
 
-class Solid(NamedTuple):
+class HomogeneousSolid(NamedTuple):
     """A homogeneous solid of density 1, in the frame of the body at phase 0 of the tail; SI."""
 
     volume: float
@@ -67,15 +65,11 @@ class Links(NamedTuple):
     """Coupling and wire."""
 
 
-def links_of(robot: RobotTables, solids: Mapping[str, Solid] | None = None) -> Links:
+def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
     `body.mass` is that of body and coupling together, assumed to be of uniform density. The wire has
     `tail.density`.
-
-    Args:
-        robot: a checked robot.
-        solids: its `robot_solids`, where they are known already.
     """
     solids = robot_solids(robot) if solids is None else solids
     body, wire = solids["body"], solids["tail"]
@@ -86,12 +80,8 @@ def links_of(robot: RobotTables, solids: Mapping[str, Solid] | None = None) -> L
     return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
 
 
-def robot_solids(robot: RobotTables) -> dict[str, Solid]:
-    """Volume, centroid and inertia of `body`, `coupling` (where there is one) and `tail`, each of density 1.
-
-    Args:
-        robot: a checked robot.
-    """
+def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
+    """Volume, centroid and inertia of `body`, `coupling` (where there is one) and `tail`, each of density 1."""
     batch = RobotBatch.of(robot)
     found = {name: revolution_solid(outline) for name, outline in outlines_of(robot).items()}
     found["tail"] = wire_solid(
@@ -107,35 +97,27 @@ def robot_solids(robot: RobotTables) -> dict[str, Solid]:
 
 
 def outlines_of(robot: RobotTables) -> dict[str, Outline]:
-    """Outlines of `body` and, where there is one, `coupling`.
-
-    Args:
-        robot: a checked robot.
-    """
+    """Outlines of `body` and, where there is one, `coupling`."""
     body, coupling = robot.body, robot.coupling
     outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
 
-def revolution_solid(outline: Outline) -> Solid:
-    """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding.
-
-    Args:
-        outline: from its front pole to its rear pole.
-    """
+def revolution_solid(outline: Outline) -> HomogeneousSolid:
+    """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding."""
     t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
     x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
     volume = float(np.pi * np.sum(square * dx))
     middle = float(np.pi * np.sum(square * x * dx)) / volume
     about_axis = 0.5 * np.pi * float(np.sum(square**2 * dx))
     across = 0.5 * about_axis + float(np.pi * np.sum(square * (x - middle) ** 2 * dx))
-    return Solid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
+    return HomogeneousSolid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
 
 
-def _run(piece: Line | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
+def _run(piece: Segment | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
     """x, rho^2 and the weighted -dx (the outline runs from front to rear) at t from 0 to 1."""
     x, rho = piece.points(t)
-    if isinstance(piece, Line):
+    if isinstance(piece, Segment):
         slope = np.full_like(t, piece.end[0] - piece.start[0])
     else:
         turn = piece.angles[1] - piece.angles[0]
@@ -152,7 +134,7 @@ def wire_solid(
     wire_diameter: float,
     taper: float,
     hand: float,
-) -> Solid:
+) -> HomogeneousSolid:
     """A round wire along eq. (10) at phase 0, its ends cut square.
 
     Args:
@@ -186,10 +168,10 @@ def wire_solid(
     second = (inner * ds[:, None]).T @ inner
     second += 0.25 * square * (arc * np.eye(3) + (along * ds[:, None]).T @ along - (ends[1] - ends[0]))
     inertia = np.pi * square * (np.trace(second) * np.eye(3) - second)
-    return Solid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+    return HomogeneousSolid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
 
 
-def _link(parts: list[tuple[Solid, float]]) -> Link:
+def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:
     """Rigidly joined solids, each with its density, kg/m^3."""
     volumes = np.array([solid.volume for solid, _ in parts])
     masses = np.array([solid.volume * density for solid, density in parts])

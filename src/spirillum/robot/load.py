@@ -13,23 +13,10 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Derived, Robot
 from spirillum.units import show
-
-__all__ = [
-    "PAPER_ROBOTS",
-    "PAPER_ROBOTS_TAKEN",
-    "is_preset",
-    "load",
-    "new_robot_file",
-    "parse_setting",
-    "preset_names",
-    "preset_text",
-    "raw_table",
-    "with_resolution",
-]
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
 # A measured mass no longer describes the robot once one of these changes (Table I weighs body and coupling).
@@ -125,16 +112,7 @@ def _preset_table(preset: str) -> dict[str, Any]:
 
 
 def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) -> None:
-    """Write a robot file to edit: a preset's own text, whole.
-
-    Args:
-        path: file to write.
-        preset: the preset to start from.
-        overwrite: replace a file that is there.
-
-    Raises:
-        InputError: if there is no such preset, or the file is there or cannot be written.
-    """
+    """Write a robot file to edit: a preset's own text, whole."""
     if preset not in preset_names():
         raise InputError(
             f"preset {preset!r}{did_you_mean(preset, preset_names())}; allowed: {', '.join(preset_names())}"
@@ -150,16 +128,7 @@ def _looks_like_a_name(robot: str | Path) -> bool:
 
 
 def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelength=20mm") -> tuple[str, Any]:
-    """Split ``PATH=VALUE``; VALUE is read as TOML, else taken as text (a quantity or a word).
-
-    Args:
-        text: the setting.
-        option: that takes it, for the sentence of an error.
-        example: of a setting, for that sentence.
-
-    Raises:
-        InputError: if there is no ``=`` or no path.
-    """
+    """Split ``PATH=VALUE``; VALUE is read as TOML, else taken as text (a quantity or a word)."""
     path, equals, value = text.partition("=")
     path, value = path.strip(), value.strip()
     if not equals or not path or not value:
@@ -183,9 +152,6 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
         robot: a checked robot.
         resolution: fields of `Resolution` that replace the robot's own.
         models: the models that will be asked; none: any.
-
-    Raises:
-        InputError: for a wrong value, a field that none of the models reads, or one beside the form `table`.
     """
     options = robot.model
     given = Resolution.of(resolution).model_dump(exclude_none=True)
@@ -216,12 +182,6 @@ def _extended(
     table: dict[str, Any], source: str, folder: Path, above: tuple[Path, ...] = ()
 ) -> tuple[dict[str, Any], list[set[str]]]:
     """Lay the table over the preset or the robot file that its `extends` names.
-
-    Args:
-        table: raw tables, which are changed.
-        source: what to call them.
-        folder: where a file that they name is looked for.
-        above: the files that lie over these tables.
 
     Returns:
         The tables, and the fields that each layer has changed, from below.
@@ -313,12 +273,7 @@ def _touched(table: Mapping[str, Any]) -> set[str]:
 
 
 def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
-    """Warn where a measured mass is older than the geometry that it weighs.
-
-    Args:
-        table: the final raw tables.
-        changes: fields that each layer changed (a file over its preset, then the overrides).
-    """
+    """Warn where a measured mass is older than the geometry that it weighs."""
     body = table.get("body")
     stale: list[str] = []
     for changed in changes:
@@ -330,12 +285,7 @@ def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str,
 
 
 def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
-    """Warn of what is older than the size of the body that it belongs to.
-
-    Args:
-        table: the final raw tables.
-        changes: fields that each layer changed (a file over its preset, then the overrides).
-    """
+    """Warn of what is older than the size of the body that it belongs to."""
     found = []
     for field, whose in _SIZED.items():
         section, name = field.split(".")

@@ -13,15 +13,9 @@ from textwrap import dedent
 
 from pydantic import BaseModel
 
-__all__ = ["meanings"]
-
 
 def meanings(model: type[BaseModel]) -> dict[str, str]:
-    """Meanings of the fields of a table by their names; its own words replace those of what it is made from.
-
-    Args:
-        model: the table.
-    """
+    """Meanings of the fields of a table by their names; its own words replace those of what it is made from."""
     ours = (part for part in reversed(model.__mro__) if part.__module__.startswith("spirillum."))
     return {name: words for part in ours for name, words in _words(part) if name in model.model_fields}
 

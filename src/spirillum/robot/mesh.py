@@ -23,8 +23,6 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
 from spirillum.units import show
 
-__all__ = ["COLOURS", "STRIPE_COLOURS", "RobotMesh", "TailLine", "robot_mesh", "tail_line"]
-
 Colour = tuple[float, float, float]
 
 STRIPE_COLOURS: dict[StripeColour, Colour] = {
@@ -118,10 +116,6 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
         robot: a checked robot.
         phase: phase phi of the tail, rad; all pieces of the rotor turn with it.
         fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
-
-    Raises:
-        InputError: if the fineness is out of range, the seal longer than the body behind its nose, or a piece has more
-            triangles than fit into memory.
     """
     fineness = _checked_fineness(fineness)
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
@@ -143,11 +137,7 @@ def _check_triangles(cause: str, rings: int, around: int) -> None:
 
 
 def _checked_fineness(fineness: float) -> float:
-    """The fineness as a number in its range.
-
-    Raises:
-        InputError: if it is not one.
-    """
+    """The fineness as a number in its range."""
     try:
         number = float(fineness)
     except (TypeError, ValueError):
@@ -192,11 +182,7 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
 
 
 def _check_seal(robot: Robot, seal: Seal) -> None:
-    """The seal ends behind the nose.
-
-    Raises:
-        InputError: if it does not.
-    """
+    """The seal ends behind the nose."""
     body = robot.body
     nose = 0.5 * body.length if body.shape in ("sphere", "spheroid") else body.rounding(body.front_end)
     longest = body.length - nose
@@ -245,10 +231,6 @@ def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
 
     A wire cannot be swept around a bend sharper than its own radius, as a very large `tail.taper` makes at the root:
     there the line starts behind the bend.
-
-    Args:
-        robot: a checked robot.
-        fineness: number of points, relative to the normal one.
     """
     tail = robot.tail
     wavenumber = 2.0 * np.pi / tail.wavelength

@@ -9,11 +9,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.parts import End, Shape
 
-__all__ = ["Arc", "Line", "Outline", "body_outline", "cylinder_outline", "solid_outlines"]
-
 
 @dataclass(frozen=True)
-class Line:
+class Segment:
     """A straight segment from (x, rho) to (x, rho), m."""
 
     start: tuple[float, float]
@@ -73,7 +71,7 @@ class Arc:
 class Outline:
     """A closed solid of revolution: pieces from its front pole to its rear pole."""
 
-    pieces: tuple[Line | Arc, ...]
+    pieces: tuple[Segment | Arc, ...]
     corners: tuple[bool, ...]
     """Whether there is a sharp edge between each piece and the next."""
 
@@ -99,7 +97,7 @@ class Outline:
         return np.asarray(found).reshape(shape)
 
 
-def _end(end: End | None, x_tip: float, outward: float, radius: float, fillet: float) -> list[Line | Arc]:
+def _end(end: End | None, x_tip: float, outward: float, radius: float, fillet: float) -> list[Segment | Arc]:
     """Pieces of an end from the axis to where the straight side begins."""
     inner = x_tip - outward * (radius if end == "hemisphere" else fillet)
     if end == "hemisphere":
@@ -107,15 +105,15 @@ def _end(end: End | None, x_tip: float, outward: float, radius: float, fillet: f
     if end == "fillet":
         core = radius - fillet
         arc = Arc((inner, core), (outward * fillet, fillet), (0.0, 0.5 * np.pi))
-        return [Line((x_tip, 0.0), (x_tip, core)), arc] if core > 0 else [arc]
-    return [Line((x_tip, 0.0), (x_tip, radius))]
+        return [Segment((x_tip, 0.0), (x_tip, core)), arc] if core > 0 else [arc]
+    return [Segment((x_tip, 0.0), (x_tip, radius))]
 
 
-def _reversed(pieces: list[Line | Arc]) -> list[Line | Arc]:
-    turned: list[Line | Arc] = []
+def _reversed(pieces: list[Segment | Arc]) -> list[Segment | Arc]:
+    turned: list[Segment | Arc] = []
     for piece in reversed(pieces):
-        if isinstance(piece, Line):
-            turned.append(Line(piece.end, piece.start))
+        if isinstance(piece, Segment):
+            turned.append(Segment(piece.end, piece.start))
         else:
             turned.append(Arc(piece.centre, piece.semi_axes, (piece.angles[1], piece.angles[0])))
     return turned
@@ -131,7 +129,7 @@ def body_outline(
     nose = _end(front, half, 1.0, radius, fillet)
     tail = _reversed(_end(rear, -half, -1.0, radius, fillet))
     x_front, x_rear = nose[-1].points(np.ones(1))[0][0], tail[0].points(np.zeros(1))[0][0]
-    side: list[Line | Arc] = [Line((float(x_front), radius), (float(x_rear), radius))]
+    side: list[Segment | Arc] = [Segment((float(x_front), radius), (float(x_rear), radius))]
     if x_front - x_rear < 1e-9 * length:
         side = []
     joints = [front == "flat"] if side else [front == "flat" or rear == "flat"]
@@ -144,9 +142,9 @@ def cylinder_outline(diameter: float, front: float, rear: float) -> Outline:
     """Outline of a flat-ended cylinder from x = front to x = rear < front; lengths in m."""
     radius = 0.5 * diameter
     pieces = (
-        Line((front, 0.0), (front, radius)),
-        Line((front, radius), (rear, radius)),
-        Line((rear, radius), (rear, 0.0)),
+        Segment((front, 0.0), (front, radius)),
+        Segment((front, radius), (rear, radius)),
+        Segment((rear, radius), (rear, 0.0)),
     )
     return Outline(pieces, (True, True))
 

@@ -8,20 +8,6 @@ from pydantic import BeforeValidator, WithJsonSchema
 
 from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Section, Viscosity
 
-__all__ = [
-    "Body",
-    "Channel",
-    "ChannelOrNone",
-    "Coupling",
-    "End",
-    "Fluid",
-    "Seal",
-    "SealOrNone",
-    "Shape",
-    "StripeColour",
-    "Tail",
-]
-
 
 def _read_taper(value: Any) -> float | None:
     if value == "none" or value is None:

@@ -13,8 +13,6 @@ from spirillum.robot.arguments import Options
 from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw
 from spirillum.units import show
 
-__all__ = ["Ends", "Placement", "gap_on_asperities"]
-
 Ends = Literal["open", "closed"]
 """Ends of the channel: both open into a bath, or closed (no net flux)."""
 

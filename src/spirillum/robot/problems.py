@@ -11,8 +11,6 @@ from pydantic import BaseModel, ValidationError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
-__all__ = ["problems_in", "refused_table", "refused_value"]
-
 _OTHERWISE = {
     "tail.turns": "tail.length over tail.wavelength is the number of turns",
     "tail.pitch": "tail.wavelength is the pitch of the helix, a length",
@@ -33,11 +31,6 @@ def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _
     """Check a raw table; return the model, or every problem as a sentence, unknown fields first.
 
     A misspelt field is missing under its right name, too; its own sentence says what to do.
-
-    Args:
-        model: what the table has to be.
-        table: the raw table.
-        under: the name under which sentences put its fields; empty: none.
     """
     try:
         return model.model_validate(table)
@@ -51,12 +44,7 @@ def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _
 
 
 def refused_table(problems: Sequence[str], source: str = "") -> InputError:
-    """All problems of a table as one error: the first as its sentence, the fields of the others by name.
-
-    Args:
-        problems: what is wrong, a sentence each that begins with its field.
-        source: file or table, which every sentence begins with; empty: none.
-    """
+    """All problems of a table as one error: the first as its sentence, the fields of the others by name."""
     every = [f"{source}: {problem}" for problem in problems] if source else list(problems)
     if len(problems) == 1:
         return InputError(every[0])
@@ -89,12 +77,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
 
 
 def refused_value(error: ValidationError, field: str) -> str:
-    """A sentence for a single value that was refused.
-
-    Args:
-        error: of the value.
-        field: what it was given for.
-    """
+    """A sentence for a single value that was refused."""
     return _refused(error.errors(include_url=False)[0], field)
 
 

@@ -14,8 +14,6 @@ from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
 from spirillum.robot.tables import RobotTables
 
-__all__ = ["STANDARD_GRAVITY", "Derived", "Robot", "motor_current_problem"]
-
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901)."""
 
@@ -32,10 +30,6 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
     """A sentence where (17) has no single steady current; empty where it has one.
 
     It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
-
-    Args:
-        motor: the motor.
-        battery: its battery.
     """
     r = motor.resistance
     current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)

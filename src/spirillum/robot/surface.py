@@ -10,14 +10,12 @@ from jaxtyping import Int
 
 from spirillum.arrays import Samples
 from spirillum.costs import check_memory
-from spirillum.robot.outline import Arc, Line, Outline
+from spirillum.robot.outline import Arc, Outline, Segment
 
 if TYPE_CHECKING:
     _Integers = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 else:
     _Integers = np.ndarray
-
-__all__ = ["Faces", "Profile", "Surface", "corner_normals", "mass_properties", "profile_of", "revolved", "rod", "swept"]
 
 Faces: TypeAlias = Int[_Integers, "..."]
 """Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
@@ -40,7 +38,7 @@ class Surface(NamedTuple):
     """Index of each triangle's sector around the axis, (m,)."""
 
 
-class Profile(NamedTuple):
+class OutlinePoints(NamedTuple):
     """Points of an outline from its front pole to its rear pole."""
 
     x: Samples
@@ -51,7 +49,7 @@ class Profile(NamedTuple):
     """Whether each band, from a point to the next, lies in a plane perpendicular to the axis."""
 
 
-def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Profile:
+def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> OutlinePoints:
     """Points along an outline: on an arc in proportion to its angle, on a line only its ends.
 
     Args:
@@ -63,7 +61,7 @@ def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Pro
     rho: list[Samples] = []
     flat: list[bool] = []
     for piece in outline.pieces:
-        if isinstance(piece, Line):
+        if isinstance(piece, Segment):
             count = 1
         else:
             count = max(2, int(np.ceil(around * abs(piece.angles[1] - piece.angles[0]) / (2.0 * np.pi))))
@@ -74,15 +72,15 @@ def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Pro
         first = 1 if x else 0  # pieces share their ends
         x.append(here_x[first:])
         rho.append(here_rho[first:])
-        flat += [isinstance(piece, Line) and piece.start[0] == piece.end[0]] * (len(t) - 1)
+        flat += [isinstance(piece, Segment) and piece.start[0] == piece.end[0]] * (len(t) - 1)
     all_rho = np.concatenate(rho)
     all_rho[[0, -1]] = 0.0
-    return Profile(np.concatenate(x), all_rho, tuple(flat))
+    return OutlinePoints(np.concatenate(x), all_rho, tuple(flat))
 
 
-def _parameter(piece: Line | Arc, x: float) -> float:
+def _parameter(piece: Segment | Arc, x: float) -> float:
     """Parameter (0 to 1) at which the piece passes x; NaN where it does not."""
-    if isinstance(piece, Line):
+    if isinstance(piece, Segment):
         run = piece.end[0] - piece.start[0]
         return (x - piece.start[0]) / run if run != 0 else float("nan")
     cosine = (x - piece.centre[0]) / piece.semi_axes[0]
@@ -100,7 +98,7 @@ def _with_cut(t: Samples, cut: float) -> Samples:
     return np.sort(np.concatenate([t[:1], kept, t[-1:], np.full(1, cut)]))
 
 
-def revolved(profile: Profile, around: int, start: float = 0.0) -> Surface:
+def revolved(profile: OutlinePoints, around: int, start: float = 0.0) -> Surface:
     """The surface of a solid of revolution about the x axis.
 
     Args:
@@ -141,7 +139,7 @@ def rod(start: Samples, end: Samples, radius: float, around: int, *, round_start
         x.append(-radius * np.cos(ball[::-1]))
         rho.append(radius * np.sin(ball[::-1]))
     tips = length + (radius if round_end else 0.0), -radius if round_start else 0.0
-    profile = Profile(
+    profile = OutlinePoints(
         np.concatenate([[tips[0]], *x, [tips[1]]]), np.concatenate([[0.0], *rho, [0.0]]), (False,) * (len(x) + 1)
     )
     surface = revolved(profile, around)
@@ -241,9 +239,6 @@ def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
         vertices: (n, 3).
         faces: outward oriented, (m, 3).
         crease: the angle, rad.
-
-    Raises:
-        InputError: for more triangles than fit into memory.
     """
     check_memory("smooth shading", len(faces), "triangles", _SHADED, "as with a smaller fineness")
     a, b, c = np.moveaxis(vertices[faces], 1, 0)

@@ -9,10 +9,8 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.robot.actuation import Battery, Drive, Friction, Magnetic, Motor
 from spirillum.robot.fields import Section, Text
-from spirillum.robot.options import Calibrations, ModelOptions
+from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
-
-__all__ = ["RobotTables"]
 
 
 class RobotTables(Section):

@@ -17,14 +17,12 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
-from spirillum.robot.seat import GAP_SHARE
-from spirillum.studies.loading import LoadedStudy
+from spirillum.robot.tube_pose import GAP_SHARE
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import Indices, Part, groups
 from spirillum.swimming.band import at_place, band_places, joined
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
-
-__all__ = ["AT_PLACES", "BandTask", "band_tasks", "left_out", "placed_at", "reference_place", "with_band"]
 
 AT_PLACES = (
     "forward_velocity",

@@ -10,13 +10,11 @@ import numpy as np
 from spirillum.arrays import Flags
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import broken
-from spirillum.studies.work import REASONS, Part, Task
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.studies.work import REASONS, ModelTask, Part
 from spirillum.swimming.cautions import accuracy_limits
 from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
 from spirillum.swimming.steady import requirements
-
-__all__ = ["Caution", "cautions", "summed"]
+from spirillum.swimming.steady_quantities import STEADY, Swimming
 
 
 class Caution(NamedTuple):
@@ -32,7 +30,7 @@ class Caution(NamedTuple):
     """Whether they have no answer for it."""
 
 
-def _refusals(task: Task, part: Part) -> list[Caution]:
+def _refusals(task: ModelTask, part: Part) -> list[Caution]:
     """Why robots of a task have no answer, one for each requirement; each robot counts for the first that it breaks."""
     left = np.any(part["outside"] != 0, axis=-1)
     found = []
@@ -51,7 +49,7 @@ def _refusals(task: Task, part: Part) -> list[Caution]:
     return found
 
 
-def _beyond_stokes(task: Task, part: Part, left: Flags) -> list[Caution]:
+def _beyond_stokes(task: ModelTask, part: Part, left: Flags) -> list[Caution]:
     """The refusal of robots that move far outside Stokes flow, under the first reading of the friction that has one."""
     code = REASONS.index("beyond-stokes")
     refused = left & np.any(part["outside"] == code, axis=-1)
@@ -64,7 +62,7 @@ def _beyond_stokes(task: Task, part: Part, left: Flags) -> list[Caution]:
     return [Caution(task.model, "beyond-stokes", len(rows), sentence, refused=True)]
 
 
-def cautions(task: Task, part: Part) -> list[Caution]:
+def cautions(task: ModelTask, part: Part) -> list[Caution]:
     """What to be careful about in a task's answer, and why robots have none, one for each kind."""
     size = task.batch.size
     first = Swimming(**{item.name: part[item.name][:, 0] for item in STEADY}, valid=part["outside"][:, 0] == 0)

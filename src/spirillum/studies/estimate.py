@@ -8,16 +8,14 @@ from math import prod
 from time import monotonic
 from typing import NamedTuple
 
-from spirillum.crews import ESTIMATE, Crew
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.processes import AHEAD, memory_in_use
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import Layout, Region, cut, layout_of
+from spirillum.studies.regions import Layout, RobotBlock, cut, layout_of
 from spirillum.studies.stored import Plan, RegionJob, encoded_region, plan_of
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import groups
-
-__all__ = ["Estimate", "Pace", "estimate_of", "is_large"]
+from spirillum.worker_pool import ESTIMATE, WorkerPool
 
 _FEW, _MORE = 200, 2000
 """Robots that are computed to know the memory of the rest of them."""
@@ -48,9 +46,6 @@ class Pace:
         """Take note of a region that is done, and return the time from begin to end, s; None: not known yet.
 
         The first region of every process is left out of the pace: before it, the process loads what it needs.
-
-        Args:
-            robots: number of robots of the region.
         """
         now = self._clock()
         self._regions, self._done = self._regions + 1, self._done + robots
@@ -62,7 +57,7 @@ class Pace:
         return now - self._start + (self._robots - self._done) / rate
 
 
-class Estimate(NamedTuple):
+class CostEstimate(NamedTuple):
     """What a study takes beside its time."""
 
     results: int
@@ -107,22 +102,16 @@ class _Cost(NamedTuple):
     """Size of a region's files, bytes."""
 
 
-def estimate_of(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, crew: Crew) -> Estimate:
-    """Estimate what is missing of a study.
-
-    Args:
-        loaded: the study.
-        observed: observed rates and speeds of its robots, if any.
-        plan: what its store holds.
-        missing: number of regions that are to be computed.
-        crew: who computes.
-    """
+def estimate_of(
+    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, crew: WorkerPool
+) -> CostEstimate:
+    """Estimate what is missing of a study."""
     cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0)
     workers, base = crew.size, memory_in_use()
     alone = crew.cluster is None and (workers == 1 or missing < 2)
     here = base + (cost.memory if alone else AHEAD * workers * cost.encoded)
     others = 0 if alone or crew.cluster is not None else min(workers, missing)
-    return Estimate(
+    return CostEstimate(
         results=loaded.study.size,
         memory=here + others * (base + cost.memory),
         disk=plan.bytes_of_results,
@@ -157,7 +146,9 @@ def _is_quick(name: str, loaded: LoadedStudy) -> bool:
     return all(quickest(model, batch) is not model for _, batch in groups(one))
 
 
-def _job(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, first: Region, count: int) -> RegionJob:
+def _job(
+    loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, first: RobotBlock, count: int
+) -> RegionJob:
     """The first region, with about so many of its robots."""
     stop = list(first.stop)
     for axis in range(len(stop)):

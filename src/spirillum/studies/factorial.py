@@ -12,17 +12,12 @@ import numpy as np
 
 from spirillum.arrays import Values
 
-__all__ = ["half_fraction", "main_effects"]
-
 Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 """Levels of the factors in each run, (runs, factors): -1 low, +1 high."""
 
 
 def half_fraction(factors: int) -> Levels:
     """The levels of a half fraction of all combinations, the last factor's the product of the others'.
-
-    Args:
-        factors: number of factors, 2 at least.
 
     Returns:
         (2**(factors - 1), factors); -1 low, +1 high. Every column adds up to 0, and any two are orthogonal from three

@@ -12,17 +12,14 @@ import numpy as np
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels.compiled import rows_in_one_thread
 from spirillum.studies.band import BandTask
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
-from spirillum.studies.work import Indices, OneRobot, Part, Task, answer
+from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.work import Indices, ModelTask, OneRobot, Part, answer
 
-__all__ = ["AnyTask", "Job", "answered", "job_of", "one_thread_each"]
-
-
-AnyTask = Task | BandTask | OneRobot
+AnyTask = ModelTask | BandTask | OneRobot
 
 
-class Job(NamedTuple):
+class StudyJob(NamedTuple):
     """A task with all that it is computed from; its robots are numbered from 0."""
 
     task: AnyTask
@@ -31,20 +28,20 @@ class Job(NamedTuple):
     observed: ObservedArrays | None
 
 
-def job_of(task: AnyTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> tuple[int, Job]:
+def job_of(task: AnyTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> tuple[int, StudyJob]:
     """A task as a job, with its number."""
     study = loaded.study.model_copy(update={"grid": None, "robots": None})
     small = replace(loaded, study=study, robots=(), placements=(), question={}, cautions=())
-    if not isinstance(task, Task):
-        return task.number, Job(task, small, None)
+    if not isinstance(task, ModelTask):
+        return task.number, StudyJob(task, small, None)
     if loaded.posterior is not None:
         small = replace(small, robots=tuple(loaded.robot_at(index) for index in task.indices.tolist()))
     seen = None if observed is None else observed_at(observed, task.indices)
     own: Indices = np.arange(task.size, dtype=np.intp)
-    return task.number, Job(replace(task, indices=own), small, seen)
+    return task.number, StudyJob(replace(task, indices=own), small, seen)
 
 
-def answered(numbered: tuple[int, Job]) -> Part:
+def answered(numbered: tuple[int, StudyJob]) -> Part:
     """The answer of a job."""
     task, loaded, observed = numbered[1]
     if isinstance(task, OneRobot):
@@ -55,11 +52,7 @@ def answered(numbered: tuple[int, Job]) -> Part:
 
 @contextmanager
 def one_thread_each(*models: str) -> Iterator[None]:
-    """While the block runs, this process keeps to one thread: the others have the other cores.
-
-    Args:
-        models: names of the models that are asked.
-    """
+    """While the block runs, this process keeps to one thread: the others have the other cores."""
     if all(find_swimmer_model(name).closed_form for name in models):
         yield
         return

@@ -12,16 +12,14 @@ import numpy as np
 from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
 from spirillum.measurement.observations import (
-    Observation,
-    Observed,
+    ObservationRow,
+    RobotObservations,
     check_driven,
     read_observations,
     summarised,
 )
 from spirillum.robot.robot import Robot
-from spirillum.studies.loading import LoadedStudy
-
-__all__ = ["ObservedArrays", "observed_arrays", "observed_at"]
+from spirillum.studies.study_loader import LoadedStudy
 
 _NAMES = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
 
@@ -53,12 +51,7 @@ def observed_at(observed: ObservedArrays, indices: np.ndarray) -> ObservedArrays
 
 
 def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
-    """Read observations and match them with the study's robots by channel, wavelength and amplitude.
-
-    Raises:
-        InputError: if the file is wrong, a row belongs to no robot of the study, or a rate's sign contradicts
-            the tail's hand.
-    """
+    """Read observations and match them with the study's robots by channel, wavelength and amplitude."""
     observations = read_observations(path)
     tails = _tails(loaded)
     for item in observations:
@@ -101,14 +94,14 @@ def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
 
 
 def _by_robot(
-    observations: Sequence[Observation], tails: Mapping[tuple[float, float, float], Robot]
-) -> list[tuple[Robot, list[Observation]]]:
-    found: dict[int, tuple[Robot, list[Observation]]] = {}
+    observations: Sequence[ObservationRow], tails: Mapping[tuple[float, float, float], Robot]
+) -> list[tuple[Robot, list[ObservationRow]]]:
+    found: dict[int, tuple[Robot, list[ObservationRow]]] = {}
     for item in observations:
         robot = tails[item.tail]
         found.setdefault(id(robot), (robot, []))[1].append(item)
     return list(found.values())
 
 
-def _column(rows: Sequence[Observed | None], name: str, item: int) -> PerRobot:
+def _column(rows: Sequence[RobotObservations | None], name: str, item: int) -> PerRobot:
     return np.array([np.nan if row is None else getattr(row, name)[item] for row in rows])

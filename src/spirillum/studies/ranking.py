@@ -16,30 +16,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import Values
+from spirillum.envelope import quantity
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
 from spirillum.units import display_unit, in_unit, show
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "ENDS",
-    "LET_GO",
-    "RANKED",
-    "SETTLED_BASIS",
-    "Best",
-    "Ranked",
-    "RankedRobot",
-    "StudyRanking",
-    "best_in_words",
-    "can_be_ranked",
-    "ranking_of",
-    "robot_dims",
-    "unit_of_ranked",
-]
 
 _ALIKE = 0.01
 _EQUAL = 1e-9
@@ -50,7 +34,7 @@ _MOST = 1000
 """Robots in an answer."""
 
 
-class Ranked(NamedTuple):
+class QuantityRanking(NamedTuple):
     """How a quantity ranks robots."""
 
     title: str
@@ -68,11 +52,11 @@ class Ranked(NamedTuple):
 LET_GO = "forward_velocity_settled"
 """The speed in steady motion, of robots that were let go."""
 RANKED = {
-    "forward_velocity": Ranked("speed", "fastest", 1.0),
-    LET_GO: Ranked("settled", "fastest once settled", 1.0),
-    "hydrodynamic_efficiency": Ranked("efficiency", "most efficient", 1.0),
-    "motor_current": Ranked("current", "least current", -1.0),
-    "shaft_power": Ranked("power", "least power", -1.0),
+    "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
+    LET_GO: QuantityRanking("settled", "fastest once settled", 1.0),
+    "hydrodynamic_efficiency": QuantityRanking("efficiency", "most efficient", 1.0),
+    "motor_current": QuantityRanking("current", "least current", -1.0),
+    "shaft_power": QuantityRanking("power", "least power", -1.0),
 }
 """Quantities that rank robots, in the order in which they are shown."""
 SETTLED_BASIS = "settled: by model tube, let go, in steady motion; all else: by the model above, not let go"
@@ -197,12 +181,7 @@ class StudyRanking:
 
 
 def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
-    """Which robot is the best by a quantity, and how surely.
-
-    Args:
-        best: as `Best.to_dict` gives it.
-        size: its value with the unit; empty where that stands in a table beside.
-    """
+    """Which robot is the best by a quantity, and how surely."""
     if best["alike"]:
         return f"{best['what']}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
     sure = f"at {best['places']} of {best['of_places']} places" if "places" in best else ""
@@ -215,11 +194,7 @@ def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
-    """Whether a dataset is a study with all its dimensions and the quantities that rank robots.
-
-    Args:
-        dataset: any dataset.
-    """
+    """Whether a dataset is a study with all its dimensions and the quantities that rank robots."""
     chosen, indexes = ("model", "friction"), dataset.indexes
     named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
     over = {*chosen, *robot_dims(dataset)}
@@ -232,11 +207,7 @@ def robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def ranking_of(dataset: xr.Dataset) -> StudyRanking:
-    """The ranking of a study's robots.
-
-    Args:
-        dataset: what `spirillum.study` returns.
-    """
+    """The ranking of a study's robots."""
     settings = json.loads(str(dataset.attrs.get("settings", "{}")))
     robots = settings.get("robots", [])
     walled = any(robot.get("channel") for robot in robots)

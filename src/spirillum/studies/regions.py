@@ -13,18 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import BLOCK, Indices
-
-__all__ = ["Layout", "Region", "cut", "layout_of"]
 
 _SOLVED_BLOCK, _PLACED_BLOCK = 128, 64
 """Robots of a region for a model that solves for the flow: some ten seconds of work; and for one that solves for body
 and walls once, for all tails at one place."""
 
 
-class Region(NamedTuple):
+class RobotBlock(NamedTuple):
     """A block of robots."""
 
     number: int
@@ -39,7 +37,7 @@ class Region(NamedTuple):
         return prod(stop - start for start, stop in zip(self.start, self.stop, strict=True))
 
     @property
-    def of_one(self) -> Region:
+    def of_one(self) -> RobotBlock:
         """Its first robot alone."""
         return self._replace(stop=tuple(start + 1 for start in self.start))
 
@@ -58,15 +56,15 @@ class Layout:
         """Number of regions."""
         return prod(ceil(size / part) for size, part in zip(self.shape, self.chunk, strict=True))
 
-    def regions(self) -> Iterator[Region]:
+    def regions(self) -> Iterator[RobotBlock]:
         """All regions, in their order."""
         parts = tuple(ceil(size / part) for size, part in zip(self.shape, self.chunk, strict=True))
         for number, place in enumerate(np.ndindex(*parts)):
             start = tuple(at * part for at, part in zip(place, self.chunk, strict=True))
             ends = zip(start, self.chunk, self.shape, strict=True)
-            yield Region(number, start, tuple(min(first + part, size) for first, part, size in ends))
+            yield RobotBlock(number, start, tuple(min(first + part, size) for first, part, size in ends))
 
-    def indices(self, region: Region) -> Indices:
+    def indices(self, region: RobotBlock) -> Indices:
         """Indices of a region's robots in the flat order of the study."""
         along = [np.arange(first, last) for first, last in zip(region.start, region.stop, strict=True)]
         found: Indices = np.ravel_multi_index(np.meshgrid(*along, indexing="ij"), self.shape).ravel()
@@ -90,7 +88,7 @@ def layout_of(loaded: LoadedStudy) -> Layout:
 
 
 def cut(
-    loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, region: Region
+    loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, region: RobotBlock
 ) -> tuple[LoadedStudy, ObservedArrays | None]:
     """The part of a study that a region is: a study of its own, without what it does not need."""
     grid, study = loaded.study.grid, loaded.study

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from spirillum.crews import Crew, shared_out
+import numpy as np
+
+from spirillum.files import opened, whole_file
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
@@ -20,12 +23,11 @@ from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.cautions import cautions, summed
 from spirillum.studies.dataset import assembled
 from spirillum.studies.jobs import AnyTask, answered, job_of
-from spirillum.studies.kept_parts import keep, kept
-from spirillum.studies.laid_down import laid_down_tasks, without_answer
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.released_robots import laid_down_tasks, without_answer
 from spirillum.studies.settled import not_settled, settled_basis, settled_tasks
-from spirillum.studies.work import OneRobot, Task, tasks
+from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.work import ModelTask, OneRobot, Part, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
@@ -33,11 +35,69 @@ from spirillum.swimming.drive_warnings import CONSTANT_TORQUE
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.steady import requirements
 from spirillum.version import own_version
+from spirillum.worker_pool import WorkerPool, map_tasks
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Progress", "computed_study", "study_fingerprint", "warnings_of", "warnings_of_calibrations"]
+
+class Keepable(Protocol):
+    """A task as far as keeping its answer goes."""
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that keeps its answer."""
+
+    @property
+    def size(self) -> int:
+        """Number of robots."""
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays that every answer has."""
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+
+
+def kept(task: Keepable, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
+    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task.
+
+    Args:
+        task: what was asked.
+        folder: where answers are kept; None: nowhere.
+        leading: sizes of the first axes of all its arrays.
+    """
+    if folder is None or not (folder / task.file_name).is_file():
+        return None
+    try:
+        with opened(folder / task.file_name, "a part of a study", _LARGEST_PART) as stream:
+            if any(not _as_kept(item) for item in zipfile.ZipFile(stream).infolist()):
+                return None
+            with np.load(stream, allow_pickle=False) as stored:
+                part = {name: stored[name] for name in stored.files}
+    except Exception:  # a damaged file raises whatever the libraries meet first
+        return None
+    whole = task.needed <= set(part) <= task.allowed
+    fits = all(array.dtype == np.float64 and array.shape[: len(leading)] == leading for array in part.values())
+    return part if whole and fits else None
+
+
+_LARGEST_PART = 1 << 30
+
+
+def _as_kept(item: zipfile.ZipInfo) -> bool:
+    """Whether an array stands in the file as it is: what is compressed could be a thousand times as large."""
+    return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
+
+
+def keep(task: Keepable, part: Part, folder: Path | None) -> None:
+    """Keep a finished answer."""
+    if folder is not None:
+        with whole_file(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
+            np.savez(stream, **cast("dict[str, Any]", part))
+
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
@@ -55,7 +115,7 @@ def computed_study(
     fingerprint: str,
     parts: Path | None,
     tell: Progress,
-    crew: Crew | None = None,
+    crew: WorkerPool | None = None,
 ) -> xr.Dataset:
     """The dataset of a study.
 
@@ -67,7 +127,7 @@ def computed_study(
         tell: called with what is being done, steps done and steps in all.
         crew: who computes; None: this process.
     """
-    todo: list[Task | BandTask] = list(tasks(loaded))
+    todo: list[ModelTask | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
     followed = loaded.study.predicted or loaded.study.settled
     with_table = _with_table(loaded) if followed else {}
@@ -80,15 +140,15 @@ def computed_study(
     if missing:
         tell(missing[0].words, done, len(asked))
     jobs = (job_of(task, loaded, observed) for task in missing)
-    at_work = _worth(missing, crew or Crew())
-    for (number, _), part in shared_out(answered, jobs, at_work, besides=_KEPT if parts else ""):
+    at_work = _worth(missing, crew or WorkerPool())
+    for (number, _), part in map_tasks(answered, jobs, at_work, besides=_KEPT if parts else ""):
         found[number] = part
         keep(asked[number], part, parts)
         done += 1
         tell(asked[number].words, done, len(asked))
     tell("dataset", len(asked), len(asked))
     parts_of = {number: part for number, part in found.items() if part is not None}
-    answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, Task)]
+    answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
     laid_down = [(task, parts_of[task.number]) for task in runs]
     settled = [(task, parts_of[task.number]) for task in let_go]
@@ -114,11 +174,11 @@ def _leading(task: AnyTask, loaded: LoadedStudy) -> tuple[int, ...]:
     return (1,) if isinstance(task, OneRobot) else (task.size, len(loaded.study.friction))
 
 
-def _worth(missing: Sequence[AnyTask], crew: Crew) -> Crew:
+def _worth(missing: Sequence[AnyTask], crew: WorkerPool) -> WorkerPool:
     """Who computes: this process where the others would start longer than they work."""
-    quick = all(isinstance(task, Task) and find_swimmer_model(task.model).closed_form for task in missing)
+    quick = all(isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form for task in missing)
     short = quick and sum(task.size for task in missing) < _SHORT
-    return Crew() if short and crew.cluster is None else crew
+    return WorkerPool() if short and crew.cluster is None else crew
 
 
 def warnings_of(loaded: LoadedStudy) -> list[str]:

@@ -17,21 +17,10 @@ from spirillum.errors import InputError
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.spec import Contact
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.units import show
-
-__all__ = [
-    "PLACE",
-    "SETTLED",
-    "STATES",
-    "SettledTask",
-    "not_settled",
-    "settled_basis",
-    "settled_tasks",
-    "settled_variables",
-]
 
 SETTLED = (
     "forward_velocity",
@@ -93,13 +82,7 @@ class SettledTask(OneRobot):
 
 
 def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[SettledTask]:
-    """One task for each robot, numbered from `first`; none where none is asked for.
-
-    Args:
-        loaded: the study.
-        robots: those with a table, by their index in the flat order of the study.
-        first: number of the first task.
-    """
+    """One task for each robot, numbered from `first`; none where none is asked for."""
     if loaded.study.settled:
         tails = loaded.count // len(loaded.robots)
         for number, (index, robot) in enumerate(robots.items(), start=first):
@@ -107,11 +90,7 @@ def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) 
 
 
 def settled_basis(contact: Contact) -> str:
-    """What settled speeds are, and rest on, a sentence.
-
-    Args:
-        contact: of the robots with the glass.
-    """
+    """What settled speeds are, and rest on, a sentence."""
     height = "1e-4 of its radius" if contact.roughness is None else show(contact.roughness, "um")
     return (
         "a settled speed is that of a robot left to itself until its motion is steady, which may take minutes, on "
@@ -149,11 +128,6 @@ def settled_variables(
     answers: Sequence[tuple[SettledTask, Part]], robots: Sequence[str], shape: Sequence[int]
 ) -> dict[str, Any]:
     """The steady motions as variables of a dataset.
-
-    Args:
-        answers: of the robots that were let go, one at least.
-        robots: dimensions of the robots.
-        shape: sizes of these.
 
     Returns:
         `<quantity>_settled` over the robots, NaN for those without a steady motion, and `settled`, what became of them.

@@ -18,8 +18,6 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz, show
 
-__all__ = ["LARGEST_STORED", "Contact", "Grid", "LaidDown", "Study"]
-
 _MOST_ROBOTS = 100_000
 """Most robots that are loaded one by one."""
 LARGEST_STORED = 500_000_000
@@ -27,7 +25,7 @@ LARGEST_STORED = 500_000_000
 _Name = Annotated[Text, Field(min_length=1, max_length=200)]
 
 
-class Grid(Section):
+class TailGrid(Section):
     """Every wavelength with every amplitude in every channel."""
 
     channels: Annotated[dict[_Name, _Name], Field(min_length=1, max_length=1000)]
@@ -111,7 +109,7 @@ class Study(Section):
     """Whose statements to hold the results against."""
     assumed_motor_rates: Annotated[tuple[Rate, ...], Field(max_length=1000)] = ()
     """Motor rates at which B_eff is inferred as a curve, where no rates were observed."""
-    grid: Grid | None = None
+    grid: TailGrid | None = None
     """A grid of robots."""
     robots: Annotated[list[_Name], Field(min_length=1, max_length=_MOST_ROBOTS)] | None = None
     """A list of robots (presets or files) instead of a grid."""

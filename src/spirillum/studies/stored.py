@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import as_json
+from spirillum.envelope import as_json
 from spirillum.files import Stored, chunk_key, region_files
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.cautions import cautions
 from spirillum.studies.dataset import coordinates_of, laid_out
 from spirillum.studies.jobs import one_thread_each
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import Layout, Region, cut
+from spirillum.studies.regions import Layout, RobotBlock, cut
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import AT_RATES, WITH_INTERVALS, Part, answer, tasks
-from spirillum.swimming.answer import STEADY
+from spirillum.swimming.steady_quantities import STEADY
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Plan", "RegionJob", "encoded_region", "plan_of", "region_jobs"]
 
 _LAST = "outside"
 """The variable whose chunk takes its place last: where it is, the region is."""
@@ -49,16 +47,16 @@ class Plan(NamedTuple):
         items = [item for item in self.variables.values() if item.dtype != "str"]
         return int(sum(np.prod(item.shape, dtype=float) * np.dtype(item.dtype).itemsize for item in items))
 
-    def place(self, name: str, region: Region) -> list[tuple[int, int]]:
+    def place(self, name: str, region: RobotBlock) -> list[tuple[int, int]]:
         """Where a region of a variable lies: among the robots where it is, and whole along what comes behind them."""
         own = list(zip(region.start, region.stop, strict=True))
         return own + [(0, size) for size in self.variables[name].shape[len(own) :]]
 
-    def note(self, region: Region) -> str:
+    def note(self, region: RobotBlock) -> str:
         """Path within the store of what a region has to say, while the study runs."""
         return f"notes/{region.number:07d}.json"
 
-    def pieces(self, region: Region) -> list[str]:
+    def pieces(self, region: RobotBlock) -> list[str]:
         """Paths within the store of all files of a region, in the order in which they take their places."""
         keys = [chunk_key(name, self.variables[name], self.place(name, region)) for name in self.regional]
         return [*keys[:-1], self.note(region), keys[-1]]
@@ -67,7 +65,7 @@ class Plan(NamedTuple):
 class RegionJob(NamedTuple):
     """A region with all that it is computed from."""
 
-    region: Region
+    region: RobotBlock
     loaded: LoadedStudy
     """The study of its robots."""
     observed: ObservedArrays | None
@@ -117,7 +115,7 @@ def _empty(loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
 
 
 def region_jobs(
-    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, regions: Sequence[Region]
+    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, regions: Sequence[RobotBlock]
 ) -> Iterator[RegionJob]:
     """Regions with what they are computed from, made as they are taken."""
     light = plan._replace(coordinates=dict.fromkeys(plan.coordinates, np.zeros(0)))

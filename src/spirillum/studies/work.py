@@ -16,26 +16,12 @@ from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.studies.study_loader import LoadedStudy
 from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
 from spirillum.swimming.steady import requirements, speed_error, swim
-
-__all__ = [
-    "AT_RATES",
-    "BLOCK",
-    "REASONS",
-    "WITH_INTERVALS",
-    "OneRobot",
-    "Part",
-    "Task",
-    "answer",
-    "gathered",
-    "groups",
-    "tasks",
-]
+from spirillum.swimming.steady_quantities import STEADY, Swimming
 
 AT_RATES = (
     "forward_velocity",
@@ -101,7 +87,7 @@ Part = dict[str, Values]
 
 
 @dataclass(frozen=True)
-class Task:
+class ModelTask:
     """One model for one block of robots of the same kind."""
 
     number: int
@@ -182,13 +168,7 @@ class OneRobot(ABC):
 
 
 def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
-    """A quantity of robots that were followed one by one, over all robots of the study; NaN for those that were not.
-
-    Args:
-        answers: one at least.
-        name: of the quantity.
-        shape: sizes of the dimensions of the robots.
-    """
+    """A quantity of robots that were followed one by one, over all robots of the study; NaN for those that were not."""
     first = answers[0][1][name]
     values = np.full((int(np.prod(shape)), *first.shape[1:]), np.nan)
     for task, part in answers:
@@ -196,13 +176,13 @@ def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequenc
     return values.reshape(*shape, *first.shape[1:])
 
 
-def tasks(loaded: LoadedStudy) -> Iterator[Task]:
+def tasks(loaded: LoadedStudy) -> Iterator[ModelTask]:
     """All tasks of a study, always in the same order."""
     number = 0
     for indices, batch in groups(loaded):
         for model in loaded.study.models:
             for cut, block in batch.blocks(_block_size(find_swimmer_model(model))):
-                yield Task(number, model, indices[cut], block)
+                yield ModelTask(number, model, indices[cut], block)
                 number += 1
 
 
@@ -242,7 +222,7 @@ def _friction_at(loaded: LoadedStudy, index: int) -> float:
     return float("nan") if own is None else own
 
 
-def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
+def answer(task: ModelTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
     """Compute one task."""
     study = loaded.study
     readings = study.friction
@@ -306,7 +286,7 @@ def _speed_errors(quick: QuickParts, reading: str, found: Swimming) -> PerRobot:
     return errors
 
 
-def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Part:
+def _intervals(task: ModelTask, loaded: LoadedStudy, posterior: PosteriorFile) -> Part:
     """Limits of the intervals of every robot by itself, driven by its own drive; NaN where there is no answer."""
     readings, model = loaded.study.friction, find_swimmer_model(task.model)
     shape = (task.size, len(readings))
@@ -332,7 +312,7 @@ def _stacked(results: Sequence[Swimming], name: str) -> Values:
     return np.stack([getattr(result, name) for result in results], axis=-1)
 
 
-def _at_assumed_rates(task: Task, quick: QuickParts, rates: Sequence[float], readings: Sequence[str]) -> Part:
+def _at_assumed_rates(task: ModelTask, quick: QuickParts, rates: Sequence[float], readings: Sequence[str]) -> Part:
     """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
     electrics = task.batch.electrics
     assert electrics is not None  # noqa: S101 - the caller has asked

@@ -22,20 +22,6 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, Matrix12, Samples, Values
 from spirillum.robot.actuation import FrictionReading
 
-__all__ = [
-    "FRICTIONLESS",
-    "FrictionTorques",
-    "TorqueBalance",
-    "body_per_tail",
-    "coasting_rates",
-    "force_free",
-    "friction_torques",
-    "joined",
-    "rates_per_torque",
-    "released",
-    "with_body_factors",
-]
-
 _ZERO = np.zeros(1)
 _ZERO.setflags(write=False)
 

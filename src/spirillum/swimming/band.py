@@ -20,22 +20,20 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import PerRobot
+from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken
-from spirillum.robot.options import ModelOptions
+from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import GAP_BAND, contact_pitch, largest_gap
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
 from spirillum.swimming.steady import requirements
+from spirillum.swimming.steady_quantities import STEADY, Swimming
 from spirillum.units import show
-
-__all__ = ["PLACES_PER_FIELD", "TOLERANCE", "Band", "band_of", "band_places", "joined", "left_open", "steepest_pitch"]
 
 PLACES_PER_FIELD = 3
 """Gaps, and pitches at each of them."""
@@ -109,10 +107,6 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     """The places of a robot's band, from wide gaps to narrow ones and from level to steep.
 
     As many for every robot, so that the places of several robots compare: where a robot has no room, some are the same.
-
-    Args:
-        batch: one robot, inside the domain of the model, with what is known of its placement.
-        model: a hydrodynamic model.
 
     Returns:
         `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
@@ -194,15 +188,7 @@ def band_of(
     answer: Callable[[RobotBatch], Swimming],
     tell: Progress,
 ) -> Band | None:
-    """The band of one robot; None where its placement leaves nothing open.
-
-    Args:
-        batch: one robot inside the domain of the model, with what is known of its placement.
-        model: a hydrodynamic model.
-        reference: its answer at the reference place.
-        answer: how it swims where it is.
-        tell: called with what is being done, places done and places in all, the reference place being the first.
-    """
+    """The band of one robot; None where its placement leaves nothing open."""
     places = band_places(batch, model)
     if not places:
         return None

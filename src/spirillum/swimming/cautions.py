@@ -6,17 +6,15 @@ import numpy as np
 
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.announced import TABLE_TAKES
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import Swimming
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.reynolds import reynolds_limits
+from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
-
-__all__ = ["accuracy_limits", "calibration_warnings", "no_band_warnings"]
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:

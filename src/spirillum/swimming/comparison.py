@@ -9,27 +9,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_resolution
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
-from spirillum.swimming.answer import STEADY, headline
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import friction_reading
-
-__all__ = ["ModelComparison", "compare_models", "estimated_error", "uneven_models"]
+from spirillum.swimming.steady_quantities import STEADY, headline
 
 _UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}
 
 
 @dataclass(frozen=True)
-class ModelComparison(Shown):
+class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
     robot: Robot
@@ -97,7 +95,7 @@ class ModelComparison(Shown):
         return envelope("model-comparison", content, self.warnings)
 
     def _shown(self) -> tuple[dict[str, Any], None]:
-        """See `Shown`: the quantities that matter most, model by model."""
+        """See `DisplayMixin`: the quantities that matter most, model by model."""
         answer = self.to_dict()
         models = [item for item in answer["models"] if item["answered"]]
         short = [{"model": item["model"], **{name: item[name] for name in headline(item)}} for item in models]
@@ -116,13 +114,7 @@ class ModelComparison(Shown):
 
 
 def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[str]:
-    """What sets models apart besides their theory, a sentence each.
-
-    Args:
-        robots: the robots that they answer for.
-        models: names of the models.
-        calibrated: those of them that take calibration factors.
-    """
+    """What sets models apart besides their theory, a sentence each."""
     found = []
     walled = [name for name in models if find_swimmer_model(name).placed]
     open_ = [name for name in models if name not in walled]
@@ -215,11 +207,7 @@ def compare_models(
 
 
 def _chosen(models: Sequence[str] | None) -> list[str]:
-    """Names of the models.
-
-    Raises:
-        InputError: for an unknown name, one that stands twice, or none at all.
-    """
+    """Names of the models."""
     asked = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
     if not asked:
         raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")

@@ -18,8 +18,6 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.robot import Robot
 
-__all__ = ["PosteriorFor", "drawn_discrepancy", "error_of_mean", "posterior_for_of"]
-
 PosteriorFor = Literal["new", "measured"]
 """Whose discrepancy an interval holds: of a tail like those that were fitted, or of a fitted one."""
 
@@ -31,9 +29,6 @@ def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -
         name: `new` or `measured`.
         posterior: the posterior; None without one.
         robot: the robot.
-
-    Raises:
-        InputError: for another name, without a posterior, or for a robot that was not measured.
     """
     if name not in get_args(PosteriorFor):
         raise InputError(f"for = {name!r}; allowed: {', '.join(get_args(PosteriorFor))}")
@@ -100,12 +95,6 @@ def error_of_mean(
     """Standard error of a mean over trials, SI: that of one trial over the root of the number of trials.
 
     The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their sum.
-
-    Args:
-        error: relative error of one trial by the scatter of trials; NaN where unknown.
-        stated: relative error of one trial by its measurement; NaN where it was not stated.
-        scale: what both are relative to, SI.
-        trials: number of trials of the mean.
     """
     found: Samples = np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
     return found

@@ -19,10 +19,8 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.tabled import TabledTube, mean_resistances_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.seat import gap_of
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.balance import joined
-
-__all__ = ["AxialTable", "DrawnResistance", "Draws", "TubeResistance", "chebyshev_points"]
 
 Draws = Mapping[str, Samples]
 """Number to values, (draws, robots) or (draws, 1)."""
@@ -160,12 +158,7 @@ class TubeResistance:
 
     @classmethod
     def of(cls, batch: RobotBatch, model: TabledTube) -> TubeResistance:
-        """For the robots of a batch, in their tubes.
-
-        Args:
-            batch: the robots; what their placement leaves open is level, at the reference gap.
-            model: with the table of each.
-        """
+        """For the robots of a batch, in their tubes."""
         packed = [model.table_of(batch, index).packed for index in range(batch.size)]
         longest = max(table.size for table in packed)
         place = batch.placement

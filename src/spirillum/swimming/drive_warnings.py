@@ -7,10 +7,8 @@ import numpy as np
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
-
-__all__ = ["CONSTANT_TORQUE", "drive_warnings"]
 
 CONSTANT_TORQUE = (
     "drive.kind = 'torque': constant torque is assumed at every rate, so that speed and rates fall as one over the "

@@ -21,8 +21,6 @@ from spirillum.swimming.balance import (
 )
 from spirillum.swimming.motor import steady_current
 
-__all__ = ["DriveState", "at_rate", "current_at", "driven", "one_piece"]
-
 
 @dataclass(frozen=True)
 class DriveState:

@@ -24,11 +24,9 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
-from spirillum.swimming.answer import Swimming
 from spirillum.swimming.balance import joined, with_body_factors
 from spirillum.swimming.steady import swim
-
-__all__ = ["KnownResistance", "swim_on_floor", "weights_in_fluid", "with_dry_friction"]
+from spirillum.swimming.steady_quantities import Swimming
 
 _SMOOTH = 1e-4
 """v_r over the sliding speed of a body that turns as fast as its tail, as in a run with six degrees of freedom."""
@@ -137,10 +135,6 @@ def swim_on_floor(
         robots: the same, or one for all.
         coefficient: mu_c, one for each robot or for all; None or 0: no dry friction.
         asked: what else `swim` is asked.
-
-    Raises:
-        InputError: for what `swim` refuses, and for dry friction under robots whose joint is fixed or whose weight is
-            not known.
     """
     mu = np.zeros(1) if coefficient is None else np.atleast_1d(np.asarray(coefficient, dtype=float))
     free = swim(batch, model, **asked)

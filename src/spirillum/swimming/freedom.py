@@ -15,8 +15,6 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 
-__all__ = ["LINKS", "Motion", "Screw", "check_full", "motion_of"]
-
 Motion = Literal["held", "free"]
 """Lateral motion and tilt held, or released."""
 
@@ -60,22 +58,14 @@ class Screw(NamedTuple):
 
 
 def motion_of(name: str) -> Motion:
-    """The motion of that name.
-
-    Raises:
-        InputError: if there is none.
-    """
+    """The motion of that name."""
     if name not in get_args(Motion):
         raise InputError(f"motion = {name!r}; allowed: {', '.join(get_args(Motion))}")
     return cast("Motion", name)
 
 
 def check_full(model: SwimmerModel) -> None:
-    """Refuse a model that does not know all that a free motion needs.
-
-    Raises:
-        InputError: for a model of the axial entries only, or one whose answer holds at one place in the channel.
-    """
+    """Refuse a model that does not know all that a free motion needs."""
     if model.axial_only:
         why = "knows the entries along and about the motor axis only"
     elif model.placed:

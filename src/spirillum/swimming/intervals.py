@@ -23,7 +23,6 @@ from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import LEVEL, STEADY, Intervals, Swimming
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
 from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
@@ -31,8 +30,7 @@ from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import friction_reading
-
-__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over", "knows_torque", "without_torque"]
+from spirillum.swimming.steady_quantities import LEVEL, STEADY, Intervals, Swimming
 
 OF_TORQUE = (
     "tail_torque",
@@ -69,9 +67,6 @@ def intervals_of(
         friction: reading of the friction.
         posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
         placement: where the robot lies, for a model that computes the walls; a gap or pitch that it says is not drawn.
-
-    Raises:
-        InputError: for draws of the place of a robot without a table.
     """
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
@@ -140,16 +135,7 @@ def without_torque(found: Intervals) -> Intervals:
 
 
 def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
-    """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,).
-
-    Args:
-        robot: the robot, as `PosteriorFile.central` gives it.
-        model: the hydrodynamic model of the posterior.
-        posterior: its draws.
-
-    Raises:
-        InputError: for draws of the place of a robot without a table.
-    """
+    """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,)."""
     draws = posterior.of(robot, np.random.default_rng(1))
     size = posterior.count
     batch, drawn = _drawn(without_reynolds_bound(robot), model, posterior, draws, Placement())
@@ -208,11 +194,7 @@ def drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: in
 def _drawn(
     robot: Robot, model: SwimmerModel, posterior: PosteriorFile, draws: Mapping[str, Samples], placement: Placement
 ) -> tuple[RobotBatch, KnownResistance]:
-    """A robot for each draw, and the model with their resistances.
-
-    Raises:
-        InputError: for draws of the place of a robot without a table.
-    """
+    """A robot for each draw, and the model with their resistances."""
     batch = drawn_batch(robot, posterior.model, draws, posterior.count)
     columns = {name: values[:, None] for name, values in draws.items()}
     if not model.placed:

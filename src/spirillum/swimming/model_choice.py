@@ -14,27 +14,13 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
-from spirillum.fluid.tube.announced import TABLE_TAKES
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import requirements
-
-__all__ = [
-    "AUTO",
-    "UNBOUNDED",
-    "WALLED",
-    "ModelChoice",
-    "check_calibrated",
-    "choose_model",
-    "fitted_models",
-    "has_table",
-    "models_without_answer",
-    "posterior_alone",
-    "walls_left_out",
-]
 
 AUTO = "auto"
 """Name that leaves the choice of the model to `choose_model`."""
@@ -61,17 +47,7 @@ class ModelChoice:
 def posterior_alone(
     posterior: str | Path, model: str, calibration: str | Path | None, *, calibrated: bool
 ) -> PosteriorFile:
-    """A posterior, read for the model that is asked for; it stands in place of every other calibration.
-
-    Args:
-        posterior: path of its file.
-        model: name of a model, or `auto` for any.
-        calibration: path of another calibration, which is refused.
-        calibrated: whether calibration factors are wanted at all; without them a posterior is refused.
-
-    Raises:
-        InputError: for another calibration beside it, a file that is no posterior, or one of another model.
-    """
+    """A posterior, read for the model that is asked for; it stands in place of every other calibration."""
     if calibration is not None or not calibrated:
         raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
     return read_posterior(posterior, *([] if model == AUTO else [model]))
@@ -83,9 +59,6 @@ def check_calibrated(calibration: str | Path | None, *, calibrated: bool) -> Non
     Args:
         calibration: calibration file; None without one.
         calibrated: whether calibration factors are wanted.
-
-    Raises:
-        InputError: for both.
     """
     if calibration is not None and not calibrated:
         raise InputError("calibration together with no-calibration (calibrated = False); allowed: one of them")
@@ -115,9 +88,6 @@ def choose_model(
         motion: of a steady state, `held` or `free`; the free one in a tube takes a table, too.
         other_way: how else to come to an answer with walls than by `spirillum prepare`, a clause for the caution.
         among: the robot is one of several that are compared.
-
-    Raises:
-        InputError: for an unknown model, or a calibration that was fitted with several.
     """
     if asked != AUTO:
         return ModelChoice(find_swimmer_model(asked, AUTO).name)
@@ -141,11 +111,7 @@ def choose_model(
 
 
 def models_without_answer(robot: Robot) -> list[str]:
-    """A sentence on each model whose domain a robot lies outside of, lying level in its channel.
-
-    Args:
-        robot: the robot.
-    """
+    """A sentence on each model whose domain a robot lies outside of, lying level in its channel."""
     batch = RobotBatch.of(robot)
     found = []
     for name, model in SWIMMER_MODELS.items():
@@ -158,12 +124,7 @@ def models_without_answer(robot: Robot) -> list[str]:
 
 
 def walls_left_out(why: str, *, among: bool) -> str:
-    """The caution where a robot in a channel is answered for without its walls.
-
-    Args:
-        why: the reason, a clause.
-        among: the robot is one of several that are compared.
-    """
+    """The caution where a robot in a channel is answered for without its walls."""
     makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
     return f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
 
@@ -176,15 +137,7 @@ def has_table(batch: RobotBatch) -> bool:
 
 
 def fitted_models(calibration: str | Path | None, posterior: PosteriorFile | None) -> list[str]:
-    """Models with which a posterior or a calibration file was fitted; none where neither names one.
-
-    Args:
-        calibration: calibration file; None without one.
-        posterior: posterior; None without one.
-
-    Raises:
-        InputError: if the calibration file is wrong.
-    """
+    """Models with which a posterior or a calibration file was fitted; none where neither names one."""
     if posterior is not None:
         return [posterior.model]
     if calibration is None:

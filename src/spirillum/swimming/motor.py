@@ -12,8 +12,6 @@ import numpy as np
 from spirillum.arrays import Values
 from spirillum.robot.batch import Electrics
 
-__all__ = ["battery_voltage", "run_time", "steady_current", "winding_resistance"]
-
 _LARGEST_START = 1e6
 """Largest current at which the search for the steady one starts, A."""
 
@@ -61,11 +59,6 @@ def _excess_and_step(motor: Electrics, i: Values, linear: Values, drive: Values)
 
 def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
     """Steady root of (17): R(I) I = duty V(I) - (back_emf + back_emf_per_current I).
-
-    Args:
-        motor: motor and battery.
-        back_emf: the part of K_b omega_m that does not depend on the current, V.
-        back_emf_per_current: K_b d(omega_m)/dI of whatever the motor turns, V/A, not negative.
 
     Returns:
         The current, A; negative where the tail drives the motor (back-emf above the voltage), NaN where it

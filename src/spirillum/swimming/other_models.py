@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import quantity
+from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.actuation import FrictionReading
@@ -18,8 +18,6 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.freedom import Motion
 from spirillum.swimming.steady import requirements, swim
-
-__all__ = ["OtherModel", "OtherModels", "other_models"]
 
 
 @dataclass(frozen=True)

@@ -10,23 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
+from spirillum.fitted.fit_notes import Fitted, fitted_of, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import Fitted, fitted_of, friction_acts
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.fluid.stated import what_is_fitted
-from spirillum.fluid.tube.announced import TILTED
+from spirillum.fluid.tube.progress_messages import TILTED
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
-from spirillum.robot.options import Resolution
+from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
-from spirillum.swimming.answer import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import (
     accuracy_limits,
@@ -37,19 +36,20 @@ from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
-from spirillum.swimming.loading import prepared
-from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
+from spirillum.swimming.robot_preparation import prepared
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_error
+from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
+from spirillum.swimming.steady_state import SteadyState
 from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
 
 
 @dataclass(frozen=True)
-class Prediction(Shown):
+class Prediction(DisplayMixin):
     """Steady swimming of one robot, SI, rates signed about +x.
 
     The quantities are attributes (`prediction.forward_velocity`); NaN where one does not apply.
@@ -79,7 +79,7 @@ class Prediction(Shown):
     """Lateral motion and tilt held, or released."""
     interval_of: str = ""
     """Whose the intervals are, in half a sentence; empty without a posterior."""
-    lying: Lying | None = None
+    lying: SteadyState | None = None
     """Where a free robot comes to lie in its tube, from where it was laid down (`placement`); None for others."""
     choice: ModelChoice | None = None
     """Why the model was taken; None where nobody asked."""
@@ -142,7 +142,7 @@ class Prediction(Shown):
         return sorted({*super().__dir__(), *_QUANTITIES})
 
     def _shown(self) -> tuple[dict[str, Any], list[str]]:
-        """See `Shown`: the quantities that matter most, without what other models say."""
+        """See `DisplayMixin`: the quantities that matter most, without what other models say."""
         answer = self.to_dict(others=False)
         return answer, headline(answer)
 
@@ -246,9 +246,6 @@ def predict(  # noqa: PLR0913 - the options of the command
             `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.
-
-    Raises:
-        InputError: for wrong input, or a robot outside the model's domain.
     """
     drawn, given = None, Placement.of(placement)
     where = given
@@ -413,23 +410,14 @@ class _Case:
 
 
 def free_in_tube(fitted_by: str) -> str:
-    """What a free motion in the tube rests on.
-
-    Args:
-        fitted_by: file of a calibration or a posterior whose values act on it; empty without one.
-    """
+    """What a free motion in the tube rests on."""
     computed = f"walls, weight and contact are computed, {what_is_fitted(fitted_by)}"
     where = " where it has none" if fitted_by else ""
     return f"{computed}; roughness and dry friction are assumed{where}"
 
 
 def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
-    """The steady motion with the medians of intervals where they are known.
-
-    Args:
-        swum: of one robot.
-        intervals: over the draws of a posterior.
-    """
+    """The steady motion with the medians of intervals where they are known."""
     middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
     return replace(swum, **middles)
 
@@ -469,11 +457,7 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
 
 
 def _check_band(model: str) -> None:
-    """Refuse a band of a model that knows no places.
-
-    Raises:
-        InputError: for such a model.
-    """
+    """Refuse a band of a model that knows no places."""
     walled = [name for name, known in SWIMMER_MODELS.items() if known.placed]
     if model not in walled:
         raise InputError(

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
@@ -21,14 +22,10 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
-from spirillum.robot.options import ModelOptions
+from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
-from spirillum.swimming.loading import prepared
+from spirillum.swimming.robot_preparation import prepared
 from spirillum.units import show_apart
-
-__all__ = ["Prepared", "check_usual_resolution", "preparations_answer", "prepare", "prepare_all"]
-
 
 _NOT_KEPT = (
     "the table is not kept, for there is no folder to keep it in (SPIRILLUM_CACHE is off, or the folder cannot be "
@@ -37,7 +34,7 @@ _NOT_KEPT = (
 
 
 @dataclass(frozen=True)
-class Prepared(Shown):
+class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
 
     robot: Robot
@@ -176,14 +173,7 @@ _MOST_WORKERS = 64
 
 
 def check_usual_resolution(options: ModelOptions) -> None:
-    """Refuse a resolution of a robot whose table answers.
-
-    Args:
-        options: of the robot.
-
-    Raises:
-        InputError: if there is one.
-    """
+    """Refuse a resolution of a robot whose table answers."""
     if resolved := options.resolution:
         raise InputError(
             f"{resolved} of a robot whose table is asked for, which has its own resolution; allowed: only where the "
@@ -194,13 +184,7 @@ def check_usual_resolution(options: ModelOptions) -> None:
 def table_for(
     batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
-    """The table of the first robot of a batch in its tube.
-
-    Args:
-        batch: robots with a channel.
-        workers: number of processes.
-        progress: told what is being solved, how many places are done, and of how many.
-    """
+    """The table of the first robot of a batch in its tube."""
     return prepared_tables([_asked(batch)], workers=workers, progress=progress)[0]
 
 

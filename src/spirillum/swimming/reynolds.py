@@ -18,22 +18,6 @@ from spirillum.robot.limits import Limit, all_hold, broken
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
-__all__ = [
-    "BEYOND_STOKES",
-    "LOW_REYNOLDS",
-    "body_reynolds",
-    "check_stokes_flow",
-    "flow_limit",
-    "in_stokes_flow",
-    "is_stokes_flow",
-    "motion_limits",
-    "reynolds_limits",
-    "reynolds_warnings",
-    "stokes_flow_problem",
-    "tail_reynolds",
-    "without_reynolds_bound",
-]
-
 LOW_REYNOLDS = 0.1
 """Reynolds number above which an answer has a warning."""
 BEYOND_STOKES = 10.0
@@ -53,12 +37,7 @@ def body_reynolds(batch: RobotBatch, speed: Samples | float) -> Samples:
 
 
 def tail_reynolds(batch: RobotBatch, tail_rate: Samples | float) -> Samples:
-    """Return rho |omega| B_o^2/mu, the Reynolds number on the tail's amplitude.
-
-    Args:
-        batch: the robots.
-        tail_rate: omega, rad/s.
-    """
+    """Return rho |omega| B_o^2/mu, the Reynolds number on the tail's amplitude."""
     return batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity
 
 
@@ -140,15 +119,8 @@ def reynolds_warnings(limits: Iterable[Limit]) -> dict[str, str]:
 def check_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> dict[str, str]:
     """Refuse a motion far outside Stokes flow.
 
-    Args:
-        batch: the robot.
-        limits: of its motion.
-
     Returns:
         A warning for each limit that the motion exceeds, by the limit's flag.
-
-    Raises:
-        InputError: if a Reynolds number is above `BEYOND_STOKES` and the robot does not allow it.
     """
     listed = list(limits)
     if problem := stokes_flow_problem(batch, listed):

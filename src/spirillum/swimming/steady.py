@@ -9,7 +9,7 @@ from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
-from spirillum.argument_kinds import number_array
+from spirillum.argument_validation import number_array
 from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
@@ -19,12 +19,12 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
-from spirillum.swimming.answer import Swimming
 from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
 from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
 from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of
 from spirillum.swimming.motor import battery_voltage, run_time
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
+from spirillum.swimming.steady_quantities import Swimming
 
 __all__ = [
     "Rates",
@@ -63,12 +63,6 @@ def axial_forces(batch: RobotBatch, model: SwimmerModel, motion: Swimming, *, ca
 
     In the order of `SwimmerModel.axial`: force and torque on the body, force and torque on the rotor. The two forces
     are drag and thrust; they cancel, as nothing else pushes along the axis.
-
-    Args:
-        batch: robots.
-        model: the model that predicted the motion.
-        motion: their steady motion.
-        calibrated: apply calibration factors, as the prediction did.
     """
     r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
     rates = (motion.forward_velocity, motion.body_rotation_rate, motion.forward_velocity, motion.tail_rotation_rate)
@@ -135,11 +129,7 @@ def swim(
 
 
 def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
-    """Refuse a free motion that the torque balance about the motor axis does not decide.
-
-    Raises:
-        InputError: for a model that does not know all entries, or a drive that does not turn about the motor axis.
-    """
+    """Refuse a free motion that the torque balance about the motor axis does not decide."""
     check_full(model)
     if batch.drive == "magnetic":
         raise InputError(
@@ -149,12 +139,7 @@ def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
 
 
 def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
-    """Relative error of the forward velocities of a model that is checked by others.
-
-    Args:
-        speeds: forward velocities by the model, then by those of `SwimmerModel.checked_by`.
-        unchecked: error that all share, see `SwimmerModel.unchecked_error`.
-    """
+    """Relative error of the forward velocities of a model that is checked by others."""
     with np.errstate(divide="ignore", invalid="ignore"):
         changes = [np.abs(after / before - 1.0) for before, after in pairwise(speeds)]
     total: PerRobot = np.sum(changes, axis=0) + unchecked
@@ -162,11 +147,7 @@ def speed_error(speeds: Sequence[PerRobot], unchecked: float) -> PerRobot:
 
 
 def friction_reading(name: str) -> FrictionReading:
-    """The reading of that name.
-
-    Raises:
-        InputError: if there is none.
-    """
+    """The reading of that name."""
     for reading in get_args(FrictionReading):
         if name == reading:
             return cast("FrictionReading", reading)
@@ -281,14 +262,7 @@ class Rates(NamedTuple):
 
 
 def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str, PerRobot]) -> Swimming:
-    """All quantities of steady swimming.
-
-    Args:
-        batch: the robots.
-        rates: their motion.
-        valid: which of them have one.
-        more: further quantities of `Swimming` by name; those that are left out are NaN.
-    """
+    """All quantities of steady swimming."""
     speed, body_rate, tail_rate, load, drive, shaft, friction, dissipated, current, effective, residual = rates
     slip = tail_rate - body_rate
     none: PerRobot = np.full(1, np.nan)

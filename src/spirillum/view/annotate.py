@@ -15,15 +15,13 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.extras import required
 from spirillum.formats.h264 import h264_writer
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
     from spirillum.vision.camera.optics import BodyPose, Optics
-
-__all__ = ["Annotator", "Seen", "annotated_film"]
 
 _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
@@ -41,7 +39,7 @@ _LARGEST = 1920
 """Longest side of an annotated frame, pixels: a larger one is reduced by a whole number."""
 
 
-class Seen(Protocol):
+class AnnotatedFrame(Protocol):
     """The tracker's result for a frame."""
 
     @property
@@ -77,7 +75,7 @@ class Annotator:
         """
         from spirillum.robot.mesh import tail_line
 
-        self._cv2 = required("cv2", "an annotated video", "video")
+        self._cv2 = import_optional("cv2", "an annotated video", "video")
         body = robot.body
         self._period = period
         self._half, self._radius = 0.5 * body.length, 0.5 * body.diameter
@@ -86,7 +84,7 @@ class Annotator:
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
 
-    def draw(self, image: np.ndarray, seen: Seen) -> np.ndarray:
+    def draw(self, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
         """A copy of a frame with the tracking result drawn on it, reduced to at most 1920 pixels.
 
         Args:
@@ -131,7 +129,7 @@ class Annotator:
         whole = np.ascontiguousarray(image[: height * times, : width * times])
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
-    def _dials(self, picture: np.ndarray, seen: Seen) -> None:
+    def _dials(self, picture: np.ndarray, seen: AnnotatedFrame) -> None:
         """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root.
 
         Where stripes repeat, the body has a hand for each that may be stripe 1.
@@ -164,7 +162,7 @@ class Annotator:
                 part = rear + self._seal * np.array([start, start + 0.3])
                 line(np.stack([part, np.full(2, y), np.full(2, 0.0)], axis=1), _POINTER)
 
-    def _along(self, seen: Seen) -> float:
+    def _along(self, seen: AnnotatedFrame) -> float:
         assert seen.pose is not None  # noqa: S101 - asked only where it was seen
         if self._first is None:
             self._first = seen.pose.x
@@ -243,7 +241,7 @@ def annotated_film(
     *,
     period: float = 2.0 * math.pi,
     waiting: int = 8,
-) -> Iterator[Callable[[int, np.ndarray, Seen], None]]:
+) -> Iterator[Callable[[int, np.ndarray, AnnotatedFrame], None]]:
     """A film of annotated frames at their true times, drawn and encoded by a thread of its own.
 
     Args:
@@ -253,14 +251,11 @@ def annotated_film(
         thumbnail: takes a frame as JPEG, when the film is complete.
         period: of the robot's stripes: by whole multiples of it the body's angle is not known, rad.
         waiting: most frames that wait to be drawn.
-
-    Raises:
-        InputError: if a package is missing, or no encoder is there.
     """
     annotator = Annotator(robot, period)
     kept: list[np.ndarray] = []
 
-    def drawn(index: int, image: np.ndarray, seen: Seen) -> np.ndarray:
+    def drawn(index: int, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
         picture = annotator.draw(image, seen)
         if seen.pose is not None and (not kept or index & (index - 1) == 0):
             kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
@@ -268,7 +263,7 @@ def annotated_film(
 
     writer = _Writer(path, words, drawn, waiting)
 
-    def on_frame(index: int, image: np.ndarray, seen: Seen) -> None:
+    def on_frame(index: int, image: np.ndarray, seen: AnnotatedFrame) -> None:
         writer.add((index, image, seen))
 
     try:
@@ -281,12 +276,12 @@ def annotated_film(
 
 
 def _jpeg(picture: np.ndarray) -> bytes:
-    cv2 = required("cv2", "an annotated video", "video")
+    cv2 = import_optional("cv2", "an annotated video", "video")
     good, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
     return bytes(data) if good else b""
 
 
-_Frame = tuple[int, np.ndarray, Seen]
+_Frame = tuple[int, np.ndarray, AnnotatedFrame]
 """A frame's number, its picture and its observation."""
 
 
@@ -294,9 +289,13 @@ class _Writer:
     """Draws frames and writes them to H.264; the film starts with the first frame's time."""
 
     def __init__(
-        self, path: Path, words: dict[str, str], drawn: Callable[[int, np.ndarray, Seen], np.ndarray], waiting: int
+        self,
+        path: Path,
+        words: dict[str, str],
+        drawn: Callable[[int, np.ndarray, AnnotatedFrame], np.ndarray],
+        waiting: int,
     ) -> None:
-        required("av", "an annotated video", "video")  # said here, before any frame is tracked
+        import_optional("av", "an annotated video", "video")  # said here, before any frame is tracked
         self._path, self._words, self._drawn = path, words, drawn
         self._queue: Queue[_Frame | None] = Queue(waiting)
         self._error: BaseException | None = None
@@ -314,11 +313,7 @@ class _Writer:
         self._thread.join()
 
     def check(self) -> None:
-        """Raise the error of the encoding thread.
-
-        Raises:
-            InputError: if there is no encoder, or the film could not be written.
-        """
+        """Raise the error of the encoding thread."""
         if self._error is not None:
             raise self._error
 

@@ -9,8 +9,6 @@ from spirillum.errors import InputError
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.robot import Robot
 
-__all__ = ["covered_body", "part_of"]
-
 _BATTERY = (0.03, 0.58, 0.56, 0.30)
 """Start and end along the room before the seal; half the width and the height over the body's radius, as the bent light
 shows them; assumed."""
@@ -26,15 +24,7 @@ _WRAP, _BACK, _GREEN, _BLACK, _GREY = (
 
 
 def covered_body(robot: Robot, body: RobotMesh) -> list[RobotMesh]:
-    """The opaque pieces of a body under a glass cover: its seal, a battery, a board.
-
-    Args:
-        robot: a checked robot.
-        body: its body as a piece of `robot_mesh`.
-
-    Raises:
-        InputError: if the robot has no seal, which holds the cover.
-    """
+    """The opaque pieces of a body under a glass cover: its seal, a battery, a board."""
     if robot.seal is None:
         raise InputError("glass_cover (--trouble glass-cover) requires a robot with a seal, which holds the cover")
     rear, nose, radius = robot.seal.length - 0.5 * robot.body.length, 0.5 * robot.body.length, 0.5 * robot.body.diameter

@@ -12,8 +12,6 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.robot.arguments import Options, in_range, whole, within
 from spirillum.robot.fields import Angle
 
-__all__ = ["Degradation"]
-
 
 class Degradation(Options):
     """How much of each disturbance a video has; the defaults are a clean one's."""

@@ -9,10 +9,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.virtual.degradation import Degradation
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.tank import Tank
-
-__all__ = ["Disturbances", "tilt_of"]
 
 _LAMP, _LOST, _TILT, _GLARE, _BUBBLES, _HAND, _GRAIN = range(10, 17)
 _GRAINS = 1 << 21
@@ -34,7 +32,7 @@ class Disturbances:
 
     @classmethod
     def of_robot(
-        cls, degradation: Degradation, seed: int, lens: Lens, duration: float, robot: Robot, tank: Tank
+        cls, degradation: Degradation, seed: int, lens: VirtualLens, duration: float, robot: Robot, tank: Tank
     ) -> Self:
         """Those of a video of a robot in its tank, with bubbles above the robot and below the oil's surface.
 
@@ -51,7 +49,13 @@ class Disturbances:
         return cls(degradation, seed, lens, duration, (length, diameter), top)
 
     def __init__(
-        self, degradation: Degradation, seed: int, lens: Lens, duration: float, body: tuple[float, float], top: float
+        self,
+        degradation: Degradation,
+        seed: int,
+        lens: VirtualLens,
+        duration: float,
+        body: tuple[float, float],
+        top: float,
     ) -> None:
         """Draw the random numbers.
 

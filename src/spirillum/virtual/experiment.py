@@ -15,7 +15,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator
 
-from spirillum.answer import envelope
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
@@ -34,19 +35,16 @@ from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
-from spirillum.shown import Shown
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
 from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
-from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.trial import render
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, rate_quantities
-
-__all__ = ["Planned", "VirtualExperiment", "virtual_experiment"]
 
 _LONGEST = 20.0
 _MOST = 10_000
@@ -89,7 +87,7 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class VirtualExperiment(Shown):
+class VirtualExperiment(DisplayMixin):
     """A virtual experiment that was written."""
 
     folder: Path
@@ -232,7 +230,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
     """What a study has filmed; None: the paper's robots."""
     if study is None:
         return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None, ())
-    from spirillum.studies.loading import load_study
+    from spirillum.studies.study_loader import load_study
 
     loaded = load_study(study)
     if loaded.count > _MOST:

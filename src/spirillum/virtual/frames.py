@@ -5,13 +5,42 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.kernels.raster import develop
+from spirillum.virtual.artifacts import ViewArtifacts
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.label import stamp
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.trajectory import TrialTrajectory
-from spirillum.virtual.troubles import View
 
-__all__ = ["Frames"]
+_TEXT = "synthetic"
+_LETTERS = {  # 3 x 5 pixels, rows from the top
+    "s": "011 100 010 001 110",
+    "y": "000 101 011 001 110",
+    "n": "000 110 101 101 101",
+    "t": "010 111 010 010 011",
+    "h": "100 100 110 101 101",
+    "e": "000 010 111 100 011",
+    "i": "010 000 010 010 010",
+    "c": "000 011 100 100 011",
+}
+_LARGE = 480
+"""Width of a picture above which the letters are twice as large, pixels."""
+
+
+def stamp(image: np.ndarray) -> None:
+    """Write the label into the lower right corner of a picture.
+
+    Args:
+        image: (height, width, 3) bytes; changed.
+    """
+    mask = np.zeros((5, 4 * len(_TEXT) - 1), dtype=bool)
+    for place, letter in enumerate(_TEXT):
+        rows = [[digit == "1" for digit in row] for row in _LETTERS[letter].split()]
+        mask[:, 4 * place : 4 * place + 3] = rows
+    times = 2 if image.shape[1] >= _LARGE else 1
+    mask = np.repeat(np.repeat(mask, times, axis=0), times, axis=1)
+    height, width = mask.shape
+    corner = image[-height - 3 : -3, -width - 3 : -3]
+    corner[mask] = (60, 60, 66)
+
 
 _VIGNETTING = 0.20
 """Relative loss of light in the corners; assumed."""
@@ -20,7 +49,7 @@ _BRIGHTNESS = 1.05
 """Exposure of the camera: linear light of white paper is about 0.8."""
 
 
-class Frames:
+class FrameEncoder:
     """The frames of one video, in order: noise differs from frame to frame."""
 
     def __init__(
@@ -29,7 +58,7 @@ class Frames:
         disturbances: Disturbances,
         trajectory: TrialTrajectory,
         exposure: float,
-        view: View | None = None,
+        view: ViewArtifacts | None = None,
     ) -> None:
         """Prepare.
 

@@ -8,12 +8,10 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
-from spirillum.virtual.lens import Lens
-from spirillum.virtual.options import CameraOptions
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.tank import Tank, tube_height
 from spirillum.virtual.trajectory import TrialTrajectory
-
-__all__ = ["check_size", "framed", "lens_of", "out_of_picture", "swimming_range"]
+from spirillum.virtual.trial_options import CameraOptions
 
 _SURFACE = 60e-3
 """Height of the oil's surface above the reference plane, m; assumed."""
@@ -29,7 +27,7 @@ _LOOKS = 1001
 """Moments at which it is asked whether the robot is in the picture."""
 
 
-def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> Lens:
+def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:
     """The lens of a camera.
 
     Args:
@@ -39,18 +37,14 @@ def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> Lens:
     return replace(_ideal_lens(camera), tilt=tilt, distortion=(camera.distortion, 0.0))
 
 
-def _ideal_lens(camera: CameraOptions) -> Lens:
+def _ideal_lens(camera: CameraOptions) -> VirtualLens:
     """The lens without tilt and distortion."""
     focal = _FOCAL * camera.size[0] / camera.shrunk
-    return Lens(_EYE, _SURFACE, _INDEX, focal, camera.size, leftwards=camera.leftwards)
+    return VirtualLens(_EYE, _SURFACE, _INDEX, focal, camera.size, leftwards=camera.leftwards)
 
 
-def check_size(robot: Robot, tank: Tank, lens: Lens) -> None:
-    """The robot is large enough for this camera, and its tube small enough for the tank.
-
-    Raises:
-        InputError: if not.
-    """
+def check_size(robot: Robot, tank: Tank, lens: VirtualLens) -> None:
+    """The robot is large enough for this camera, and its tube small enough for the tank."""
     if tank.tube is not None and tank.tube_height + tank.outside >= lens.surface:
         most = 1e3 * (lens.surface - 2.0 * (tank.outside - tank.tube))
         raise InputError(
@@ -66,18 +60,13 @@ def check_size(robot: Robot, tank: Tank, lens: Lens) -> None:
 
 
 def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
-    """Smallest and largest x of the body's mid-length at which the whole robot is in the picture, m.
-
-    Args:
-        robot: a checked robot.
-        camera: view, direction and size of the picture; distortion is left out.
-    """
+    """Smallest and largest x of the body's mid-length at which the whole robot is in the picture, m."""
     low, high = _visible(_ideal_lens(camera), tube_height(robot, camera.view))
     rear, nose = _extent(robot)
     return low - rear, high - nose
 
 
-def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float | None) -> TrialTrajectory:
+def framed(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens, start: float | None) -> TrialTrajectory:
     """The trajectory from a first x, or centred in the picture.
 
     Args:
@@ -85,9 +74,6 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float |
         robot: a checked robot.
         lens: the camera.
         start: x of the body's mid-length at the first frame, m; None: centred.
-
-    Raises:
-        InputError: if the robot is never in the picture.
     """
     _check_beside_axis(trajectory, robot, lens)
     x = trajectory.position[:, 0]
@@ -101,7 +87,7 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float |
     return trajectory.shifted(shift)
 
 
-def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> tuple[str, ...]:
+def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> tuple[str, ...]:
     """A sentence if the robot is beyond the left or the right edge of the picture for a part of the film."""
     times = np.linspace(trajectory.time[0], trajectory.time[-1], _LOOKS)
     x = np.interp(times, trajectory.time, trajectory.position[:, 0])
@@ -114,12 +100,8 @@ def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> tup
     return (f"the robot is in the picture for {seen * length:.3g} of {length:.3g} s: it swims out of it",)
 
 
-def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> None:
-    """The robot swims between the floor and the oil's surface, and between the upper and the lower edge of the picture.
-
-    Raises:
-        InputError: if it is on no frame.
-    """
+def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> None:
+    """Check that the robot stays between floor and oil surface, and between the picture's upper and lower edge."""
     radius = 0.5 * robot.body.diameter
     _, y, z = trajectory.position.T
     nearer = "allowed: a lateral nearer to 0, or a run that stays nearer to the axis"
@@ -134,7 +116,7 @@ def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: Lens) ->
         raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its middle; {nearer}")
 
 
-def _visible(lens: Lens, height: float) -> tuple[float, float]:
+def _visible(lens: VirtualLens, height: float) -> tuple[float, float]:
     """Smallest and largest x in the picture's middle row at a height, m."""
     middle = 0.5 * (lens.size[1] - 1)
     ends = lens.points(np.array([[0.0, middle], [lens.size[0] - 1.0, middle]]), height)[:, 0]

@@ -8,13 +8,11 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.raster import project
-from spirillum.kernels.sightlines import Camera, sightline
-
-__all__ = ["Lens"]
+from spirillum.kernels.sightlines import RefractingCamera, sightline
 
 
 @dataclass(frozen=True)
-class Lens:
+class VirtualLens:
     """The lens of the camera, in its frame: x along the channel towards the nose, z towards the camera, y = z x x.
 
     Lengths are in m, places in the picture in pixels.
@@ -53,16 +51,13 @@ class Lens:
         return 0.5 * (self.size[0] - 1), 0.5 * (self.size[1] - 1)
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> RefractingCamera:
         """Its numbers, as the kernels take them."""
         focal = -self.focal if self.leftwards else self.focal
-        return Camera(self.eye, self.surface, self.index, focal, *self.centre, *self.distortion)
+        return RefractingCamera(self.eye, self.surface, self.index, focal, *self.centre, *self.distortion)
 
     def seen(self, points: Samples) -> Samples:
         """Pixel u, v and height z of points.
-
-        Args:
-            points: (n, 3), m.
 
         Returns:
             (n, 3): u, v in pixels, z in m.

@@ -10,24 +10,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.argument_kinds import as_number, check_kind, checked
-from spirillum.dynamics.poses import Pose, Poses
+from spirillum.argument_validation import as_number, check_kind, validate_arguments
+from spirillum.dynamics.poses import Poses, RobotPose
 from spirillum.errors import InputError, clipped
 from spirillum.files import write_text
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
-from spirillum.robot.text import robot_text
+from spirillum.robot.toml_writer import robot_text
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.frames import Frames
+from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import check_size, lens_of, swimming_range
-from spirillum.virtual.options import CameraOptions, Seeded
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
+from spirillum.virtual.trial_options import CameraOptions, Seeded
 from spirillum.virtual.truth import setup_text
-
-__all__ = ["Shot", "VirtualCamera"]
 
 _LAMP_TIME = 20.0
 """Time over which the lamp drifts once, s, as in a trial's usual length."""
@@ -47,11 +45,11 @@ class Shot(NamedTuple):
 class VirtualCamera:
     """Takes pictures of a robot whose poses come one by one, as from `spirillum.Plant`; all of it is synthetic."""
 
-    @checked
+    @validate_arguments
     def __init__(
         self,
         robot: str | Path | Mapping[str, Any] | Robot,
-        pose: Pose,
+        pose: RobotPose,
         *,
         camera: CameraOptions | Mapping[str, Any] | None = None,
         degradation: str | Degradation | Mapping[str, Any] | None = None,
@@ -82,9 +80,9 @@ class VirtualCamera:
         low, high = swimming_range(self.robot, self.camera)
         self._shift = low + _SHARE * (high - low) - float(pose.position[0])
         self._height = float(self._trajectory(0.0, pose, 1.0, pose).position[0, 2])
-        self._last: tuple[float, Pose] | None = None
+        self._last: tuple[float, RobotPose] | None = None
 
-    def take(self, time: float, pose: Pose) -> Shot:
+    def take(self, time: float, pose: RobotPose) -> Shot:
         """The picture whose exposure ends at a moment; what moved since the last picture is blurred.
 
         Args:
@@ -102,7 +100,7 @@ class VirtualCamera:
             raise InputError(f"time = {clipped(time)} s; allowed: {last}")
         trajectory, self._last = self._trajectory(*before, time, pose), (time, pose)
         exposure = min(self.camera.exposure, time - before[0])
-        frames = Frames(self._painter, self._disturbances, trajectory, exposure)
+        frames = FrameEncoder(self._painter, self._disturbances, trajectory, exposure)
         middle = time - 0.5 * exposure
         return Shot(middle, frames.image(middle))
 
@@ -121,11 +119,11 @@ class VirtualCamera:
         write_text(path, setup_text(name, self.camera, self._lens, self._tank.spacing, axis, timed=True))
         return path
 
-    def x_of(self, pose: Pose) -> float:
+    def x_of(self, pose: RobotPose) -> float:
         """Place of a robot's mid-length along the channel from below the lens, as the tracker counts it, m."""
         return float(pose.position[0]) + self._shift
 
-    def _trajectory(self, before: float, first: Pose, now: float, last: Pose) -> TrialTrajectory:
+    def _trajectory(self, before: float, first: RobotPose, now: float, last: RobotPose) -> TrialTrajectory:
         """From one pose to the next, at their times."""
         both = (first, last)
         poses = Poses(

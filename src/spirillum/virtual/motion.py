@@ -13,16 +13,14 @@ from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import gap_of
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
-from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.tank import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
 
 _USUAL = 20.0
 """Length of a film of steady swimming, s."""
@@ -33,7 +31,7 @@ _WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds o
 
 
 @dataclass(frozen=True)
-class Motion:
+class TrialMotion:
     """A trajectory and its source."""
 
     trajectory: TrialTrajectory
@@ -55,9 +53,6 @@ def steady_rates(
 
     Returns:
         The rates by name, what they are from, and warnings.
-
-    Raises:
-        InputError: for an unknown model or reading of the friction, or a robot that the model cannot predict.
     """
     given = {
         "forward_velocity": motion.forward_velocity,
@@ -103,18 +98,8 @@ def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[str, ...]:
     return (f"{named}: the film shows a faster robot than with model '{WALLED}'",)
 
 
-def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> Motion:
-    """Steady swimming in a trial.
-
-    Args:
-        robot: a checked robot.
-        motion: the model and the prescribed rates.
-        trial: duration, and pose at the first frame; `start` is not applied.
-        camera: where the camera stands.
-
-    Raises:
-        InputError: if the rates cannot be computed, or the robot does not fit into its channel in this pose.
-    """
+def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
+    """Steady swimming in a trial."""
     room = _clearance(robot)
     if trial.wobble > room:
         most = f"0 to {1e3 * room:.4g} mm, the room in the channel"
@@ -131,10 +116,10 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         body_angle=trial.body_angle,
         tail_phase=trial.tail_phase,
     )
-    return Motion(trajectory, source, warnings)
+    return TrialMotion(trajectory, source, warnings)
 
 
-def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> Motion:
+def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
     """The motion of a run.
 
     Args:
@@ -142,9 +127,6 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
         run: a run of `spirillum.simulate`.
         trial: duration; the pose is the run's.
         camera: where the camera stands.
-
-    Raises:
-        InputError: if the run is of another robot, ends too early, or cannot be shown.
     """
     from spirillum.dynamics.run_file import robot_of
 
@@ -157,7 +139,7 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     model = str(run.attrs.get("model", ""))[:60]
     if trial.duration is not None:
         trajectory = trajectory.until(trial.duration)
-    return Motion(trajectory, f"run, {model}" if model else "run", _between_samples(trajectory))
+    return TrialMotion(trajectory, f"run, {model}" if model else "run", _between_samples(trajectory))
 
 
 def _between_samples(trajectory: TrialTrajectory) -> tuple[str, ...]:
@@ -183,9 +165,6 @@ def _resting_place(robot: Robot, asked: float | None, lateral: float) -> Samples
         robot: a checked robot.
         asked: the gap; None: that of the reference place of models with walls.
         lateral: the offset.
-
-    Raises:
-        InputError: if gap or offset are wider than the channel leaves.
     """
     if robot.channel is None:
         return np.array([0.0, lateral, 0.0])

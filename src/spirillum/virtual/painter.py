@@ -2,18 +2,178 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.raster import Lamps, Shading, Shadow, blend, draw
+from spirillum.kernels.sightlines import Backdrop
+from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
-from spirillum.virtual.cover import Cover
-from spirillum.virtual.lens import Lens
-from spirillum.virtual.solids import Solid, solids_of
+from spirillum.virtual.contents import part_of
+from spirillum.virtual.lens import VirtualLens
+from spirillum.virtual.solids import MATERIALS, RenderedSolid, joined, solids_of
 from spirillum.virtual.tank import Tank, backdrop, spots, tint
-from spirillum.virtual.trajectory import Pose, TrialTrajectory
+from spirillum.virtual.trajectory import CameraFramePose, TrialTrajectory
 
-__all__ = ["Painter"]
+_GLASS = 1.47
+"""Refractive index of the cover; borosilicate glass, assumed."""
+_WALL = 0.11
+"""Thickness of its wall over its radius; assumed: 1 mm of 9."""
+_AMBIENT = 0.85
+"""Light of the room beside the picture over the picture's mean; assumed."""
+_SIDEWAYS = float(np.cos(np.radians(75.0)))
+"""Cosine of the angle to the vertical from which on light comes from the room instead of the floor."""
+_ENCODED = 2.0
+"""What is added to a component of a normal where it is drawn as a colour, which is positive."""
+_EMPTY = -1e30
+_NEAREST, _FARTHEST = 1e-9, 0.9999
+_FAR = np.linspace(_NEAREST, _FARTHEST, 501)
+"""Distances of lines of sight from the centre over the cover's radius, at which paths of light are computed."""
+_SHARP, _BLUR = 2.0, 0.25
+"""Factor by which the floor is shrunk from which on its structure blurs, and how wide over the cover's radius."""
+
+
+class Glass(NamedTuple):
+    """The cover in a window of the picture."""
+
+    share: Samples
+    """Share of each pixel that the cover has, (rows, columns)."""
+    across: Samples
+    """x and y of its unit normal in the camera's frame, (rows, columns, 2)."""
+
+
+class Cover:
+    """The glass before a robot's seal: its surface to draw, and what is seen through it."""
+
+    def __init__(self, robot: Robot, index: float, still: Backdrop, lamps: Lamps, side: float) -> None:
+        """Prepare.
+
+        Args:
+            robot: a checked robot with a seal.
+            index: refractive index of the oil.
+            still: the scene behind it.
+            lamps: that light it.
+            side: -1 where the camera is rotated by half a turn, else 1.
+        """
+        from scipy.ndimage import gaussian_filter
+
+        body = next(piece for piece in robot_mesh(robot) if piece.name == "body")
+        self.solid: RenderedSolid = joined([part_of(body, body.region == 0)])
+        self._radius, self._still, self._lamps, self._side = 0.5 * robot.body.diameter, still, lamps, side
+        self._index = index
+        pixels = float(1.0 / np.abs(np.diff(still.floor[..., 0], axis=1)).mean())
+        self._ambient = _AMBIENT * still.light.mean(axis=(0, 1))
+        self._blurred = gaussian_filter(still.light, (*(2 * [_BLUR * self._radius * pixels]), 0))
+        self._pixels = pixels
+        count = len(self.solid.faces)
+        self._red, self._green = (np.tile(colour, (count, 1)) for colour in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+
+    def encoded(self, turn: Samples) -> Shading:
+        """Its normals as colours: x in red, y in green.
+
+        Args:
+            turn: rotation of the body, (3, 3).
+        """
+        normals = self.solid.normals @ turn.T + _ENCODED
+        return Shading(self._red, self._green, *(np.ascontiguousarray(normals[..., k]) for k in (0, 1)))
+
+    def decoded(self, depth: Samples, samples: Samples) -> Glass:
+        """The cover in a window of samples that were drawn with the colours of `encoded`; the samples are cleared.
+
+        Args:
+            depth: height of what each sample has met, (rows, columns, k).
+            samples: colours, (rows, columns, k, 3).
+        """
+        hit = np.asarray(depth > _EMPTY)[..., None]
+        count = np.asarray(hit.sum(axis=2))
+        across = np.where(hit, samples[..., :2], 0.0).sum(axis=2) / np.maximum(count, 1) - _ENCODED
+        depth[:] = _EMPTY
+        return Glass(hit.mean(axis=(2, 3)), np.where(count > 0, across, 0.0))
+
+    def refract(self, picture: Samples, glass: Glass, left: int, top: int, height: float) -> None:
+        """Replace what lies behind the cover by what is seen through it.
+
+        Args:
+            picture: linear light, (rows, columns, 3); changed.
+            glass: the cover in its window.
+            left: column of the picture at which the window begins.
+            top: row at which it begins.
+            height: of the body's axis above the floor, m.
+        """
+        from scipy.ndimage import map_coordinates
+
+        v, u = np.nonzero(glass.share)
+        across = glass.across[v, u]
+        far = np.clip(np.hypot(*across.T), _NEAREST, _FARTHEST)
+        shift, floor, detail = (np.interp(far, _FAR, values) for values in self._paths(height))
+        move = self._side * (shift * self._pixels / far)[:, None] * across
+        places = np.stack([top + v - move[:, 1], left + u + move[:, 0]])
+        sharp, blurred = (
+            np.stack([map_coordinates(light[..., k], places, order=1, mode="nearest") for k in range(3)], axis=-1)
+            for light in (self._still.light, self._blurred)
+        )
+        seen = blurred + detail[:, None] * (sharp - blurred)
+        through = self._ambient + floor[:, None] * (seen - self._ambient)
+        picture[top + v, left + u] += glass.share[v, u][:, None] * (through - picture[top + v, left + u])
+
+    def _paths(self, height: float) -> tuple[Samples, Samples, Samples]:
+        """Shift, share of light from the floor, and how sharp the floor is there, at `_FAR`."""
+        shift, floor = light_path(_FAR, self._radius, height, self._index)
+        shrunk = np.abs(np.gradient(shift / self._radius + _FAR, _FAR))
+        return shift, floor, 1.0 / np.maximum(shrunk / _SHARP, 1.0) ** 2
+
+    def shine(self, picture: Samples, glass: Glass, left: int, top: int) -> None:
+        """Add the lamps that the glass mirrors."""
+        upwards = np.sqrt(np.maximum(1.0 - np.square(glass.across).sum(axis=-1), 0.0))
+        normals = np.concatenate([glass.across, upwards[..., None]], axis=-1)
+        _, _, specular, exponent = MATERIALS["body"]
+        facing = np.maximum(normals @ self._lamps.halfway.T, 0.0) ** exponent @ self._lamps.strength
+        rows, columns = glass.share.shape
+        window = slice(top, top + rows), slice(left, left + columns)
+        picture[window] += (specular * facing * glass.share * self._still.over[window])[..., None]
+
+
+def light_path(far: Samples, radius: float, height: float, index: float) -> tuple[Samples, Samples]:
+    """Where the floor is seen through a round cover with air inside, straight from above.
+
+    A line of sight stays in a plane with the normal, where wall and air are circles, and n times its distance from the
+    centre is the same in oil, glass and air (Bouguer's formula: M. Born, E. Wolf,
+    Principles of Optics, 3.2). Where that exceeds the air's radius, the air mirrors it (total reflection).
+
+    Args:
+        far: distance of the line of sight from the centre over the cover's radius, 0 to 1, (n,).
+        radius: of the cover, m.
+        height: of its centre above the floor, m.
+        index: refractive index of the oil.
+
+    Returns:
+        Distance by which the floor is seen farther from the centre, m, and the share of the light that is from there;
+        the rest comes from the room; (n,) each.
+    """
+    inner = radius * (1.0 - _WALL)
+    distance = far * radius
+    at_oil, in_glass = np.arcsin(far), np.arcsin(index / _GLASS * far)
+    at_air = np.arcsin(np.minimum(index * distance / (_GLASS * inner), 1.0))
+    in_air = np.arcsin(np.minimum(index * distance / inner, 1.0))
+    total = index * distance >= inner
+    bent = np.where(total, np.pi - 2.0 * at_air, 2.0 * (in_air - at_air)) - 2.0 * (at_oil - in_glass)
+    cos = np.cos(bent)
+    steep = np.maximum(cos, _SIDEWAYS)
+    sin = np.sin(bent)
+    shift = distance * (cos - 1.0) + (height + distance * sin) * sin / steep
+    passed = np.where(total, 1.0, (1.0 - _mirrored(at_air, in_air)) ** 2)
+    return shift, passed * np.clip((cos - _SIDEWAYS) / 0.2, 0.0, 1.0)
+
+
+def _mirrored(inside: Samples, outside: Samples) -> Samples:
+    """Share of unpolarised light that a surface mirrors, by the angles on both sides (Fresnel)."""
+    plus, minus = np.maximum(inside + outside, 1e-9), inside - outside
+    upright = ((1.0 - _GLASS) / (1.0 + _GLASS)) ** 2
+    oblique = 0.5 * ((np.sin(minus) / np.sin(plus)) ** 2 + (np.tan(minus) / np.tan(plus)) ** 2)
+    return np.asarray(np.where(inside + outside < 1e-4, upright, oblique))
+
 
 _STILL = 0.1
 """Motion blur below which an exposure is drawn at one time, pixels."""
@@ -39,7 +199,7 @@ class Painter:
     """Draws the robot before its tank. One painter serves one video: it keeps its buffers between frames."""
 
     def __init__(
-        self, robot: Robot, tank: Tank, lens: Lens, edges: Samples | None = None, *, covered: bool = False
+        self, robot: Robot, tank: Tank, lens: VirtualLens, edges: Samples | None = None, *, covered: bool = False
     ) -> None:
         """Prepare.
 
@@ -47,7 +207,7 @@ class Painter:
             robot: a checked robot.
             tank: the still parts.
             lens: the camera.
-            edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
+            edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
             covered: whether the body before its seal is a cover of glass.
         """
         self.robot, self.tank, self.lens = robot, tank, lens
@@ -80,7 +240,7 @@ class Painter:
             return picture
         depth, samples = self._buffers(bottom - top, right - left)
 
-        def sample(part: tuple[Solid, Samples, list[Samples]], shading: Shading) -> None:
+        def sample(part: tuple[RenderedSolid, Samples, list[Samples]], shading: Shading) -> None:
             solid, _, moments = part
             for number, pixels in enumerate(moments):
                 which = np.arange(number, _SAMPLES, len(moments))  # each time has a share of every pixel's samples
@@ -101,17 +261,17 @@ class Painter:
 
     def _parts(
         self,
-        solids: list[tuple[Solid, str]],
+        solids: list[tuple[RenderedSolid, str]],
         trajectory: TrialTrajectory,
-        middle: Pose,
+        middle: CameraFramePose,
         time: float,
         exposure: float,
-    ) -> list[tuple[Solid, Samples, list[Samples]]]:
+    ) -> list[tuple[RenderedSolid, Samples, list[Samples]]]:
         """Solids, each with its rotation and the pixels of its vertices at times over the exposure."""
         found = []
         for solid, name in solids:
 
-            def seen(share: float, every: int = 1, solid: Solid = solid, name: str = name) -> Samples:
+            def seen(share: float, every: int = 1, solid: RenderedSolid = solid, name: str = name) -> Samples:
                 pose = trajectory.at(time + share * exposure) if share else middle
                 return self.lens.seen(solid.vertices[::every] @ getattr(pose, name).T + pose.position)
 
@@ -139,7 +299,7 @@ class Painter:
         shape = (rows, columns, _SAMPLES)
         return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
 
-    def _shadow(self, pose: Pose) -> Shadow:
+    def _shadow(self, pose: CameraFramePose) -> Shadow:
         """The soft shadow; the lamp stands a little to one side."""
         half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
         x, y, z = (float(value) for value in pose.position)

@@ -11,10 +11,8 @@ from spirillum.kernels.raster import Lamps, Materials, Shading, shade
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, corner_normals
+from spirillum.virtual.artifacts import repainted
 from spirillum.virtual.contents import covered_body
-from spirillum.virtual.troubles import repainted
-
-__all__ = ["MATERIALS", "Solid", "joined", "linear", "solids_of"]
 
 _LONGEST = 5e-3
 """Longest edge of a triangle, m."""
@@ -41,7 +39,7 @@ def linear(colours: Samples) -> Samples:
 
 
 @dataclass(frozen=True)
-class Solid:
+class RenderedSolid:
     """A rigid part of the robot, in its own axes, m."""
 
     vertices: Samples = field(repr=False)
@@ -58,12 +56,7 @@ class Solid:
     """Index of each triangle's material in `MATERIALS`, (m,)."""
 
     def shading(self, turn: Samples, lamps: Lamps) -> Shading:
-        """Colours, and light on the corners.
-
-        Args:
-            turn: rotation of the solid, (3, 3).
-            lamps: that light it.
-        """
+        """Colours, and light on the corners."""
         shading = Shading(self.colours, self.gloss, *(np.empty((len(self.faces), 3)) for _ in range(2)))
         materials = Materials(*np.ascontiguousarray(np.transpose(list(MATERIALS.values()))))
         shade(self.normals, turn, lamps, materials, self.kind, shading)
@@ -72,13 +65,13 @@ class Solid:
 
 def solids_of(
     robot: Robot, fineness: float = 1.0, edges: Samples | None = None, *, covered: bool = False
-) -> tuple[Solid, Solid]:
+) -> tuple[RenderedSolid, RenderedSolid]:
     """Body and rotor of a robot, the rotor with its tail at phase 0.
 
     Args:
         robot: a checked robot.
         fineness: of `spirillum.robot.mesh.robot_mesh`.
-        edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
+        edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
         covered: whether a glass cover, which is not one of them, stands before the seal.
     """
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
@@ -91,7 +84,7 @@ def solids_of(
     return joined(covered_body(robot, body[0]) if covered else body), joined(rotor)
 
 
-def joined(pieces: list[RobotMesh]) -> Solid:
+def joined(pieces: list[RobotMesh]) -> RenderedSolid:
     """One solid of pieces that move together.
 
     Args:
@@ -108,7 +101,7 @@ def joined(pieces: list[RobotMesh]) -> Solid:
         normals.append(corner_normals(points, triangles, _CREASE))
         kind.append(np.full(len(triangles), _KINDS.index(piece.name)))
         count += len(points)
-    return Solid(
+    return RenderedSolid(
         np.ascontiguousarray(np.concatenate(vertices)),
         np.ascontiguousarray(np.concatenate(faces), dtype=np.int64),
         np.concatenate(colours),

@@ -9,12 +9,10 @@ from functools import lru_cache
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.sightlines import Backdrop, Ruler, Tube, Waves, still_picture
+from spirillum.kernels.sightlines import Backdrop, FloorWaves, GlassTube, Ruler, still_picture
 from spirillum.robot.robot import Robot
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.solids import linear
-
-__all__ = ["Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
 
 _SPACING = 2e-3
 """From one line of the ruler to the next in the usual picture, m."""
@@ -69,14 +67,7 @@ class Tank:
 
 
 def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False) -> Tank:
-    """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
-
-    Args:
-        robot: a checked robot.
-        view: `top` or `side`.
-        shrunk: width of the picture over that of the usual one.
-        grid: whether grid paper covers the floor, with lines as far apart as those of the ruler.
-    """
+    """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls."""
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
@@ -86,12 +77,7 @@ def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False)
 
 
 def tube_height(robot: Robot, view: str) -> float:
-    """Height of the tube's axis above the reference plane, m; of the robot's path where there is no tube.
-
-    Args:
-        robot: a checked robot.
-        view: `top` or `side`.
-    """
+    """Height of the tube's axis above the reference plane, m; of the robot's path where there is no tube."""
     return _SIDE_AXIS if view == "side" else _reach(robot)
 
 
@@ -126,13 +112,8 @@ def tint(depth: float) -> Samples:
 
 
 @lru_cache(maxsize=4)
-def backdrop(tank: Tank, lens: Lens) -> Backdrop:
-    """The still parts seen through a lens; cached, so that trials with one tank and camera share it.
-
-    Args:
-        tank: the still parts.
-        lens: the camera.
-    """
+def backdrop(tank: Tank, lens: VirtualLens) -> Backdrop:
+    """The still parts seen through a lens; cached, so that trials with one tank and camera share it."""
     width, height = lens.size
     light, over, shine, floor = (np.empty((height, width, *more), dtype=np.float32) for more in ((3,), (), (), (2,)))
     still = Backdrop(light, over, shine, floor)
@@ -145,11 +126,11 @@ def backdrop(tank: Tank, lens: Lens) -> Backdrop:
     start = math.inf if tank.grid else tank.ruler - paper
     ruler = Ruler(start, tank.ruler, end, end + paper, tank.spacing, line_width)
     half_length = -1.0 if tank.tube is None else 0.5 * tank.tube_length
-    tube = Tube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
+    tube = GlassTube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
     azimuth, phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2)).T
     wavenumber = 2 * np.pi * np.array(_MOTTLE) / tank.shrunk
     amplitude = np.full(len(_MOTTLE), 0.012)
-    waves = Waves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
+    waves = FloorWaves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
     still_picture(lens.camera, lens.turn, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), still)
     if tank.grid:
         _print_grid(still, tank.spacing, colours[0])

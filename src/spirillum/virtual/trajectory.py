@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from spirillum.dynamics.poses import Poses
 
-__all__ = ["Pose", "TrialTrajectory", "lab_to_camera", "run_trajectory", "steady_trajectory", "trajectory_of"]
-
 _MAX_OBLIQUITY = 0.5
 """Largest angle of a run's robot to the channel, rad."""
 _SAMPLES_PER_TURN = 240
@@ -24,7 +22,7 @@ _SAMPLES_PER_TURN = 240
 
 
 @dataclass(frozen=True)
-class Pose:
+class CameraFramePose:
     """Position and attitude of the robot at one time, in the camera's frame."""
 
     position: Samples
@@ -64,23 +62,19 @@ class TrialTrajectory:
         found |= {axis: np.interp(times, self.time, self.position[:, k]) for k, axis in enumerate("xyz")}
         return found
 
-    def at(self, time: float) -> Pose:
+    def at(self, time: float) -> CameraFramePose:
         """Pose at a time."""
         now = {name: float(values[0]) for name, values in self.series(np.array([time])).items()}
         attitude = _attitude(now["heading"], now["pitch"])
         position = np.array([now["x"], now["y"], now["z"]])
-        return Pose(position, attitude @ _about_x(now["body_angle"]), attitude @ _about_x(now["tail_phase"]))
+        return CameraFramePose(position, attitude @ _about_x(now["body_angle"]), attitude @ _about_x(now["tail_phase"]))
 
     def shifted(self, x: float) -> TrialTrajectory:
         """Translated along the channel by `x`, m."""
         return replace(self, position=self.position + np.array([x, 0.0, 0.0]))
 
     def until(self, end: float) -> TrialTrajectory:
-        """Truncated at a time.
-
-        Raises:
-            InputError: if it ends earlier.
-        """
+        """Truncated at a time."""
         if end > float(self.time[-1]) * (1.0 + 1e-9):
             last = float(self.time[-1])
             raise InputError(f"duration = {end:g} s, but the run ends at {last:g} s; allowed: at most that")
@@ -175,9 +169,6 @@ def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: flo
         leftwards: whether the nose points to the left in the picture.
         axis: height of the channel's axis in the camera's frame, m.
         level: height of the motor axis above the channel's in a run that does not hold it, m.
-
-    Raises:
-        InputError: if the run cannot be shown.
     """
     from spirillum.dynamics.poses import poses_of
 
@@ -192,9 +183,6 @@ def trajectory_of(poses: Poses, view: str, *, leftwards: bool, axis: float) -> T
         view: `top` or `side`.
         leftwards: whether the nose points to the left in the picture.
         axis: height of the channel's axis in the camera's frame, m.
-
-    Raises:
-        InputError: if the robot turns across the channel.
     """
     from spirillum.dynamics.poses import rotation_matrix
 

@@ -3,40 +3,127 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.files import protected, whole_files, write_dataset
+from spirillum.files import (
+    MARK,
+    check_replaceable,
+    holds_own_only,
+    output_target,
+    protected,
+    whole_file,
+    whole_files,
+    whole_folder,
+    write_dataset,
+)
+from spirillum.formats.h264 import h264_writer
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
-from spirillum.robot.text import robot_text
-from spirillum.shown import Shown
+from spirillum.robot.toml_writer import robot_text
 from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
+from spirillum.virtual.artifacts import Troubles, ViewArtifacts, counted_frames, stripe_edges, with_troubles
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.film import FrameWriter, video_target, video_writer
-from spirillum.virtual.frames import Frames
+from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import check_size, framed, lens_of, out_of_picture
-from spirillum.virtual.lens import Lens
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.motion import motion_of, motion_of_run
-from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import Tank, tank_of
-from spirillum.virtual.troubles import Troubles, View, counted_frames, stripe_edges, with_troubles
+from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VirtualTrial", "render"]
+
+_QUALITY = {"preset": "veryfast", "x264-params": "mbtree=0"}
+"""With `mbtree`, small pictures now and then gave different bytes from equal frames."""
+_THREADS = 2
+"""Threads of the encoder, a fixed number, so that a seed determines the bytes."""
+
+
+class FrameWriter(Protocol):
+    """Takes frames, one after the other."""
+
+    def add(self, image: np.ndarray, number: int) -> None:
+        """Append a frame, (height, width, 3) sRGB bytes, that was recorded as this number, counted from 0."""
+
+
+def video_target(path: str | Path) -> Path:
+    """The video to write, or the folder for its frames."""
+    path = Path(path)
+    if path.suffix:
+        return output_target(path, {".mp4": "a video, or a folder without an ending"}, "trial.mp4")
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
+    if not path.is_dir():
+        check_replaceable(path)
+    if path.exists() and not (path.is_dir() and holds_own_only(path)):
+        raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
+    return path
+
+
+@contextmanager
+def video_writer(
+    target: Path, size: tuple[int, int], fps: float, crf: int, tags: Mapping[str, str]
+) -> Iterator[FrameWriter]:
+    """A writer of a video; it appears, complete, when the block ends."""
+    if target.suffix != ".mp4":
+        with _png_writer(target, tags) as pngs:
+            yield pngs
+        return
+    with (
+        whole_file(target) as temporary,
+        h264_writer(
+            temporary,
+            size,
+            Fraction(fps).limit_denominator(1001),
+            tags,
+            quality=_QUALITY | {"crf": str(crf)},
+            threads=_THREADS,
+            encoders=("libx264",),  # others know no constant rate factor
+            instead="a folder of PNG files",
+            extra="video",
+        ) as writer,
+    ):
+        yield writer
+
+
+class _Pngs:
+    """Writes frames as PNG files into a folder."""
+
+    def __init__(self, folder: Path, tags: Mapping[str, str]) -> None:
+        self._folder, self._tags = folder, tags
+
+    def add(self, image: np.ndarray, number: int) -> None:
+        """Write a frame under its number."""
+        from PIL import Image, PngImagePlugin
+
+        info = PngImagePlugin.PngInfo()
+        info.add_text("Software", MARK)
+        for name, text in self._tags.items():
+            info.add_itxt(name.capitalize(), text)
+        Image.fromarray(image).save(self._folder / f"{number:05d}.png", compress_level=1, pnginfo=info)
+
+
+@contextmanager
+def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
+    with whole_folder(folder) as part:
+        yield _Pngs(part, tags)
+
 
 _MOST_FRAMES = 200_000
 _LEAST_DEPTH = 1e-6
@@ -44,7 +131,7 @@ _LEAST_DEPTH = 1e-6
 
 
 @dataclass(frozen=True)
-class VirtualTrial(Shown):
+class VirtualTrial(DisplayMixin):
     """A virtual trial that was written."""
 
     path: Path
@@ -91,11 +178,7 @@ class VirtualTrial(Shown):
 
 
 def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
-    """Refuse what a run says itself: all of a motion, and of a trial all but its length and where it starts.
-
-    Raises:
-        InputError: if it is given.
-    """
+    """Refuse what a run says itself: all of a motion, and of a trial all but its length and where it starts."""
     for options in given:
         usual = type(options)()
         for name in type(options).model_fields:
@@ -202,7 +285,9 @@ def render(
     if robot_file != robot.name:
         texts["robot"] = robot_text(robot)
     painter = _painter_of(robot, tank, lens, troubles, seed)
-    frames = Frames(painter, disturbances, trajectory, camera.exposure, View(troubles, seed, camera.size))
+    frames = FrameEncoder(
+        painter, disturbances, trajectory, camera.exposure, ViewArtifacts(troubles, seed, camera.size)
+    )
     tell = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
@@ -218,7 +303,7 @@ def render(
     return written
 
 
-def _painter_of(robot: Robot, tank: Tank, lens: Lens, troubles: Troubles, seed: int) -> Painter:
+def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles, seed: int) -> Painter:
     """What draws the robot, with uneven stripes and a cover of glass where the troubles have them."""
     stripes = len(robot.seal.stripes) if robot.seal is not None else 0
     edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
@@ -237,11 +322,7 @@ def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[
 
 
 def _stated_height(height: float, error: float, surface: float) -> float:
-    """Height of the robot's axis as the setup states it, m: wrong by an error, but between floor and surface.
-
-    Raises:
-        InputError: if a setup with it would not be valid.
-    """
+    """Height of the robot's axis as the setup states it, m: wrong by an error, but between floor and surface."""
     if not _LEAST_DEPTH <= height + error <= surface - _LEAST_DEPTH:
         low, high = -1e3 * height, 1e3 * (surface - height)
         raise InputError(
@@ -252,7 +333,7 @@ def _stated_height(height: float, error: float, surface: float) -> float:
 
 
 def _facts(
-    trial: VirtualTrial, camera: CameraOptions, degradation: Degradation, troubles: Troubles, lens: Lens
+    trial: VirtualTrial, camera: CameraOptions, degradation: Degradation, troubles: Troubles, lens: VirtualLens
 ) -> dict[str, Any]:
     """What the truth says of a trial besides its rates."""
     return {
@@ -281,7 +362,7 @@ def _facts(
 
 def _write_frames(
     writer: FrameWriter,
-    frames: Frames,
+    frames: FrameEncoder,
     numbers: tuple[np.ndarray, np.ndarray],
     fps: float,
     tell: Callable[[str, int, int], None],

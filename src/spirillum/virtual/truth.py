@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import as_json, envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.envelope import as_json, envelope, quantity
 from spirillum.files import MARK
-from spirillum.virtual.lens import Lens
-from spirillum.virtual.options import CameraOptions
+from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.trajectory import TrialTrajectory
+from spirillum.virtual.trial_options import CameraOptions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["SYNTHETIC", "names_beside", "rate_quantities", "setup_text", "truth_dataset", "truth_text"]
 
 SYNTHETIC = "synthetic: a computed robot seen by a virtual camera, not a measurement"
 _UNITS = {
@@ -35,7 +33,7 @@ def _mm(value: float) -> str:
 
 
 def setup_text(
-    robot_file: str, camera: CameraOptions, lens: Lens, spacing: float, axis: tuple[float, float], *, timed: bool
+    robot_file: str, camera: CameraOptions, lens: VirtualLens, spacing: float, axis: tuple[float, float], *, timed: bool
 ) -> str:
     """A setup file.
 
@@ -73,21 +71,12 @@ def setup_text(
 
 
 def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
-    """Forward velocity and rates as quantities of an answer.
-
-    Args:
-        rates: by name, SI.
-    """
+    """Forward velocity and rates as quantities of an answer."""
     return {name: quantity(value, _UNITS[name]) for name, value in rates.items()}
 
 
 def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
-    """The truth of a trial, JSON.
-
-    Args:
-        rates: forward velocity and rates, SI.
-        content: what else belongs to it.
-    """
+    """The truth of a trial, JSON."""
     return as_json(envelope("truth", {"synthetic": True, **rate_quantities(rates), **content}, (SYNTHETIC,))) + "\n"
 
 

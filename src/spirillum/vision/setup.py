@@ -15,19 +15,6 @@ from spirillum.robot.parts import Stripes
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
-__all__ = [
-    "INDICES",
-    "CameraSetup",
-    "Checkerboard",
-    "Markers",
-    "Region",
-    "RobotSetup",
-    "Setup",
-    "TankSetup",
-    "load_setup",
-    "stripes_of",
-]
-
 WHAT = "a setup file (TOML, see `spirillum schema setup`)"
 _Pixels = Annotated[int, Field(strict=True, ge=0, le=100_000)]
 _Corners = Annotated[int, Field(strict=True, ge=3, le=50)]
@@ -175,14 +162,7 @@ class Setup(Section):
 
 
 def load_setup(path: str | Path) -> tuple[Setup, Robot]:
-    """Read a setup file and the robot that it names.
-
-    Args:
-        path: the TOML file; the names of files in it are relative to its folder.
-
-    Raises:
-        InputError: if it cannot be read or any field is wrong; `problems` lists every one.
-    """
+    """Read a setup file and the robot that it names."""
     path = Path(path)
     checked = problems_in(Setup, read_toml(path, WHAT))
     if isinstance(checked, list):
@@ -193,12 +173,7 @@ def load_setup(path: str | Path) -> tuple[Setup, Robot]:
 
 
 def stripes_of(setup: Setup, robot: Robot) -> tuple[str, ...]:
-    """Colours of the stripes in their order: the setup's, else the robot file's; empty where there are none.
-
-    Args:
-        setup: the setup.
-        robot: the robot.
-    """
+    """Colours of the stripes in their order: the setup's, else the robot file's; empty where there are none."""
     if setup.robot.stripes is not None:
         return tuple(setup.robot.stripes)
     return tuple(robot.seal.stripes) if robot.seal else ()

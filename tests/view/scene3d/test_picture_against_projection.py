@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.poses import Pose
+from spirillum.dynamics.poses import RobotPose
 from spirillum.view.scene3d.camera import VIEWS, Margins, checked_view, fitted
 from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, resting
 from spirillum.view.scene3d.show import glass_around, shown_points
@@ -18,10 +18,10 @@ from spirillum.view.scene3d.show import glass_around, shown_points
 SIZE = (400, 226)
 SAID = "robot.png: biorob2012-wide, 160x90 pixels, view perspective\n"
 _TURN = np.array([0.96, 0.2, -0.12, 0.15])
-TILTED = Pose(np.array([0.02, -0.01, 0.03]), _TURN / np.linalg.norm(_TURN), 2.0)
+TILTED = RobotPose(np.array([0.02, -0.01, 0.03]), _TURN / np.linalg.norm(_TURN), 2.0)
 
 
-def drawn(solids: DrawnRobot, camera: Any, pose: Pose, size: tuple[int, int] = SIZE, **more: Any) -> np.ndarray:
+def drawn(solids: DrawnRobot, camera: Any, pose: RobotPose, size: tuple[int, int] = SIZE, **more: Any) -> np.ndarray:
     with Scene(solids, size, **more) as scene:
         scene.place(pose)
         scene.look(camera)
@@ -85,7 +85,7 @@ def test_robots_of_metres_and_micrometres_look_the_same() -> None:
 
 
 ROLL, ROLLED_SIZE = 0.3, (960, 540)
-ROLLED = Pose(np.zeros(3), np.array([np.cos(0.5 * ROLL), np.sin(0.5 * ROLL), 0.0, 0.0]), 0.0)
+ROLLED = RobotPose(np.zeros(3), np.array([np.cos(0.5 * ROLL), np.sin(0.5 * ROLL), 0.0, 0.0]), 0.0)
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import counted
+from spirillum.display import counted
 from spirillum.units import display_unit, in_unit
-
-__all__ = ["table"]
 
 
 def table(answer: Answer, console: Console) -> None:

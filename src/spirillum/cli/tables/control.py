@@ -10,8 +10,6 @@ from rich.markup import escape
 from spirillum.cli.tables.parts import Answer, add_quantities, friendly, grid
 from spirillum.units import display_unit, in_unit
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `control`."""

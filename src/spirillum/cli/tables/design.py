@@ -9,11 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_reason
-from spirillum.designs.leads import ALTERNATIVES
-from spirillum.shown import percent
+from spirillum.designs.improvement import ALTERNATIVES
+from spirillum.display import percent
 from spirillum.units import display_unit, in_unit
-
-__all__ = ["table"]
 
 _SHOWN = (
     "forward_velocity",

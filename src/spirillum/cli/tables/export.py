@@ -8,8 +8,6 @@ from rich.console import Console
 
 from spirillum.cli.tables.parts import Answer, add_quantities, grid
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Files, then the numbers of the geometry."""

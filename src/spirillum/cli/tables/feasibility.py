@@ -6,10 +6,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import percent
+from spirillum.display import percent
 from spirillum.units import for_people, in_unit, shown_in
-
-__all__ = ["table"]
 
 
 def table(answer: Answer, console: Console) -> None:

@@ -7,8 +7,6 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Text of `film`."""

@@ -6,8 +6,6 @@ from rich.console import Console
 
 from spirillum.cli.tables.parts import Answer, add_quantities, grid, show_reason
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Tables of `flow`."""

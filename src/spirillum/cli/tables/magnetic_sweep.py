@@ -9,9 +9,6 @@ from spirillum.cli.tables.parts import Answer, grid
 from spirillum.quantities import QUANTITIES
 from spirillum.units import in_unit
 
-__all__ = ["table"]
-
-
 _COLUMNS = {
     "field_rate": "field",
     "tail_rotation_rate": "tail",

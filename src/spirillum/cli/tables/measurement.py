@@ -9,8 +9,6 @@ from spirillum.cli.tables.parts import Answer, grid
 from spirillum.measurement.shown import ShownNumber, shown
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Tables of `measure`: each trial, and the means over them; one trial has one table."""

@@ -8,12 +8,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import percent
-from spirillum.swimming.answer import headline
+from spirillum.display import percent
+from spirillum.swimming.steady_quantities import headline
 from spirillum.units import display_unit, in_unit
-
-__all__ = ["table"]
-
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
 """What follows from other rows, and stands in the JSON only."""

@@ -7,9 +7,7 @@ from rich.markup import escape
 
 from spirillum.calibration.fit_warnings import CALLED
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import counted, percent
-
-__all__ = ["table"]
+from spirillum.display import counted, percent
 
 
 def table(answer: Answer, console: Console) -> None:

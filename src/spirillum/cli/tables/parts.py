@@ -9,23 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.shown import percent, rows_of
+from spirillum.display import percent, rows_of
 from spirillum.units import display_unit, in_unit
-
-__all__ = [
-    "LAID_DOWN",
-    "Answer",
-    "add_bands",
-    "add_quantities",
-    "friendly",
-    "grid",
-    "show_error",
-    "show_lying",
-    "show_placement",
-    "show_reason",
-    "show_unsteady",
-]
-
 
 Answer = Mapping[str, Any]
 _NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady")

@@ -17,10 +17,8 @@ from spirillum.cli.tables.parts import (
     show_reason,
     show_unsteady,
 )
-from spirillum.shown import fitted_words, rows_of
-from spirillum.swimming.answer import headline
-
-__all__ = ["table"]
+from spirillum.display import fitted_words, rows_of
+from spirillum.swimming.steady_quantities import headline
 
 
 def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:

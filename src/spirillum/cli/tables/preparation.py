@@ -7,8 +7,6 @@ from rich.console import Console
 from spirillum.cli.tables.parts import Answer, grid
 from spirillum.units import in_unit
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Tables of `prepare`: errors at places that were not used, and where the table holds."""

@@ -7,8 +7,6 @@ from rich.console import Console
 from spirillum.cli.tables.parts import Answer, grid
 from spirillum.units import in_unit
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `prepare` for several robots: the error of each one's table."""

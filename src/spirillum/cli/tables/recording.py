@@ -6,8 +6,6 @@ from rich.console import Console
 
 from spirillum.cli.tables.parts import Answer, grid
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """The file, then its topics."""

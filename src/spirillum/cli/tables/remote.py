@@ -6,8 +6,6 @@ from rich.console import Console
 
 from spirillum.cli.tables.parts import Answer
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Text of `remote`."""

@@ -10,8 +10,6 @@ from rich.table import Table
 
 from spirillum.cli.tables.parts import Answer, show_placement
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `resistance`."""

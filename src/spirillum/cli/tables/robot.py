@@ -10,8 +10,6 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, friendly, grid
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `robot show`."""

@@ -18,9 +18,6 @@ from spirillum.cli.tables.parts import (
 from spirillum.quantities import QUANTITIES
 from spirillum.units import in_unit
 
-__all__ = ["table"]
-
-
 _COLUMNS = ("gap", "normal_resistance", "over_lubrication", "sideways_force")
 """Quantities of the film under the level robot."""
 

@@ -6,9 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer
-from spirillum.shown import percent
-
-__all__ = ["table"]
+from spirillum.display import percent
 
 
 def table(answer: Answer, console: Console) -> None:

@@ -7,8 +7,6 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Text of `setup propose`: what was found and how sure it is, then what is left to be filled in."""

@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.answer import quantity
 from spirillum.cli.tables.parts import (
     Answer,
     add_bands,
@@ -21,9 +20,8 @@ from spirillum.cli.tables.parts import (
     show_reason,
 )
 from spirillum.dynamics.events import told
+from spirillum.envelope import quantity
 from spirillum.units import display_unit, in_unit
-
-__all__ = ["table"]
 
 
 def table(answer: Answer, console: Console) -> None:

@@ -8,11 +8,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.shown import counted
+from spirillum.display import counted
 from spirillum.studies.ranking import ENDS, LET_GO, RANKED, best_in_words
 from spirillum.units import display_unit, in_unit
-
-__all__ = ["empty_results", "table"]
 
 
 def table(answer: Answer, console: Console, *, rows: int = 10) -> None:

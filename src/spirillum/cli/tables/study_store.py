@@ -8,8 +8,6 @@ from rich.markup import escape
 from spirillum.cli.tables.parts import Answer
 from spirillum.cli.tables.study import empty_results
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Text of `study --store`."""

@@ -7,8 +7,6 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console, rows: int = 10) -> None:
     """Table of `suggest`."""

@@ -9,8 +9,6 @@ from spirillum.cli.tables.parts import Answer, grid
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import RATE_NAMES
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `track`: speed and rates over all frames, and how fast it was."""

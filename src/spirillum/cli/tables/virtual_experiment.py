@@ -8,8 +8,6 @@ from rich.markup import escape
 from spirillum.cli.tables.parts import Answer, grid
 from spirillum.units import in_unit
 
-__all__ = ["table"]
-
 
 def table(answer: Answer, console: Console) -> None:
     """Text and table of `virtual-experiment`."""

@@ -18,8 +18,6 @@ from spirillum.fluid.model import ResistanceModel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 
-__all__ = ["Perrin", "SpheroidDrag", "body_axial", "body_matrix", "semi_axes", "spheroid_drag"]
-
 
 class SpheroidDrag(NamedTuple):
     """Diagonal of a spheroid's resistance matrix about its centre."""

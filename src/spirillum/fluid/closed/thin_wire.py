@@ -8,8 +8,6 @@ from spirillum.arrays import PerRobot
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 
-__all__ = ["EXACT_EPS_CONSTANT", "PRINTED_EPS_CONSTANT", "cutoff", "thin_wire_cautions"]
-
 PRINTED_EPS_CONSTANT = 2.6
 """Constant of eps as the paper prints it."""
 EXACT_EPS_CONSTANT = 0.5 * np.pi * np.exp(0.5)

@@ -1,36 +1,42 @@
 """Tables are made: the flow is solved for at their places, and what is left without the film is packed.
 
 Robots that differ in their tails have places in common: wall and body are solved for once for all of them.
+
+A robot whose middle lies on the tube's axis: every tilt is a pitch, seen from another side.
+A table needs lowered and yawed noses there too. All of them follow from raised ones by a rotation about the tube's
+axis, and by one about the robot's own that brings the tail's phase along.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.announced import announcement, kept_after
 from spirillum.fluid.tube.film import FilmTable
-from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
-from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
-from spirillum.fluid.tube.rest import (
+from spirillum.fluid.tube.outer_resistance import (
     PHASES,
+    NodeSolution,
     Progress,
-    Solution,
     all_kept,
     even_phases,
+    factor_of,
+    fourier,
+    matrices_at,
     mirrored,
     rest_at,
     seen_in_mirror,
     solutions,
     solved_as_one,
 )
+from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
+from spirillum.fluid.tube.progress_messages import kept_after, progress_message
+from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable
@@ -38,11 +44,66 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import MOST_STATIONS
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.film_table import film_at
+from spirillum.kernels.tube_table import MOTIONS
 from spirillum.robot.outline import Outline
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import Seat, gap_of
+from spirillum.robot.tube_pose import Seat, gap_of
 
-__all__ = ["HELD_OUT", "built_tables"]
+_HALF_TURN = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class OnAxis:
+    """Resistance of a robot at offset 0 for any pitch and yaw."""
+
+    pitches: Samples
+    """Pitches of both signs, increasing, rad."""
+    values: Samples
+    """Fourier coefficients of the factor there, (pitches, phases, 36)."""
+
+    @classmethod
+    def of(cls, pitches: Samples, values: Samples) -> OnAxis:
+        """From raised noses.
+
+        Args:
+            pitches: from 0, increasing, rad.
+            values: Fourier coefficients of the factor, (pitches, phases, 36).
+        """
+        signs = (_HALF_TURN[:, None] * _HALF_TURN)[np.tril_indices(MOTIONS)]
+        harmonic = (np.arange(values.shape[1]) + 1) // 2
+        lowered = values[1:] * signs * ((-1.0) ** harmonic)[:, None]
+        return cls(np.concatenate([-pitches[:0:-1], pitches]), np.concatenate([lowered[::-1], values]))
+
+    def coefficients(self, pitch: float, yaw: float = 0.0) -> Samples:
+        """Fourier coefficients of the factor at a pitch and yaw, (phases, 36)."""
+        if yaw == 0.0:
+            return self._at(pitch)
+        axis = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+        side = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+        tilt = float(np.arctan2(np.hypot(axis[1], axis[2]), axis[0]))
+        level = np.array([0.0, axis[2], -axis[1]]) / np.hypot(axis[1], axis[2])  # y' of the frame without yaw
+        turn = float(np.arctan2(level @ np.cross(axis, side), level @ side))
+        count = self.values.shape[1]
+        phases = np.array(even_phases(count))
+        rotation = _about_x(turn)
+        matrices = rotation @ matrices_at(self._at(tilt), phases - turn) @ rotation.T
+        return fourier(factor_of(matrices, "on the tube's axis"))
+
+    def _at(self, pitch: float) -> Samples:
+        apart = self.pitches[:, None] - self.pitches + np.eye(self.pitches.size)
+        ahead = np.where(np.eye(self.pitches.size, dtype=bool), 1.0, (pitch - self.pitches) / apart)
+        found: Samples = np.tensordot(np.prod(ahead, axis=1), self.values, axes=1)
+        return found
+
+
+def _about_x(angle: float) -> Samples:
+    """From rates in a frame that is turned about x by an angle to those in the frame that is not, (8, 8)."""
+    c, s = np.cos(angle), np.sin(angle)
+    found = np.eye(MOTIONS)
+    for first in (1, 4):
+        found[first : first + 2, first : first + 2] = [[c, -s], [s, c]]
+    return found
+
 
 _TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
 """How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
@@ -62,11 +123,6 @@ def built_tables(
 ) -> list[TubeTable]:
     """Solve for the flow at every place of every robot and make their tables.
 
-    Args:
-        robots: geometry, and R of its tube, m; those with the same body and tube share their work.
-        workers: number of processes.
-        progress: told what is being solved, how much is done, and of how much.
-
     Raises:
         InputError: for a robot without a table, such as one whose tail is wider than its body, or whose flow does not
             fit into memory.
@@ -79,21 +135,21 @@ def built_tables(
         _check_memory(places.geometry, some)
     if progress is not None:
         count, kept = _solved_before(wanted)
-        progress(announcement(count, workers, kept), 0, count)
+        progress(progress_message(count, workers, kept), 0, count)
     try:
         return _solved_tables(every, nodes, workers, progress)
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
 
 
-def _solved_before(places: Sequence[Solution]) -> tuple[int, int]:
+def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
     """Number of places that are solved for on their own, and how many of them are kept."""
     shared = solved_as_one(places)
     return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
 
 
 def _solved_tables(
-    every: Sequence[Places], nodes: Sequence[list[Solution]], workers: int, progress: Progress | None
+    every: Sequence[Places], nodes: Sequence[list[NodeSolution]], workers: int, progress: Progress | None
 ) -> list[TubeTable]:
     """The tables of robots whose nodes are given."""
     start = time.perf_counter()
@@ -120,7 +176,7 @@ def _wire_error(places: Places, workers: int = 1) -> float | None:
     seat = Seat.at_gap(g.body, places.radius, max(gap_of(Placement(), g.body_diameter, places.radius), places.thinnest))
     tail = g, even_phases(_WIRE_PHASES)
     standard, high = Fineness("standard", _WIRE_TOLERANCE), Fineness("high", _WIRE_TOLERANCE)
-    asked = [Solution((tail,), seat, fineness) for fineness in (standard, high)]
+    asked = [NodeSolution((tail,), seat, fineness) for fineness in (standard, high)]
     speeds = [
         response_of(np.mean(found[0], axis=0))[0] for found in solutions(asked, "checking the wire", None, workers)
     ]
@@ -133,20 +189,21 @@ def _tabulated_film(body: Outline, radius: float) -> Samples:
     return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(kernel.STEEPEST)).packed
 
 
-def _nodes(places: Places) -> list[Solution]:
+def _nodes(places: Places) -> list[NodeSolution]:
     """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
 
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
         return places.geometry, even_phases(place.phases)
 
-    level = [Solution((tail(place),), place.seat, fineness_at(place.seat)) for place in _level(places)]
+    level = [NodeSolution((tail(place),), place.seat, fineness_at(place.seat)) for place in _level(places)]
     yawed = [
-        Solution((tail(place), mirrored(*tail(place))), place.seat, fineness_at(place.seat)) for place in _yawed(places)
+        NodeSolution((tail(place), mirrored(*tail(place))), place.seat, fineness_at(place.seat))
+        for place in _yawed(places)
     ]
     return level + yawed
 
 
-def _check_memory(geometry: RobotGeometry, nodes: Sequence[Solution]) -> None:
+def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> None:
     """Refuse a table for whose nodes the memory does not suffice, before the first is solved for.
 
     The level node of each gap stands for the tilted ones with it, and the first with yaw, nearest to the glass, for all
@@ -174,6 +231,7 @@ class _Place(NamedTuple):
 
 
 def fineness_at(seat: Seat) -> Fineness:
+    """Return the solver's resolution and tolerance at a pose."""
     level = seat.pitch == 0 and seat.yaw == 0
     return Fineness("standard", _LEVEL_TOLERANCE if level else _TOLERANCE)
 
@@ -264,21 +322,23 @@ def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
     return out
 
 
-def _held_out(places: Places, *, yawed: bool = True) -> list[Solution]:
+def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
     """Random places of a table that are no nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
-    chosen: list[Solution] = []
+    chosen: list[NodeSolution] = []
     while len(chosen) < HELD_OUT:
         t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
         f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
         seat, phase = places.seat_between(t, f, yaw if yawed else 0.0), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(Solution(((places.geometry, (phase,)),), seat, fineness_at(seat)))
+            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, fineness_at(seat)))
     return chosen
 
 
-def _largest_errors(table: Samples, places: Sequence[Solution], found: Sequence[Sequence[Samples]]) -> dict[str, float]:
+def _largest_errors(
+    table: Samples, places: Sequence[NodeSolution], found: Sequence[Sequence[Samples]]
+) -> dict[str, float]:
     """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
     errors = []
     for place, answers in zip(places, found, strict=True):

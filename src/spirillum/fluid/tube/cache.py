@@ -25,17 +25,6 @@ from spirillum.errors import InputError, clipped
 from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = [
-    "cache_folder",
-    "check_cache_folder",
-    "digest_of",
-    "imported_sources",
-    "is_kept",
-    "kept_or_computed",
-    "sealed",
-    "unsealed",
-]
-
 _PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ("numpy", "scipy", "numba")
 _IMPORT = re.compile(
@@ -51,11 +40,7 @@ def cache_folder() -> Path | None:
 
 
 def check_cache_folder() -> None:
-    """Refuse a folder that SPIRILLUM_CACHE names and in which nothing can be kept.
-
-    Raises:
-        InputError: if it is one.
-    """
+    """Refuse a folder that SPIRILLUM_CACHE names and in which nothing can be kept."""
     named = os.environ.get("SPIRILLUM_CACHE", "")
     folder = cache_folder()
     if not named or named.lower() == "off" or (folder is not None and os.access(folder, os.W_OK | os.X_OK)):
@@ -82,12 +67,7 @@ def _folder(named: str) -> Path | None:
 
 
 def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
-    """The answer to a question, (13, 13), from the folder or computed and kept there.
-
-    Args:
-        question: numbers and words that decide the answer; its text is part of the key, numbers to the last digit.
-        compute: answers it; the sources that its module imports are the other part.
-    """
+    """The answer to a question, (13, 13), from the folder or computed and kept there."""
     path = _path(question, compute)
     if path is None:
         return compute(question)
@@ -104,12 +84,7 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
 
 
 def is_kept(question: _Q, compute: Callable[[_Q], Samples]) -> bool:
-    """Whether the answer to a question is in the folder, so that `kept_or_computed` computes nothing.
-
-    Args:
-        question: see `kept_or_computed`.
-        compute: see there.
-    """
+    """Whether the answer to a question is in the folder, so that `kept_or_computed` computes nothing."""
     path = _path(question, compute)
     return path is not None and _kept(path) is not None
 
@@ -160,11 +135,7 @@ def digest_of(module: str) -> str | None:
 
 
 def imported_sources(module: str) -> dict[str, bytes]:
-    """Source of a module and of all modules of this package that it imports, directly or not, at any depth of nesting.
-
-    Args:
-        module: dotted name.
-    """
+    """Return the source of a module and of all modules of this package that it imports, directly or not."""
     found: dict[str, bytes] = {}
     ahead = [module]
     while ahead:

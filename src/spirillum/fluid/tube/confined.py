@@ -21,9 +21,7 @@ from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
-from spirillum.robot.seat import Seat
-
-__all__ = ["Held", "Strengths", "held_in_tube", "share_basis"]
+from spirillum.robot.tube_pose import Seat
 
 _EIGHT_PI = 8.0 * np.pi
 
@@ -174,12 +172,7 @@ class _Link:
 
 
 def share_basis(solids: Solids, tails: Sequence[Wire]) -> None:
-    """Let tails have their basis in common: it is made when the first of them is solved for.
-
-    Args:
-        solids: solids and wall.
-        tails: one wire each, at any phase, in body axes.
-    """
+    """Let tails have their basis in common: it is made when the first of them is solved for."""
     solids.tails = tuple(_turned(wire) for wire in tails)
 
 

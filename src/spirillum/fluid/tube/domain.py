@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import PerRobot
+from spirillum.envelope import quantity
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
-from spirillum.robot.seat import Seat, gap_of, largest_gap
+from spirillum.robot.tube_pose import Seat, gap_of, largest_gap
 from spirillum.units import show
-
-__all__ = ["WIRE_FILM", "placement_answer", "seat_limits", "seat_of", "tube_radius"]
 
 WIRE_FILM = 0.75
 """Thinnest film between the wire's surface and the wall over the wire's radius: thinner ones are not resolved."""

@@ -35,11 +35,9 @@ from scipy.linalg import cholesky, solve_triangular
 
 from spirillum.arrays import Matrix6, Samples
 from spirillum.errors import InputError
-from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, Place, Surface, film_surface, frame
+from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, FilmSurface, Place, film_surface, frame
 from spirillum.kernels import film_table as table
 from spirillum.robot.outline import Outline
-
-__all__ = ["FilmTable", "film_resistance"]
 
 _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
@@ -140,9 +138,6 @@ def film_resistance(
 
     Returns:
         R in frame F about the body's middle: force and torque on the body are -mu R (U, Omega).
-
-    Raises:
-        InputError: the body touches the wall, or its outline is of no known kind.
     """
     return resistance_of(FilmBody.of(outline), radius, e, p, psi, fineness=fineness)
 
@@ -179,7 +174,7 @@ def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float,
     return np.asarray(resistance + flow.T @ flow)
 
 
-def _assembled(place: Place, surface: Surface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
+def _assembled(place: Place, surface: FilmSurface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
     """Stiffness (elements, n_u, n_v, n_u, n_v), loads (elements, n_u, n_v, 6) and the shear's resistance."""
     points, normals, by_u, by_v, *turning = surface
     h = place.thickness(points, normals)
@@ -254,9 +249,6 @@ class FilmTable:
             pitch: largest pitch for which clearances are within the splines, rad.
             intervals: intervals of the splines, to show their convergence.
             step: called with the share that is done.
-
-        Raises:
-            InputError: the body does not fit, or its straight side is too short.
         """
         body = FilmBody.of(outline)
         head = _head(body, radius, yaw, pitch, intervals)

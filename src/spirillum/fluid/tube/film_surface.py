@@ -14,9 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.robot.outline import Arc, Line, Outline
-
-__all__ = ["PATCH", "ROUNDED", "TOUCHES", "Cuts", "FilmBody", "Place", "Surface", "film_surface", "frame"]
+from spirillum.robot.outline import Arc, Outline, Segment
 
 ROUNDED = 0.7
 """Angle of a rounded end that belongs to the film, rad."""
@@ -49,12 +47,8 @@ class FilmBody:
 
     @classmethod
     def of(cls, outline: Outline) -> FilmBody:
-        """Read an outline.
-
-        Raises:
-            InputError: the outline is neither an ellipse nor a straight side between two ends.
-        """
-        sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Line) and p.start[1] == p.end[1] > 0]
+        """Read an outline."""
+        sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Segment) and p.start[1] == p.end[1] > 0]
         arcs = [piece for piece in outline.pieces if isinstance(piece, Arc)]
         if len(sides) == 1:
             side = outline.pieces[sides[0]]
@@ -76,7 +70,7 @@ def frame(pitch: float, yaw: float) -> Samples:
     return np.array([[c * cy, -sy, -s * cy], [c * sy, cy, -s * sy], [s, 0.0, c]])
 
 
-class Surface(NamedTuple):
+class FilmSurface(NamedTuple):
     """Part of a body's surface at a grid of coordinates (u, v), each (n_u, n_v, 3), in F about the body's middle."""
 
     points: Samples
@@ -218,18 +212,15 @@ class Place:
         return float(self.clearance(point)), float(slope)
 
 
-def film_surface(place: Place, cuts: Cuts) -> Surface:
+def film_surface(place: Place, cuts: Cuts) -> FilmSurface:
     """Surface under the film, from the rear to the front.
 
     `along` is the derivative by a coordinate that runs from -1 to 1 in every element.
-
-    Raises:
-        InputError: the body touches the wall.
     """
     return _spheroid(place, cuts) if place.body.half else _with_side(place, cuts)
 
 
-def _with_side(place: Place, cuts: Cuts) -> Surface:
+def _with_side(place: Place, cuts: Cuts) -> FilmSurface:
     """The film of a body with a straight side, from the rear to the front."""
     body = place.body
     a = body.radius
@@ -259,7 +250,7 @@ def _with_side(place: Place, cuts: Cuts) -> Surface:
         outline = (joint + f * sin, a - f + f * cos)
         end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos), (cos, -sin))
         parts.insert(0 if outward < 0 else len(parts), end)
-    return Surface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+    return FilmSurface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
 def _revolved(
@@ -270,7 +261,7 @@ def _revolved(
     tangent: tuple[Samples, Samples],
     normal: tuple[Samples, Samples],
     turning: tuple[Samples, Samples],
-) -> Surface:
+) -> FilmSurface:
     """Surface of revolution of an outline (x, rho): tangent by s, unit normal, its derivative by s; `rate` is ds/du."""
     turn, turn_rate = place.bottom(outline[0], place.body.radius)
     fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
@@ -286,7 +277,7 @@ def _revolved(
         x[:, None, None] * _AXIS + r[:, None, None] * radial for x, r in (outline, normal, tangent, turning)
     )
     steep = normal[1][:, None]
-    return Surface(
+    return FilmSurface(
         to_points,
         to_normals,
         to_tangents * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
@@ -296,7 +287,7 @@ def _revolved(
     )
 
 
-def _spheroid(place: Place, cuts: Cuts) -> Surface:
+def _spheroid(place: Place, cuts: Cuts) -> FilmSurface:
     """The film of a spheroid: a patch of the stretched unit sphere about its nearest point."""
     body = place.body
     stretch = np.array([body.half, body.radius, body.radius])
@@ -304,7 +295,7 @@ def _spheroid(place: Place, cuts: Cuts) -> Surface:
     nearest = stretch * facing
     turn = np.arctan2(nearest[0], -nearest[2])
 
-    def patch(beta: Samples, theta: Samples) -> Surface:
+    def patch(beta: Samples, theta: Samples) -> FilmSurface:
         (sb, cb), (st, ct) = (np.sin(beta)[:, None], np.cos(beta)[:, None]), (np.sin(theta), np.cos(theta))
         zero = np.zeros(np.broadcast_shapes(sb.shape, st.shape))
         c, s = np.cos(turn), np.sin(turn)
@@ -320,7 +311,7 @@ def _spheroid(place: Place, cuts: Cuts) -> Surface:
         along, across = (stretch * slope for slope in slopes)
         turning = [slope / (stretch * size) for slope in slopes]
         first, second = (by - normals * np.sum(normals * by, axis=-1, keepdims=True) for by in turning)
-        return Surface(stretch * sphere, normals, along, across, first, second)
+        return FilmSurface(stretch * sphere, normals, along, across, first, second)
 
     step = 0.05
     probe = np.array([-step, 0.0, step])

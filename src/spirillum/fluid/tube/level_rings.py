@@ -9,10 +9,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, Rows, System, finer, midpoints, projectors, sent_to_wall
-from spirillum.fluid.tube.wall import SLACK, Waves, each, extensions, times_layers, weighted_layers
+from spirillum.fluid.tube.wall import SLACK, WallWaves, each, extensions, times_layers, weighted_layers
 from spirillum.fluid.wire.revolution import Panels
-
-__all__ = ["LevelRings"]
 
 _FINER = 4
 """Nodes that average waves over a panel, over its own."""
@@ -36,7 +34,7 @@ class LevelRings(Rings):
         self.panels, self.offset, self.modes = panels, offset, modes
         self.reference = float(np.max(panels.rho))
 
-    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
         at_nodes, averages = self._strengths(waves), self._strengths(waves, averaged=True)
         between = self._matrices(waves)
@@ -62,7 +60,7 @@ class LevelRings(Rings):
 
         each(lessen, [family for (family,) in systems])
 
-    def _bands(self, waves: Waves) -> Iterator[tuple[slice, np.ndarray]]:
+    def _bands(self, waves: WallWaves) -> Iterator[tuple[slice, np.ndarray]]:
         """Bands of k, each with the rows (of 3 a node) that its waves reach before they are damped, there and back."""
         distance = np.repeat(waves.radius - self.offset - self.panels.rho.ravel(), 3)
         edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
@@ -71,7 +69,7 @@ class LevelRings(Rings):
                 yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + SLACK
 
     def sent(
-        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+        self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
     ) -> list[Samples]:
         """See `Rings.sent`."""
         columns = forces.shape[1]
@@ -95,7 +93,7 @@ class LevelRings(Rings):
             found.append(np.concatenate(parts))
         return found
 
-    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+    def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
         """See `Rings.received`."""
         strengths = self._strengths(waves)
 
@@ -111,7 +109,7 @@ class LevelRings(Rings):
 
         return each(product, range(waves.k.size))
 
-    def _traces(self, waves: Waves, number: int) -> tuple[Samples, Samples]:
+    def _traces(self, waves: WallWaves, number: int) -> tuple[Samples, Samples]:
         """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
         from spirillum.kernels.tube_waves import circle_waves
 
@@ -129,7 +127,7 @@ class LevelRings(Rings):
             found.append(np.stack(modes, axis=1).reshape(self.modes, 3, orders, 3))
         return found[0], found[1]
 
-    def _matrices(self, waves: Waves) -> tuple[Samples, Samples]:
+    def _matrices(self, waves: WallWaves) -> tuple[Samples, Samples]:
         """sum_p eps_p U S U' between modes, even and odd, (k, modes, 3, modes, 3), with the weights in k."""
         size = 3 * self.modes
 
@@ -146,7 +144,7 @@ class LevelRings(Rings):
         pairs = each(product, range(waves.k.size))
         return np.stack([pair[0] for pair in pairs]), np.stack([pair[1] for pair in pairs])
 
-    def _strengths(self, waves: Waves, *, averaged: bool = False) -> list[Samples]:
+    def _strengths(self, waves: WallWaves, *, averaged: bool = False) -> list[Samples]:
         """Each mode on the nodes from unit modes on the reference cylinder, (3 nodes, k, 2, 3) each.
 
         The 2 stands for the real and the imaginary part of the wave. The film between a body and the wall may be

@@ -13,11 +13,9 @@ from pathlib import Path
 from spirillum.errors import InputError
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
-from spirillum.fluid.tube.rest import Progress
+from spirillum.fluid.tube.outer_resistance import Progress
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-
-__all__ = ["find_table", "prepared_tables", "tables_are_kept"]
 
 _SHIPPED = Path(__file__).parent / "tables"
 
@@ -48,12 +46,7 @@ def _kept(key: str) -> Path | None:
 
 
 def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
-    """The table of a robot in a tube, if there is one, of itself or of its mirror image.
-
-    Args:
-        geometry: of the robot.
-        radius: R of the tube, m.
-    """
+    """The table of a robot in a tube, if there is one, of itself or of its mirror image."""
     own = _of_key(key_of(geometry, radius))
     if own is not None:
         return own
@@ -65,16 +58,7 @@ def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
 def prepared_tables(
     robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
 ) -> list[TubeTable]:
-    """The tables of robots in their tubes; those that there are not are made, and kept in the user's cache.
-
-    Args:
-        robots: geometry, and R of its tube, m; those with the same body and tube share their work.
-        workers: number of processes.
-        progress: told what is being solved, how much is done, and of how much.
-
-    Raises:
-        InputError: for a robot without a table.
-    """
+    """The tables of robots in their tubes; those that there are not are made, and kept in the user's cache."""
     missing = [robot for robot in dict.fromkeys(robots) if find_table(*robot) is None]
     made = built_tables(missing, workers=workers, progress=progress) if missing else []
     fresh = {(table.geometry, table.radius): _put(table) for table in made}

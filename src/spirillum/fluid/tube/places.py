@@ -19,10 +19,8 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
-from spirillum.robot.seat import Seat, last_clear
+from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
-
-__all__ = ["CHECKED_FROM", "LARGEST_YAW", "Places", "rings_of"]
 
 _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
@@ -94,11 +92,7 @@ class Places:
 
     @cached_property
     def gaps(self) -> Samples:
-        """Nodes t, increasing.
-
-        Raises:
-            InputError: for a robot whose tail touches the glass long before its body does.
-        """
+        """Nodes t, increasing."""
         thin = self.thinnest / contact_offset(self.rings, self.radius, 0.0)
         if thin > _UPPER[0]:
             raise InputError(

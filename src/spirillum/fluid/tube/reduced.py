@@ -20,11 +20,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import System
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.wall import Waves, from_the_wall, point_waves, summed
+from spirillum.fluid.tube.wall import WallWaves, from_the_wall, point_waves, summed
 from spirillum.fluid.wire.interaction import share
 from spirillum.fluid.wire.sources import Sources
-
-__all__ = ["Answers", "Reduced"]
 
 _LEAST, _MOST_LEAST = 2e-8, 2e-6
 """Fields below this share of the largest are left out: the square of a tenth of the tolerance, between these."""
@@ -70,7 +68,7 @@ class Reduced:
 
     sources: Sources
     """The wires, at any phase."""
-    waves: Waves
+    waves: WallWaves
     """Between wires and solids."""
     away: float
     """Smallest distance of the solids from the wall, m."""
@@ -79,12 +77,7 @@ class Reduced:
 
     @classmethod
     def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:
-        """The basis of wires that turn about the solids' axis, for each of some tails.
-
-        Args:
-            solids: solids and wall.
-            tails: the wires of each, at any phase.
-        """
+        """The basis of wires that turn about the solids' axis, for each of some tails."""
         sources = Sources.joined(tails)
         seat, placed = solids.seat, solids.seat.placed(_swept(sources))
         away = float(np.min(seat.distances(sources.x, sources.rho)))
@@ -176,7 +169,7 @@ def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
     return found
 
 
-def _reflected(solids: Solids, waves: Waves, placed: Samples, away: float) -> list[Samples]:
+def _reflected(solids: Solids, waves: WallWaves, placed: Samples, away: float) -> list[Samples]:
     """Basis of what the wall reflects of forces at points, with roots of surface elements, for each system."""
     systems, size = solids.systems, 3 * len(placed)
     step = _WALL_SKETCH * len(systems[0])

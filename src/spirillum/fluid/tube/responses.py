@@ -6,8 +6,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = ["RESPONSES", "response_errors", "response_of"]
-
 RESPONSES = {
     "forward_velocity": 0.01,
     "body_rotation_rate": 0.01,
@@ -21,9 +19,6 @@ RESPONSES = {
 
 def response_of(matrix: Samples) -> Samples:
     """What a place does to a robot whose tail turns at 1 rad/s, held sideways and in tilt, closed ends, viscosity 1.
-
-    Args:
-        matrix: the 8x8.
 
     Returns:
         Forward velocity, body rate, forces y and z, torques y and z of the fluid, and the normal resistance, (7,).

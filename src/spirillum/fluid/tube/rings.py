@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.wall import Waves, point_waves, times_layers
+from spirillum.fluid.tube.wall import WallWaves, point_waves, times_layers
 from spirillum.fluid.wire.revolution import Panels
-
-__all__ = ["Rings", "Rows", "System", "finer", "midpoints", "projectors", "sent_to_wall"]
 
 
 class Rows(NamedTuple):
@@ -53,7 +51,7 @@ class Rings(ABC):
     """What the wall does to solids of revolution: their rings see its waves as Fourier modes about their own axis."""
 
     @abstractmethod
-    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """Take what the wall reflects of the solids' tractions from their single layer's matrices.
 
         Args:
@@ -64,7 +62,7 @@ class Rings(ABC):
 
     @abstractmethod
     def sent(
-        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+        self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
     ) -> list[Samples]:
         """Velocities on the solids from forces at points, by the wall, (unknowns, columns) for each system.
 
@@ -79,7 +77,7 @@ class Rings(ABC):
         """
 
     @abstractmethod
-    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+    def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
         """Velocities on some unknowns from waves at points, with the wall's single layer, for each k and system.
 
         (unknowns, 2, parities, orders, 3), to be multiplied with `point_waves`; without the minus sign.
@@ -91,7 +89,7 @@ class Rings(ABC):
         """
 
 
-def sent_to_wall(waves: Waves, number: int, points: Samples, forces: Samples) -> Samples:
+def sent_to_wall(waves: WallWaves, number: int, points: Samples, forces: Samples) -> Samples:
     """Forces at points as waves of one k, times the wall's single layer, (columns, 2, 2, orders, 3)."""
     at_points = point_waves(points, waves, number)
     mixed = forces.T @ at_points.reshape(len(at_points), -1)

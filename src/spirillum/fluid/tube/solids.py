@@ -21,14 +21,12 @@ from spirillum.costs import check_memory
 from spirillum.fluid.tube.level_rings import LevelRings
 from spirillum.fluid.tube.rings import Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
-from spirillum.fluid.tube.wall import Waves, each, waves_between
+from spirillum.fluid.tube.wall import WallWaves, each, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline
-from spirillum.robot.seat import Seat
-
-__all__ = ["MOTIONS", "Fineness", "Solids", "check_fits"]
+from spirillum.robot.tube_pose import Seat
 
 MOTIONS = 13
 """Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, held back."""
@@ -155,7 +153,7 @@ class Solids:
             return LevelRings(self.panels, self.seat.offset, self.modes)
         return TiltedRings(self.panels, self.seat, self.counts, self.fineness.precision)
 
-    def waves(self, distance: float, wires: Samples | None = None) -> Waves:
+    def waves(self, distance: float, wires: Samples | None = None) -> WallWaves:
         """The waves that matter between the solids, or solids and wires.
 
         Args:
@@ -277,14 +275,7 @@ class Solids:
 
 
 def check_fits(memory: float) -> None:
-    """Refuse solids whose equations do not fit.
-
-    Args:
-        memory: see `Solids.memory`.
-
-    Raises:
-        InputError: if they do not.
-    """
+    """Refuse solids whose equations do not fit."""
     cause = "the flow in the tube at this gap and tolerance (placement.gap, channel.diameter, body.length)"
     check_memory(cause, memory / 2**30, "GiB of equations", 2.0**30, "as with a wider gap or a narrower channel")
 

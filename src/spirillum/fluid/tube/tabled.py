@@ -25,8 +25,6 @@ from spirillum.kernels.tube_table import INSIDE, MOTIONS, largest_yaw, mean_resi
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 
-__all__ = ["THINNEST_GAP", "TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
-
 THINNEST_GAP = 1e-5
 """Thinnest gap over the body's diameter: the thinnest film that is tabulated."""
 _HELD = [0, 1, 3, 4]
@@ -80,11 +78,7 @@ class TabledTube(Tube):
     )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
-        """Answer from tables.
-
-        Args:
-            tables: by key, one for every robot that will be asked for.
-        """
+        """Answer from tables."""
         super().__init__()
         self._tables = tables
 

@@ -11,11 +11,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, System, finer, midpoints, projectors, sent_to_wall
-from spirillum.fluid.tube.wall import Waves, distances_of, each, extensions, times_layers
+from spirillum.fluid.tube.wall import WallWaves, distances_of, each, extensions, times_layers
 from spirillum.fluid.wire.revolution import Panels
-from spirillum.robot.seat import Seat
-
-__all__ = ["TiltedRings"]
+from spirillum.robot.tube_pose import Seat
 
 _FINER = 3
 """Nodes that average waves over a panel, over its own: with 2, normal resistance was 9 % low at a gap of 0.04 radii."""
@@ -112,7 +110,7 @@ class TiltedRings(Rings):
             tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
         return tiers
 
-    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
         tiers = self._tiers(systems)
         # What plain tiers and others do to each other is symmetric; the waves of averaged ones are averaged both ways.
@@ -159,7 +157,7 @@ class TiltedRings(Rings):
                 matrices[s][np.ix_(columns, rows)] -= block.T * duals[s][rows]
 
     def sent(
-        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+        self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
     ) -> list[Samples]:
         """See `Rings.sent`."""
         tiers = self._tiers(systems)
@@ -182,7 +180,7 @@ class TiltedRings(Rings):
         each(add, range(waves.k.size))
         return found
 
-    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+    def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
         """See `Rings.received`."""
         bearing = np.zeros(self.panels.size, dtype=bool)
         for family in (family for system in systems for family in system):
@@ -204,7 +202,7 @@ class TiltedRings(Rings):
 
     def _on_rings(
         self,
-        waves: Waves,
+        waves: WallWaves,
         number: int,
         sample: _Sample,
         tier: _Tier,
@@ -256,7 +254,7 @@ class TiltedRings(Rings):
 
     def _waves(
         self,
-        waves: Waves,
+        waves: WallWaves,
         number: int,
         theta: Samples,
         placed: Samples,

@@ -26,7 +26,7 @@ from spirillum.costs import MOST_MEMORY
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.stated import CHECKED, said_of_tail, what_is_fitted
+from spirillum.fluid.reference_errors import CHECKED, validation_note, what_is_fitted
 from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
@@ -37,11 +37,9 @@ from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, MOST_STATIONS, Slend
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, within
-from spirillum.robot.options import ModelOptions
+from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.outline import Outline
-from spirillum.robot.seat import Seat
-
-__all__ = ["END_LOSS", "Tube", "check_solvable", "held_robot", "solved", "solved_together"]
+from spirillum.robot.tube_pose import Seat
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -157,14 +155,7 @@ def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float
 
 
 def is_solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> bool:
-    """Whether the answer of `solved` is kept from before.
-
-    Args:
-        geometry: of the robot.
-        seat: where it is.
-        fineness: how finely the flow is resolved.
-        phase: of the tail, rad.
-    """
+    """Whether the answer of `solved` is kept from before."""
     return is_kept(_Question(geometry, "robot", seat, fineness, phase), _computed)
 
 
@@ -189,16 +180,7 @@ def solved_together(
 
 
 def check_solvable(geometry: RobotGeometry, seat: Seat, fineness: Fineness) -> None:
-    """Refuse a place at which the flow around a whole robot does not fit into memory.
-
-    Args:
-        geometry: of the robot.
-        seat: where it is.
-        fineness: how finely the flow is resolved.
-
-    Raises:
-        InputError: if it does not.
-    """
+    """Refuse a place at which the flow around a whole robot does not fit into memory."""
     check_fits(_memory(_solid_key(geometry, "robot", seat, fineness)))
 
 
@@ -255,7 +237,7 @@ class Tube(SwimmerModel):
         else:
             place = "gap and pitch are taken as given: their own uncertainty comes on top"
         standard = batch.options.slender.accuracy == "standard"
-        wire = f"; without walls, {said_of_tail(batch, CHECKED['slender'])}" if standard else ""
+        wire = f"; without walls, {validation_note(batch, CHECKED['slender'])}" if standard else ""
         return f"walls are computed, {what_is_fitted(fitted_by)}; {place}{wire}"
 
     def fineness(self, options: ModelOptions) -> Fineness:

@@ -20,23 +20,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-__all__ = [
-    "SLACK",
-    "Band",
-    "Waves",
-    "components_of",
-    "distances_of",
-    "each",
-    "extensions",
-    "from_the_wall",
-    "point_reflection",
-    "point_waves",
-    "summed",
-    "times_layers",
-    "waves_between",
-    "weighted_layers",
-]
-
 _DECAY = 2.5
 """Rate, times the radius, at which the flow of a force dies out along the tube: images in the sum over k lie beyond."""
 _LOWEST = 1e-5
@@ -60,7 +43,7 @@ _S = TypeVar("_S")
 
 
 @dataclass(frozen=True)
-class Waves:
+class WallWaves:
     """Which waves are kept: nodes in k with their weights, and the number of orders p at each."""
 
     radius: float
@@ -81,7 +64,7 @@ class Waves:
             return 0
         return min(int(np.ceil(self.radius * np.sqrt(steepest**2 - k**2)) + 3.0), self.orders[number])
 
-    def bands(self, number: int, distances: Samples, other: float, orders: int) -> Iterator[Band]:
+    def bands(self, number: int, distances: Samples, other: float, orders: int) -> Iterator[WaveBand]:
         """Which of some things the waves of one k reach: the steeper the wave, the fewer of them.
 
         Args:
@@ -97,10 +80,10 @@ class Waves:
         for low, high in pairwise(sorted({0, *(int(np.ceil(share * orders)) for share in _BANDS), orders})):
             there = np.flatnonzero(reached > low)
             if there.size:
-                yield Band(low, high, there)
+                yield WaveBand(low, high, there)
 
 
-class Band(NamedTuple):
+class WaveBand(NamedTuple):
     """Some orders of waves of one k, and what they reach."""
 
     low: int
@@ -111,7 +94,7 @@ class Band(NamedTuple):
     """Indices of what they reach before they are damped."""
 
 
-def waves_between(radius: float, reach: float, distance: float, tolerance: float) -> Waves:
+def waves_between(radius: float, reach: float, distance: float, tolerance: float) -> WallWaves:
     """The waves that matter between things in a tube.
 
     Args:
@@ -134,7 +117,7 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
     weight[1] -= slope
     around = radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))
     orders = tuple(int(p) for p in np.ceil(around) + 3.0)
-    return Waves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance))
+    return WallWaves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance))
 
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
@@ -148,12 +131,7 @@ def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
 
 
 def summed(function: Callable[[range], _T], count: int) -> list[_T]:
-    """Sums over the nodes in k, a few of them: what each thread adds up needs no more memory than one of its terms.
-
-    Args:
-        function: the sum over some nodes.
-        count: number of nodes.
-    """
+    """Sums over the nodes in k, a few of them: what each thread adds up needs no more memory than one of its terms."""
     return each(function, [range(first, count, _THREADS) for first in range(min(_THREADS, count))])
 
 
@@ -176,7 +154,7 @@ def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 
     return found
 
 
-def weighted_layers(waves: Waves, number: int) -> Samples:
+def weighted_layers(waves: WallWaves, number: int) -> Samples:
     """eps_p S_p at one k times its weight, (orders, 3, 3)."""
     from scipy.special import k0e, k1e
 
@@ -189,7 +167,7 @@ def weighted_layers(waves: Waves, number: int) -> Samples:
     return layers
 
 
-def times_layers(waves_at: Samples, waves: Waves, number: int, first: int = 0) -> Samples:
+def times_layers(waves_at: Samples, waves: WallWaves, number: int, first: int = 0) -> Samples:
     """Waves (..., orders, 3) times the wall's single layer; some of the orders, from the first one, will do."""
     flat = np.moveaxis(waves_at, -2, 0)
     orders = len(flat)
@@ -199,7 +177,7 @@ def times_layers(waves_at: Samples, waves: Waves, number: int, first: int = 0) -
     return pressed
 
 
-def point_waves(points: Samples, waves: Waves, number: int, first: int = 0, last: int | None = None) -> Samples:
+def point_waves(points: Samples, waves: WallWaves, number: int, first: int = 0, last: int | None = None) -> Samples:
     """Velocities of waves of one k at points, (3 n, 2, 2, last - first, 3): real, imaginary; even, odd.
 
     Args:
@@ -240,7 +218,7 @@ def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.
     return points[order], distances[order], components_of(np.argsort(order))
 
 
-def point_reflection(points: Samples, waves: Waves) -> Samples:
+def point_reflection(points: Samples, waves: WallWaves) -> Samples:
     """Velocities at points from forces at the same points, symmetric, (3 n, 3 n); without the minus sign."""
     placed, distances, back = from_the_wall(points, waves.radius)
 

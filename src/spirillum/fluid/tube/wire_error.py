@@ -10,8 +10,6 @@ import math
 
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
-__all__ = ["LARGEST_WIRE_ERROR", "SOLIDS_ERROR", "at_any_place", "wire_error"]
-
 _PLACES = 1.1
 """Largest error at other places, pitched by up to 3 degrees and at gaps from 0.3 mm up to the axis, over that one."""
 SOLIDS_ERROR = 2e-4
@@ -61,11 +59,7 @@ _MEASURED: dict[float, dict[tuple[float, float], float]] = {
 
 
 def at_any_place(compared: float) -> float:
-    """Relative error that is stated of all places, from that at the one at which both wires were compared.
-
-    Args:
-        compared: relative difference there.
-    """
+    """Relative error that is stated of all places, from that at the one at which both wires were compared."""
     return _PLACES * max(abs(compared), _LEAST)
 
 

@@ -26,8 +26,6 @@ from spirillum.robot.outline import Outline
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["Discretisation", "Solution", "one_thread", "share", "solve", "surface_motion"]
-
 _EIGHT_PI = 8.0 * np.pi
 
 
@@ -48,7 +46,7 @@ class Discretisation:
 
 
 @dataclass(frozen=True)
-class Solution:
+class UnitTwistSolution:
     """Tractions and forces for each of the 12 unit twists (of the body, then of the rotor), viscosity 1."""
 
     matrix: Samples
@@ -69,7 +67,7 @@ class Solution:
 
 def solve(
     solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
-) -> Solution:
+) -> UnitTwistSolution:
     """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin.
 
     Args:
@@ -97,7 +95,7 @@ def _thread_pools() -> ThreadpoolController:
 
 def _solve(
     solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
-) -> Solution:
+) -> UnitTwistSolution:
     lines = tuple(wire for wire, _ in wires)
     points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
     system = wire_system(wires, resolution.wire)
@@ -129,14 +127,14 @@ def _solution(
     densities: Amplitudes,
     strengths: Samples,
     system: WireSystem,
-) -> Solution:
+) -> UnitTwistSolution:
     matrix = _EIGHT_PI * matrix
     scale = np.sqrt(np.diag(matrix))
     there = scale > 0
     lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale[there], scale[there])
     stations, kinds = system.moments.shape[:2]
     amounts = strengths[3 * stations :].reshape(stations, kinds, 12)
-    return Solution(
+    return UnitTwistSolution(
         matrix=0.5 * (matrix + matrix.T),
         asymmetry=float(np.max(np.abs(lack))),
         panels=panels,

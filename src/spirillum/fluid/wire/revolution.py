@@ -15,9 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.outline import Arc, Line, Outline
-
-__all__ = ["Panels", "panels_of"]
+from spirillum.robot.outline import Arc, Outline, Segment
 
 _FINE = 16  # nodes of the Gauss rule that integrates a panel near its target
 _GRADING = 4  # panels at a sharp edge: distance from it as the fourth power of the parameter
@@ -76,11 +74,7 @@ class Panels:
         return np.repeat(self.solid, self.order)
 
     def of_solids(self, wanted: np.ndarray) -> Panels:
-        """The panels of some solids.
-
-        Args:
-            wanted: whether to keep each solid.
-        """
+        """The panels of some solids."""
         keep = wanted[self.solid]
         return self if np.all(keep) else Panels(self.x[keep], self.rho[keep], self.solid[keep])
 
@@ -154,7 +148,7 @@ def panels_of(outlines: Sequence[Outline], longest: Callable[[int, Samples, Samp
 
 
 def _panel_parameters(
-    piece: Line | Arc,
+    piece: Segment | Arc,
     sharp: tuple[bool, bool],
     beside: tuple[float, ...],
     longest: Callable[[Samples, Samples], Samples],

@@ -16,8 +16,6 @@ from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.parts import End, Shape
 from spirillum.units import show
 
-__all__ = ["PIECES", "RobotGeometry", "number_of"]
-
 _POINTS_PER_TURN = 200
 _STATION = 20_000.0
 """Memory of a station while clearances over a turn are sought, bytes."""

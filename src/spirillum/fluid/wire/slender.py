@@ -15,16 +15,14 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.stated import CHECKED, said_of_tail, walls_left_out
-from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
+from spirillum.fluid.reference_errors import CHECKED, validation_note, walls_left_out
+from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, within
-from spirillum.robot.options import ModelOptions
-
-__all__ = ["FINEST_WIRE_ERROR", "MOST_STATIONS", "Slender", "robot_solution", "stations_of"]
+from spirillum.robot.model_options import ModelOptions
 
 FINEST_WIRE_ERROR = 0.004
 """Relative error of speeds with `high` wires: the largest of drag, thrust, torque and speed against resolved wires."""
@@ -51,12 +49,12 @@ def stations_of(batch: RobotBatch) -> PerRobot:
     return station_count(wire_length, 0.5 * batch.wire_diameter)
 
 
-def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
+def robot_solution(batch: RobotBatch, index: int = 0) -> UnitTwistSolution:
     """Tractions on robot number `index` for all unit twists, at phase 0."""
     return _solved(RobotGeometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
 
 
-def _solved(g: RobotGeometry, part: str, resolution: Discretisation) -> Solution:
+def _solved(g: RobotGeometry, part: str, resolution: Discretisation) -> UnitTwistSolution:
     wires = [(g.wire(resolution.spacing), 1)] if "tail" in PIECES[part] else []
     return solve(g.solids(part), wires, resolution)
 
@@ -133,7 +131,7 @@ class Slender(SwimmerModel):
         """See `ResistanceModel.own_error`."""
         coupled = bool(batch.coupling_length[0] > 0 and batch.coupling_diameter[0] > 0)
         found = (
-            said_of_tail(batch, CHECKED["slender"])
+            validation_note(batch, CHECKED["slender"])
             if batch.options.slender.accuracy == "standard"
             else "against resolved wires and a robot, drag, thrust and torque of the tail and speed agree to 0.4 %"
         )

@@ -15,8 +15,6 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.fluid.wire.revolution import Panels
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem
 
-__all__ = ["Sources"]
-
 _TORQUE_MODES = 3  # torques along a wire are felt through modes 0 to 2 only: the others fade too fast
 _OF_STATIONS = ("x", "rho", "theta", "frames", "torques")
 _STEP = 1e-3  # of the differences that make couples from forces, over the blob radius

@@ -22,17 +22,6 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import skew
 
-__all__ = [
-    "Accuracy",
-    "Wire",
-    "WireSystem",
-    "closest_approach",
-    "station_count",
-    "stations_along",
-    "wire_along",
-    "wire_system",
-]
-
 Accuracy = Literal["standard", "high"]
 
 _BLOB = float(np.exp(0.5))
@@ -97,9 +86,6 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
         radius: a, m.
         spacing: of the stations, relative to the standard one.
         closed: whether the wire is a ring without ends.
-
-    Raises:
-        InputError: if the curve is no curve, has too many stations, or a wire of that radius runs into itself.
     """
     line = _checked(curve, radius, spacing, closed=closed)
     wire = stations_along(line, float(radius), float(spacing), closed=closed)

@@ -12,8 +12,6 @@ from spirillum.papers.claim import Claim
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["evaluated", "foretold"]
-
 
 def evaluated(dataset: xr.Dataset) -> list[Claim]:
     """Hold a study that names this paper against its statements; empty for one of other channels."""

@@ -13,8 +13,6 @@ from spirillum.papers.claim import Claim, Verdict
 from spirillum.robot.load import load
 from spirillum.units import Hz
 
-__all__ = ["calibration_factors", "method", "robot_and_channel"]
-
 
 def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
     """Table III."""

@@ -16,13 +16,11 @@ from spirillum.papers.biorob2012.constants import (
     VELOCITY_DROPS,
 )
 from spirillum.papers.biorob2012.evidence import Evidence
-from spirillum.papers.biorob2012.readings import Judgement, Readings
+from spirillum.papers.biorob2012.readings import FrictionModelRuns, Judgement
 from spirillum.papers.claim import Claim, PredictedVerdict
-from spirillum.studies.laid_down import INFERRED_BY
+from spirillum.studies.released_robots import INFERRED_BY
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label
-
-__all__ = ["predicted"]
 
 _EQUAL = 0.05
 """Relative difference within which motor rates count as identical, as for observations."""
@@ -32,8 +30,8 @@ def predicted(evidence: Evidence) -> list[Claim]:
     """The verdicts of a study whose robots were laid down; empty for one without."""
     if "forward_velocity_at_run" not in evidence.dataset:
         return []
-    readings = Readings(evidence)
-    sources: tuple[Callable[[Readings], Iterator[Claim]], ...] = (
+    readings = FrictionModelRuns(evidence)
+    sources: tuple[Callable[[FrictionModelRuns], Iterator[Claim]], ...] = (
         _reynolds_numbers,
         _velocity_drops,
         _global_drop,
@@ -61,7 +59,7 @@ def _of_tails(average: Callable[..., Any], values: Values) -> Values:
     return found
 
 
-def _reynolds_numbers(readings: Readings) -> Iterator[Claim]:
+def _reynolds_numbers(readings: FrictionModelRuns) -> Iterator[Claim]:
     speeds = readings.of("forward_velocity")
     for number, (channel, stated) in enumerate(LARGEST_REYNOLDS.items()):
         tail = readings.evidence.tail(stated.wavelength_mm, stated.amplitude_mm)
@@ -78,7 +76,7 @@ def _reynolds_numbers(readings: Readings) -> Iterator[Claim]:
         )
 
 
-def _velocity_drops(readings: Readings) -> Iterator[Claim]:
+def _velocity_drops(readings: FrictionModelRuns) -> Iterator[Claim]:
     speeds = readings.of("forward_velocity")
     for which, (drop, wavelength, amplitude) in VELOCITY_DROPS.items():
         tail = readings.evidence.tail(wavelength, amplitude)
@@ -93,7 +91,7 @@ def _velocity_drops(readings: Readings) -> Iterator[Claim]:
         )
 
 
-def _global_drop(readings: Readings) -> Iterator[Claim]:
+def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
     wide, narrow = readings.of("forward_velocity")[:, readings.both]
     if not wide.size:
         return
@@ -115,7 +113,7 @@ def _global_drop(readings: Readings) -> Iterator[Claim]:
     )
 
 
-def _speeds(readings: Readings) -> Iterator[Claim]:
+def _speeds(readings: FrictionModelRuns) -> Iterator[Claim]:
     speeds = readings.of("forward_velocity")
     rising, falling = np.diff(speeds, axis=1), -np.diff(speeds[:, :-1], axis=2)
     for statement, steps in (
@@ -132,7 +130,7 @@ def _steps(steps: Values) -> str:
     return f"in {np.count_nonzero(known > 0)} of {known.size} steps of the grid and the readings"
 
 
-def _body_rotation(readings: Readings) -> Iterator[Claim]:
+def _body_rotation(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("body_rotation_rate"))
     inside = np.minimum(rates - 10**-2.5 * Hz, 10**-0.5 * Hz - rates)
     yield readings.claim(
@@ -154,7 +152,7 @@ def _body_rotation(readings: Readings) -> Iterator[Claim]:
     )
 
 
-def _motor_rates(readings: Readings) -> Iterator[Claim]:
+def _motor_rates(readings: FrictionModelRuns) -> Iterator[Claim]:
     rates = np.abs(readings.of("motor_rotation_rate"))
     apart = np.abs(rates[1] / rates[0] - 1.0)
     yield readings.claim(
@@ -172,7 +170,7 @@ def _motor_rates(readings: Readings) -> Iterator[Claim]:
         yield readings.claim(statement, "trend", _steps(steps), readings.judged(readings.holds(steps)))
 
 
-def _effective_friction(readings: Readings) -> Iterator[Claim]:
+def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
     found = readings.of("effective_friction", "rft")
     motor = readings.evidence.robot.motor
     if min(found.shape[1:3]) == 1:
@@ -216,7 +214,7 @@ def _effective_friction(readings: Readings) -> Iterator[Claim]:
         )
 
 
-def _models(readings: Readings) -> Iterator[Claim]:
+def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
     seen = readings.of("forward_velocity")
     missed = {name: (readings.of("modelled_forward_velocity", name) - seen)[readings.known] for name in INFERRED_BY}
     errors: dict[str, Values] = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
@@ -239,7 +237,7 @@ def _models(readings: Readings) -> Iterator[Claim]:
             )
 
 
-def _contact(readings: Readings) -> Iterator[Claim]:
+def _contact(readings: FrictionModelRuns) -> Iterator[Claim]:
     share = readings.of("contact_share")
     yield readings.claim(
         "The robot is in intermittent contact with the channel's surface",

@@ -19,17 +19,6 @@ from spirillum.papers.claim import Claim, Verdict
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label
 
-__all__ = [
-    "body_rotation",
-    "effective_friction",
-    "global_drop",
-    "model_comparison",
-    "motor_rates",
-    "reynolds_numbers",
-    "trends",
-    "velocity_drops",
-]
-
 _EQUAL_RATES = (
     "the paper observed equal motor rates in both channels; with them a tail's loss follows without knowing the rate"
 )

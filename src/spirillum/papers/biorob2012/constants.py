@@ -8,20 +8,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = [
-    "BODY_DRAG_FACTORS",
-    "BODY_ROTATION_ERROR",
-    "FRAME_RATE",
-    "GLOBAL_DROP",
-    "LARGEST_REYNOLDS",
-    "LOW_REYNOLDS",
-    "NARROWER",
-    "ROBOT_LENGTH",
-    "VELOCITY_DROPS",
-    "LargestReynolds",
-    "VelocityDrop",
-]
-
 
 class LargestReynolds(NamedTuple):
     """The largest Reynolds number of a channel, and the tail that has it."""

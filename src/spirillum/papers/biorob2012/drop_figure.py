@@ -17,10 +17,8 @@ from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.study_view import StudyView, spread
-from spirillum.view.figures.style import Scale, label_of_model, look_of_model
+from spirillum.view.figures.style import UnitPrefix, label_of_model, look_of_model
 from spirillum.view.figures.tail_panels import head_column, tail_axis
-
-__all__ = ["drop_picture"]
 
 _TITLE = "Loss of speed from the wide to the narrow channel"
 _MOST_COLUMNS = 5
@@ -29,11 +27,7 @@ _STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0
 
 
 def drop_picture(shown: StudyView) -> Picture | None:
-    """The loss of every tail at equal motor rates; None for a study of other channels.
-
-    Args:
-        shown: a study of a grid of tails.
-    """
+    """The loss of every tail at equal motor rates; None for a study of other channels."""
     if not {"wide", "narrow"} <= {str(name) for name in shown.whole["channel"].values}:
         return None
     evidence = Evidence(shown.whole)
@@ -81,7 +75,7 @@ def _draw(shown: StudyView, evidence: Evidence, notes: list[str]) -> Figure:
     panels = sheet.panels[0]
     add_letters(panels)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
-    scale = Scale.of(values, "m")
+    scale = UnitPrefix.of(values, "m")
     for axes, wavelength in zip(panels, wavelengths, strict=True):
         for model in evidence.confined:
             look = look_of_model(model)

@@ -22,8 +22,6 @@ from spirillum.units import Hz
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NO_RATES", "Evidence", "fraction_between", "in_hertz"]
-
 NO_RATES = "the observed rates are lost; give an observations file to decide"
 
 
@@ -88,12 +86,7 @@ class Evidence:
         return reynolds * fluid.viscosity / (fluid.density * self.robot.body.diameter)
 
     def drop_per_motor_turn(self, model: str, ending: str = "") -> Values:
-        """Relative loss of speed from wide to narrow at equal motor rates, for every tail.
-
-        Args:
-            model: name of the model.
-            ending: `_at_place` for the loss at each place of a band, the last axis; "" for the reference place.
-        """
+        """Relative loss of speed from wide to narrow at equal motor rates, for every tail."""
         per_turn = self.free(f"forward_velocity{ending}", model) / self.free(f"motor_rotation_rate{ending}", model)
         loss: Values = 1.0 - per_turn[1] / per_turn[0]
         return loss

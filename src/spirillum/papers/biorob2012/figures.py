@@ -12,8 +12,6 @@ from spirillum.view.figures.study_view import PaperFigure, StudyView
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PAPER_FIGURES", "more_figures"]
-
 _FILES = {"wide": "fig5-wide", "narrow": "fig6-narrow"}
 PAPER_FIGURES = {
     channel: PaperFigure(_FILES[channel], stated.figure, stated.value) for channel, stated in LARGEST_REYNOLDS.items()

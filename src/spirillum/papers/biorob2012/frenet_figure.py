@@ -18,8 +18,6 @@ from spirillum.view.figures.scene import FAINT, HALO, INK
 from spirillum.view.figures.solids import centreline_of
 from spirillum.view.figures.style import COLOURS, PAGE, new_figure, styled
 
-__all__ = ["Frames", "frenet_figure", "frenet_frames"]
-
 _SIGHT = np.array([0.56, 0.76, -0.34])
 """Direction in which the picture is seen: from the side, from behind and from above."""
 _POINTS = 1200
@@ -28,7 +26,7 @@ _MARKED = (0.215, 0.415, 0.63, 0.83)
 _SHADES = ("#4a2410", "#c2763a", "#ffd9b0")
 
 
-class Frames(NamedTuple):
+class FrenetFrames(NamedTuple):
     """The wire's centreline and its Frenet-Serret frames, in the frame of the body."""
 
     position: Samples
@@ -41,15 +39,12 @@ class Frames(NamedTuple):
     """(n, 3) unit vectors b = t x n."""
 
 
-def frenet_frames(robot: Robot, xi: Samples) -> Frames:
+def frenet_frames(robot: Robot, xi: Samples) -> FrenetFrames:
     """Frenet-Serret frames of the wire of eq. (10), its tail at phase 0.
 
     Args:
         robot: a loaded robot.
         xi: (n,) axial distances from the root, m.
-
-    Raises:
-        InputError: if the wire is straight somewhere, where it has no normal.
     """
     step = 1e-5 * robot.tail.length
     ahead, behind = (
@@ -62,7 +57,7 @@ def frenet_frames(robot: Robot, xi: Samples) -> Frames:
     if not np.all(size > 1e-12):
         raise InputError("the wire is straight, where it has no normal; allowed: a helix")
     normal = bend / size
-    return Frames(position, tangent, normal, np.asarray(np.cross(tangent, normal)))
+    return FrenetFrames(position, tangent, normal, np.asarray(np.cross(tangent, normal)))
 
 
 def _basis() -> tuple[Samples, Samples, Samples]:

@@ -15,10 +15,8 @@ from spirillum.arrays import Flags, Values
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.studies.factorial import main_effects
-from spirillum.studies.laid_down import READ, WINDOWS, levels_of_readings
+from spirillum.studies.released_robots import READ, WINDOWS, levels_of_readings
 from spirillum.units import show
-
-__all__ = ["Judgement", "Readings"]
 
 _CLOSE = 0.05
 """Relative difference from a stated number within which it is met, as for observations."""
@@ -35,7 +33,7 @@ class Judgement(NamedTuple):
     reason: str
 
 
-class Readings:
+class FrictionModelRuns:
     """Readings of a study's robots, one for each run and window of the design."""
 
     def __init__(self, evidence: Evidence) -> None:
@@ -64,11 +62,7 @@ class Readings:
         return f"{lacking} of {self.known.size} robots have no table of their tube" if lacking else ""
 
     def holds(self, steps: Values) -> Values:
-        """Whether all steps are positive, in each reading: 1, 0, or NaN where none is known, (readings,).
-
-        Args:
-            steps: (..., readings); NaN where a robot is not known.
-        """
+        """Whether all steps are positive, in each reading: 1, 0, or NaN where none is known, (readings,)."""
         flat = steps.reshape(-1, steps.shape[-1])
         known = np.isfinite(flat)
         found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)

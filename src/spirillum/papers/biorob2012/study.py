@@ -6,8 +6,6 @@ import tomllib
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["paper_study"]
-
 
 def paper_study() -> dict[str, Any]:
     """The tables of the paper's study, as a study file has them."""

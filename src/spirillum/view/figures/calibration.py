@@ -16,13 +16,11 @@ from spirillum.view.figures.posterior import posterior_figure, profile_figure
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import spread
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, label_of_model, look_of_model, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.experiment import Quantity
-
-__all__ = ["calibration_figures", "observed_figure", "residual_figure"]
 
 _MOST_COLUMNS = 5
 _MOST_NAMES = 36
@@ -69,17 +67,12 @@ def _fit_words(found: Calibrated, channel: int | None = None) -> str:
 def _with_unit(value: float, unit: str) -> str:
     if not unit:
         return f"{value:.3g}"
-    scale = Scale.of(np.abs(np.array([value])), unit)
+    scale = UnitPrefix.of(np.abs(np.array([value])), unit)
     return f"{value / scale.factor:.3g} {scale.unit}"
 
 
 def observed_figure(found: Calibrated, channel: int) -> Figure:
-    """The panels a) to l) of the paper's Figs 5 and 6 for one channel: speed, motor rate, effective friction.
-
-    Args:
-        found: a calibration.
-        channel: place of the channel.
-    """
+    """The panels a) to l) of the paper's Figs 5 and 6 for one channel: speed, motor rate, effective friction."""
     experiment = found.experiment
     inside = experiment.channel == channel
     amplitudes = np.unique(np.array([robot.tail.amplitude for robot in experiment.robots])[inside].round(9))
@@ -156,7 +149,7 @@ def _rows(found: Calibrated) -> list[dict[str, Any]]:
     if "advance" in found.predicted:
         values, low, high = (rate * column for column in found.predicted["advance"])
         half = np.abs(rate) * _half_width(found, "advance")
-        scale = Scale.of(np.abs(values), "m/s")
+        scale = UnitPrefix.of(np.abs(values), "m/s")
         rows.append(
             _row(f"$U_x$ ({scale.unit})", scale.factor, rate * experiment.advance.mean, half, (values, low, high))
         )
@@ -170,7 +163,7 @@ def _rows(found: Calibrated) -> list[dict[str, Any]]:
     if found.friction:
         middle = np.array([item.value for item in found.friction])
         ends = (np.array([item.low for item in found.friction]), np.array([item.high for item in found.friction]))
-        scale = Scale.of(np.abs(middle), "N m s/rad")
+        scale = UnitPrefix.of(np.abs(middle), "N m s/rad")
         unknown = np.full(middle.size, np.nan)
         rows.append(_row(f"$B_{{eff}}$ ({scale.unit})", scale.factor, unknown, unknown, (middle, *ends)))
     return rows

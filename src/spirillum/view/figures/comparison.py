@@ -12,14 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-from spirillum.shown import percent
+from spirillum.display import percent
 from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import PAGE, Scale, look_of_model, plain, styled
-
-__all__ = ["comparison_figure"]
+from spirillum.view.figures.style import PAGE, UnitPrefix, look_of_model, plain, styled
 
 _LINE_HEIGHT = 0.34
 """Height of one model in a panel, inches."""
@@ -59,9 +57,6 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
 
     A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
     the error that a model estimates of its own speed. A model without an answer keeps its line and says so.
-
-    Args:
-        comparison: what `spirillum.compare_models` returns.
     """
     with styled():
         sheet = Sheet(
@@ -124,7 +119,7 @@ def _signed_percent(share: float) -> str:
 
 def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
     values = {name: panel.value(answer) for name, answer in comparison.predictions.items()}
-    scale = Scale.of(np.array([*values.values()]), panel.unit)
+    scale = UnitPrefix.of(np.array([*values.values()]), panel.unit)
     reference = values[comparison.reference] / scale.factor
     axes.axvline(reference, color="#555555", linewidth=0.8, linestyle=(0, (4, 2)), zorder=1)
     axes.axvline(0.0, color="#444444", linewidth=0.7, zorder=1)

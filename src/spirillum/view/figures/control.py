@@ -13,20 +13,14 @@ from spirillum.arrays import Samples
 from spirillum.controllers.control import Control
 from spirillum.units import show
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, plain, styled
-
-__all__ = ["control_figure"]
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
 
 _MOST_SEEN = 1500
 """Frames that are drawn at most."""
 
 
 def control_figure(control: Control) -> Figure:
-    """Three panels over time: place, distance from what was aimed at, and duty with flow; shaded where flow is imposed.
-
-    Args:
-        control: what `spirillum.control` returns.
-    """
+    """Plot position, distance from the target, and duty with flow over time; shaded where flow is imposed."""
     with styled():
         sheet = Sheet(
             f"{plain(control.robot.name)}: {control.task.kind}, controller {control.controller}, seed {control.seed}",
@@ -42,7 +36,7 @@ def control_figure(control: Control) -> Figure:
         add_letters(panels)
         time = control.dataset["time"].values
         target, around = control.task.target(time, float(np.sign(control.speed)))
-        scale = Scale.of(_path_of(control).true, "m")
+        scale = UnitPrefix.of(_path_of(control).true, "m")
         _places(panels[0], control, scale, target, around)
         _residuals(panels[1], control, target, around)
         _commands(panels[2], control)
@@ -104,7 +98,7 @@ def _path_of(control: Control) -> _Path:
     return _Path(np.hypot(*data["position"].values[:, 1:].T), seen, estimated, "distance from the axis")
 
 
-def _places(axes: Axes, control: Control, scale: Scale, target: Samples, around: float) -> None:
+def _places(axes: Axes, control: Control, scale: UnitPrefix, target: Samples, around: float) -> None:
     data, path = control.dataset, _path_of(control)
     time = data["time"].values
     every = max(1, data.sizes["frame_time"] // _MOST_SEEN)
@@ -119,7 +113,7 @@ def _places(axes: Axes, control: Control, scale: Scale, target: Samples, around:
 def _residuals(axes: Axes, control: Control, target: Samples, around: float) -> None:
     data, path = control.dataset, _path_of(control)
     time = data["time"].values
-    scale = Scale.of(np.array([4.0 * around]), "m")
+    scale = UnitPrefix.of(np.array([4.0 * around]), "m")
     rest = path.true - target
     axes.plot(time, scale(rest), color=COLOURS["black"])
     if path.estimated is not None:

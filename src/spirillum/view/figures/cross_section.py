@@ -11,12 +11,10 @@ from matplotlib.patches import Circle, Polygon
 from spirillum.arrays import Samples
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
-from spirillum.view.figures.style import COLOURS, Scale
+from spirillum.view.figures.style import COLOURS, UnitPrefix
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["draw_cross_section", "silhouette"]
 
 _RIM, _FILL, _EDGE = "#5d7486", "#dfe3e6", "#4a5258"
 _ROOM = 1.06
@@ -56,7 +54,7 @@ def draw_cross_section(axes: Axes, dataset: xr.Dataset, robot: Robot, path: Samp
     """
     assert robot.channel is not None  # noqa: S101 - the caller's promise
     radius = 0.5 * robot.channel.diameter
-    lengths = Scale.of(np.array([radius]), "m")
+    lengths = UnitPrefix.of(np.array([radius]), "m")
     attitude = np.asarray(dataset["attitude"].transpose("time", ...).values, dtype=float)
     whole = np.flatnonzero(np.isfinite(path).all(axis=1) & np.isfinite(attitude).all(axis=1))
     outlines = [lengths(silhouette(robot, path[row], attitude[row])) for row in whole[[0, -1]]]

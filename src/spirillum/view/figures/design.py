@@ -12,13 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
-from spirillum.designs.answer import Design, Profile
+from spirillum.designs.design_result import Design, ObjectiveProfile
 from spirillum.designs.evaluation import Objective
 from spirillum.units import display_unit, in_unit
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, PATCH, Scale, plain, styled
-
-__all__ = ["design_figure"]
+from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, PATCH, UnitPrefix, plain, styled
 
 _REFUSED = "#dddddd"
 _SHADE = 0.2
@@ -32,9 +30,6 @@ def design_figure(design: Design) -> Figure:
     """Panels: with two objectives their front; with two fields the landscape; the objective along every field.
 
     One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
-
-    Args:
-        design: what `spirillum.design` returns.
     """
     count = len(design.profiles) + (design.front is not None) + (design.landscape is not None)
     columns = min(count, 2)
@@ -105,7 +100,7 @@ def _objective(objective: Objective, values: Samples) -> tuple[Samples, str]:
     """Values as people read them, and the label of their axis."""
     if objective.unit == "1":
         return values, objective.name.replace("_", " ")
-    scale = Scale.of(values[np.isfinite(values)], objective.unit)
+    scale = UnitPrefix.of(values[np.isfinite(values)], objective.unit)
     return np.asarray(scale(values)), f"{objective.name.replace('_', ' ')} ({scale.unit})"
 
 
@@ -117,7 +112,7 @@ def _field(values: Samples, unit: str) -> tuple[Samples, str]:
     return values * factor, shown
 
 
-def _profile(axes: Axes, design: Design, profile: Profile) -> None:
+def _profile(axes: Axes, design: Design, profile: ObjectiveProfile) -> None:
     values, unit = _field(profile.values, profile.unit)
     objective, label = _objective(design.objectives[0], profile.objective)
     best, _ = _field(np.array([design.values[profile.path], profile.low, profile.high]), profile.unit)

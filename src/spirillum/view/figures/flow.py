@@ -19,14 +19,12 @@ from spirillum.units import Hz
 from spirillum.view.figures.scene import HALO
 from spirillum.view.figures.section import draw_glass, draw_section
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from spirillum.fields.flow import Flow
-
-__all__ = ["flow_figure"]
 
 _BESIDE, _STRIP = 1.45, 1.1
 """Typical room beside a panel for its labels and colour bar; height of the pressure along a tube, inches."""
@@ -52,7 +50,7 @@ class _View:
     """Vertical axis."""
     across: str
     """Axis across the plane."""
-    lengths: Scale
+    lengths: UnitPrefix
     x: Values
     y: Values
     solid: Values
@@ -61,7 +59,7 @@ class _View:
     def of(cls, plane: xr.Dataset) -> _View:
         first, second = (str(name) for name in plane["inside"].dims)
         x, y = (np.asarray(plane[name].values, dtype=float) for name in (first, second))
-        lengths = Scale.of(np.array([0.1 * max(np.ptp(x), np.ptp(y))]), "m")  # mm for a robot of 10 cm
+        lengths = UnitPrefix.of(np.array([0.1 * max(np.ptp(x), np.ptp(y))]), "m")  # mm for a robot of 10 cm
         across = next(axis for axis in "xyz" if axis not in (first, second))
         solid = np.asarray(plane["inside"].values, dtype=bool).T
         return cls(plane, first, second, across, lengths, lengths(x), lengths(y), solid)
@@ -96,10 +94,6 @@ def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
     """Two panels to scale: speed (logarithmic colours) with streamlines, and pressure (colours about zero).
 
     In a tube a plane along it gets a third one: the pressure at the glass that the robot does not lie on.
-
-    Args:
-        flow: what `spirillum.flow` returns.
-        plane: what its `plane` returns.
     """
     view = _View.of(plane)
     strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
@@ -177,7 +171,7 @@ def _draw_colours(axes: Axes, view: _View, values: Values, colours: str, norm: N
 def _draw_speed(axes: Axes, view: _View) -> None:
     speed = np.sqrt(sum(view.values(f"velocity_{axis}") ** 2 for axis in "xyz"))
     known = speed[np.isfinite(speed)]
-    scale = Scale.of(known, "m/s")
+    scale = UnitPrefix.of(known, "m/s")
     highest = float(known.max()) / scale.factor if known.size and known.max() > 0 else 1.0
     lowest = float(known.min()) / scale.factor if known.size else 0.0
     floor = min(max(lowest, highest * 10.0**-_SPEED_DECADES), 0.5 * highest)
@@ -192,7 +186,7 @@ def _draw_pressure(axes: Axes, view: _View) -> None:
     pressure = view.values("pressure")
     known = np.abs(pressure[np.isfinite(pressure)])
     highest = float(known.max()) if known.size and known.max() > 0 else 1.0
-    scale = Scale.of(np.array([highest]), "Pa")
+    scale = UnitPrefix.of(np.array([highest]), "Pa")
     limit = highest / scale.factor
     threshold = limit * 10.0**-_PRESSURE_DECADES
     # It peaks at the wire: on a linear scale the body's pressure would have no colour.
@@ -276,7 +270,7 @@ def _at_glass(view: _View) -> tuple[Values, Values]:
 def _draw_strip(axes: Axes, view: _View) -> None:
     """The pressure along the tube."""
     x, pressure = _at_glass(view)
-    scale = Scale.of(pressure, "Pa")
+    scale = UnitPrefix.of(pressure, "Pa")
     axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)
     axes.axhline(0.0, color="#888888", linewidth=0.6)
     axes.set_xlim(view.x[0], view.x[-1])
@@ -292,7 +286,7 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     plane = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
     where = f"{plane}, origin at the body's middle"
     yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
-    speed = Scale.of(np.array([motion.forward_velocity]), "m/s")
+    speed = UnitPrefix.of(np.array([motion.forward_velocity]), "m/s")
     yield (
         f"$U_x$ = {motion.forward_velocity / speed.factor:.4g} {speed.unit}, "
         f"tail {motion.tail_rotation_rate / Hz:.4g} Hz, body {motion.body_rotation_rate / Hz:.4g} Hz"
@@ -301,11 +295,11 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
         yield ", ".join(_place(flow, unit))
 
 
-def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
+def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
     """Where in its tube the robot lies, and what the fluid is made to do."""
     placement, motion = flow.prediction.placement, flow.prediction
     film = placement["gap"]["value"]
-    own = Scale.of(np.array([film - flow.lifted]), "m")
+    own = UnitPrefix.of(np.array([film - flow.lifted]), "m")
     in_run = f" (in the run {(film - flow.lifted) / own.factor:.4g} {own.unit})" if flow.lifted > 0.0 else ""
     yield f"gap {film / lengths.factor:.4g} {lengths.unit}{in_run}"
     if flow.seat is not None and flow.seat.pitch:
@@ -314,7 +308,7 @@ def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
         yield f"yaw {np.degrees(flow.seat.yaw):.4g}°"
     if "tail_drop" in placement:
         yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
-    mean = Scale.of(np.array([motion.plug_velocity]), "m/s")
+    mean = UnitPrefix.of(np.array([motion.plug_velocity]), "m/s")
     through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
     if motion.motion == "free":  # a moment of a run, which tells how its ends and an imposed flow drive the fluid
         yield f"mean flow {through}"
@@ -336,7 +330,7 @@ def _notes(flow: Flow, view: _View) -> Iterator[str]:
     yield f"Lines: {lines}; {', '.join(drawn)}."
     held = ""
     if flow.held_force > 0:
-        force = Scale.of(np.array([flow.held_force]), "N")
+        force = UnitPrefix.of(np.array([flow.held_force]), "N")
         words = "Weight and contact push it sideways with" if flow.prediction.motion == "free" else _HELD
         held = f" {words} {flow.held_force / force.factor:.2g} {force.unit}."
     walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."

@@ -16,12 +16,10 @@ from spirillum.quantities import unit_of
 from spirillum.studies.ranking import StudyRanking, robot_dims
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["laid_down_picture"]
 
 _SHOWN = {
     "forward_velocity": "speed",
@@ -35,12 +33,7 @@ _MOST = 4
 
 
 def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
-    """Every reading of every run over the median of its robot; None where no robot was laid down.
-
-    Args:
-        dataset: what `spirillum.study` returns.
-        ranking: of its robots.
-    """
+    """Every reading of every run over the median of its robot; None where no robot was laid down."""
     if "forward_velocity_at_run" not in dataset:
         return None
     there = _readings(dataset, "forward_velocity")
@@ -105,7 +98,7 @@ def _draw_row(axes: Axes, row: int, values: Values, touching: np.ndarray, unit: 
         axes.plot(
             values[chosen] / middle, places, marker, color=COLOURS[colour], markerfacecolor="none", markersize=3.5
         )
-    scale = Scale.of(values[known], unit)
+    scale = UnitPrefix.of(values[known], unit)
     low, high = (end / scale.factor for end in (values[known].min(), values[known].max()))
     axes.text(
         1.01, row, f"{low:.3g} to {high:.3g} {scale.unit}", transform=axes.get_yaxis_transform(), va="center", size=8

@@ -12,12 +12,10 @@ from matplotlib.lines import Line2D
 from spirillum.arrays import Samples
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["magnetic_figure"]
 
 _HELD: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
 _STEP_OUT: dict[str, Any] = {"color": "#999999", "linewidth": 0.8}
@@ -25,14 +23,10 @@ _POINTS: dict[str, Any] = {"marker": "o", "markersize": 3.5, "linewidth": 1.2}
 
 
 def magnetic_figure(dataset: xr.Dataset) -> Figure:
-    """Four panels over the rate of the field.
-
-    Args:
-        dataset: what `spirillum.magnetic_sweep` returns.
-    """
+    """Four panels over the rate of the field."""
     rate = dataset["field_rate"].values / Hz
     speed = dataset["forward_velocity"].values
-    speeds = Scale.of(np.concatenate([speed, dataset["held_forward_velocity"].values]), "m/s")
+    speeds = UnitPrefix.of(np.concatenate([speed, dataset["held_forward_velocity"].values]), "m/s")
     with styled():
         sheet = Sheet(
             f"{plain(dataset.attrs['robot'])} in a rotating field",

@@ -16,12 +16,10 @@ from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.quantities import unit_of
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, new_figure, plain
 
 if TYPE_CHECKING:
     from spirillum.measurement.measure import Measurement
-
-__all__ = ["measurement_figures", "trial_figure", "trials_figure"]
 
 _MOST_POINTS = 4000
 _LEFT_OUT = "#999999"
@@ -95,7 +93,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
         left.set_ylabel(words)
         return
     values = values - values[known][0]
-    scale = Scale.of(values, "m") if unit == "m" else Scale(2 * np.pi, "turns")
+    scale = UnitPrefix.of(values, "m") if unit == "m" else UnitPrefix(2 * np.pi, "turns")
     few = slice(None, None, max(1, time.size // _MOST_POINTS))
     out = _left_out(values, rate)
     for shown, colour in ((~out, COLOURS["sky"]), (out, _LEFT_OUT)):
@@ -109,7 +107,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     if not np.isfinite(rate.low):  # a line through two readings leaves nothing but rounding
         right.text(0.5, 0.5, "two readings", transform=right.transAxes, ha="center", color="#777777")
         return
-    small = Scale.of(rate.residual, "m" if unit == "m" else "rad")
+    small = UnitPrefix.of(rate.residual, "m" if unit == "m" else "rad")
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
     right.set_ylabel(f"residual, {small.unit}")
@@ -137,7 +135,7 @@ def trials_figure(measurement: Measurement) -> Figure:
     for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
         items = [trial.quantities[name] for trial in measurement.trials]
         values = np.array([item.value for item in items])
-        scale = Scale.of(values, unit_of(name))
+        scale = UnitPrefix.of(values, unit_of(name))
         at = np.arange(1.0, len(items) + 1.0)
         mean = measurement.summary.quantities[name]
         if np.isfinite(mean.low):

@@ -9,8 +9,6 @@ from matplotlib.figure import Figure
 
 from spirillum.view.figures.style import readable, styled
 
-__all__ = ["Picture"]
-
 
 @dataclass(frozen=True)
 class Picture:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.controllers.control import Control
-from spirillum.designs.answer import Design
+from spirillum.designs.design_result import Design
 from spirillum.dynamics.settling import Settling
 from spirillum.errors import InputError
 from spirillum.fields.flow import Flow
@@ -40,8 +40,6 @@ from spirillum.view.figures.trajectory import trajectory_figure
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Plot", "plot"]
 
 
 @dataclass(frozen=True)
@@ -93,11 +91,7 @@ def plot(answer: Any) -> Plot:
 
 
 def _of_measurement(answer: Measurement) -> Figure:
-    """The first figure of a measurement.
-
-    Raises:
-        InputError: if it has no trial.
-    """
+    """The first figure of a measurement."""
     for picture in measurement_figures(answer).values():
         return picture.figure()
     raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")

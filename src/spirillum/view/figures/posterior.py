@@ -13,15 +13,13 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.calibration.least_squares import FEWEST_LEFT
-from spirillum.shown import percent
+from spirillum.display import percent
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, look_of_model, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.identifiability import LikelihoodProfile
-
-__all__ = ["posterior_figure", "profile_figure"]
 
 _MOST = 6
 """Numbers of the figure: more would leave no room for a pair's contours."""
@@ -75,16 +73,16 @@ def posterior_figure(found: Calibrated) -> Figure:
         return sheet.finished()
 
 
-def _scales(found: Calibrated, values: Mapping[str, Samples]) -> dict[str, Scale]:
+def _scales(found: Calibrated, values: Mapping[str, Samples]) -> dict[str, UnitPrefix]:
     """Units of numbers by their labels; that of a discrepancy or a factor is empty."""
     units = {item.label: item.parameter.unit for item in found.problem.coordinates}
     return {
-        label: Scale.of(np.abs(column), units[label]) if units.get(label) else Scale(1.0, "")
+        label: UnitPrefix.of(np.abs(column), units[label]) if units.get(label) else UnitPrefix(1.0, "")
         for label, column in values.items()
     }
 
 
-def _unit(scale: Scale, between: str) -> str:
+def _unit(scale: UnitPrefix, between: str) -> str:
     """A unit in brackets behind a name; nothing for a plain number."""
     return f"{between}({scale.unit})" if scale.unit else ""
 

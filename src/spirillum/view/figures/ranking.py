@@ -12,9 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from spirillum.arrays import Values
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain, told_apart
-
-__all__ = ["ranking_picture"]
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, new_figure, plain, told_apart
 
 MOST = 12
 """Robots in the figure."""
@@ -27,11 +25,7 @@ _NO_WALLS = "The channel's walls are not computed"
 
 
 def ranking_picture(ranking: StudyRanking) -> Picture:
-    """The headline figure: speed, efficiency and current of the fastest robots, with their bands.
-
-    Args:
-        ranking: of at least one robot.
-    """
+    """The headline figure: speed, efficiency and current of the fastest robots, with their bands."""
     count = len(ranking.robots)
     which = f"The {min(MOST, count)} fastest of {count} robots" if count > MOST else f"All {count} robots"
     lines = f" Lines: {ENDS[ranking.kind]}." if ranking.kind else ""
@@ -91,14 +85,14 @@ def _column(
         panel.spines[side].set_visible(False)
 
 
-def _scale(values: Values, unit: str) -> Scale:
+def _scale(values: Values, unit: str) -> UnitPrefix:
     """A unit that makes ticks short: shares below a hundredth as powers of ten."""
     largest = float(np.nanmax(np.abs(values)))
     if unit != "1" or largest >= 0.01 or largest == 0.0:
-        scale = Scale.of(values, unit)
-        return Scale(1e-3, "mA") if scale.unit == "A" and largest < 1.0 else scale
+        scale = UnitPrefix.of(values, unit)
+        return UnitPrefix(1e-3, "mA") if scale.unit == "A" and largest < 1.0 else scale
     power = int(np.floor(np.log10(largest)))
-    return Scale(10.0**power, f"$10^{{{power}}}$")
+    return UnitPrefix(10.0**power, f"$10^{{{power}}}$")
 
 
 def _of(robots: tuple[RankedRobot, ...], which: str, name: str) -> Values:

@@ -14,22 +14,7 @@ from matplotlib.lines import Line2D
 from spirillum.arrays import Values
 from spirillum.units import Hz
 from spirillum.view.figures.study_view import StudyView, spread
-from spirillum.view.figures.style import COLOURS, PATCH, Look, Scale, label_of_model, look_of_model
-
-__all__ = [
-    "HOLLOW",
-    "Row",
-    "amplitude_handles",
-    "band_handles",
-    "bound_row",
-    "draw_band",
-    "draw_curve",
-    "draw_means",
-    "grid_rows",
-    "model_handles",
-    "robot_rows",
-    "settled_handles",
-]
+from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, label_of_model, look_of_model
 
 MOST_CURVES = 6
 """Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
@@ -58,7 +43,7 @@ Draw = Callable[[Axes, StudyView, Values], None]
 
 
 @dataclass(frozen=True)
-class Row:
+class PanelRow:
     """A row of panels that share their vertical axis."""
 
     label: str
@@ -73,7 +58,7 @@ class Row:
     """What a reader has to know, a sentence for the note below the figure."""
 
 
-def grid_rows(shown: StudyView) -> list[Row]:
+def grid_rows(shown: StudyView) -> list[PanelRow]:
     """The three rows of the paper's Figs 5 and 6, as far as the study can draw them."""
     if shown.observed:
         return _observed_rows(shown)
@@ -83,7 +68,7 @@ def grid_rows(shown: StudyView) -> list[Row]:
     return rows
 
 
-def robot_rows(shown: StudyView) -> list[Row]:
+def robot_rows(shown: StudyView) -> list[PanelRow]:
     """The rows for a list of robots."""
     if shown.observed:
         return _observed_rows(shown)
@@ -110,9 +95,9 @@ def draw_curve(
     )
 
 
-def _advance_row(shown: StudyView) -> Row:
+def _advance_row(shown: StudyView) -> PanelRow:
     everything = StudyView.of(shown.whole)
-    scale = Scale.of(np.stack([everything.advance_per_turn(model) for model in shown.models]), "m/turn")
+    scale = UnitPrefix.of(np.stack([everything.advance_per_turn(model) for model in shown.models]), "m/turn")
 
     def draw(axes: Axes, part: StudyView, x: Values) -> None:
         for model in part.models:
@@ -120,7 +105,7 @@ def _advance_row(shown: StudyView) -> Row:
             draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
             draw_curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
 
-    return Row(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
+    return PanelRow(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
 
 
 def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
@@ -133,7 +118,7 @@ def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, j
     axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=_SHADE, linewidth=4.0, zorder=2)
 
 
-def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: Scale) -> None:
+def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: UnitPrefix) -> None:
     for model in part.models:
         low, high = part.band(name, model)
         draw_band(axes, x, scale(low), scale(high), look_of_model(model), joined=part.grid)
@@ -142,17 +127,17 @@ def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: Scale) 
             draw_curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
 
 
-def _own_rate_row(shown: StudyView) -> Row:
-    hertz = Scale(Hz, "Hz")
+def _own_rate_row(shown: StudyView) -> PanelRow:
+    hertz = UnitPrefix(Hz, "Hz")
 
     def draw(axes: Axes, part: StudyView, x: Values) -> None:
         _own_drive(axes, part, x, "motor_rotation_rate", hertz)
 
     what = f"motor rate\n{shown.bound_words} " if shown.shaded else f"motor rate, {shown.bound_words}\n"
-    return Row(f"{what}$\\omega_m$ (Hz)", draw, tells=shown.bound_sentence("Motor rates"))
+    return PanelRow(f"{what}$\\omega_m$ (Hz)", draw, tells=shown.bound_sentence("Motor rates"))
 
 
-def bound_row(shown: StudyView) -> Row:
+def bound_row(shown: StudyView) -> PanelRow:
     """Forward velocity with what friction is known to be there, held, and in steady motion where robots were let go."""
     labels = {"friction": list(shown.own_drive_readings)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
@@ -166,7 +151,7 @@ def bound_row(shown: StudyView) -> Row:
             axes.plot(x, scale(part.values("forward_velocity_settled")), **_SETTLED)
 
     tells = f"{shown.bound_sentence('Speeds')} {_SETTLED_WORDS if shown.settled else ''}".strip()
-    return Row(f"forward velocity\n{shown.bound_words} $U_x$ ({scale.unit})", draw, tells=tells)
+    return PanelRow(f"forward velocity\n{shown.bound_words} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
 def drawn_amplitudes(shown: StudyView) -> list[int]:
@@ -180,7 +165,7 @@ def _amplitude_look(number: int, count: int) -> tuple[str, str]:
     return mpl.colors.to_hex(colour), _AMPLITUDE_MARKERS[number % len(_AMPLITUDE_MARKERS)]
 
 
-def _assumed_friction_row(shown: StudyView) -> Row:
+def _assumed_friction_row(shown: StudyView) -> PanelRow:
     places = drawn_amplitudes(shown)
     name = "effective_friction_at_assumed_rate"
 
@@ -213,19 +198,11 @@ def _assumed_friction_row(shown: StudyView) -> Row:
     left = shown.whole.sizes["amplitude"] - len(places)
     if left:
         tells = f"{tells} Drawn are {len(places)} of {len(places) + left} amplitudes."
-    return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
+    return PanelRow("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
 def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool = False) -> None:
-    """Observed means with their 95 % intervals; a mean without an interval stands alone.
-
-    Args:
-        axes: where.
-        x: places along the axis.
-        y: means.
-        half: half widths of their intervals.
-        hollow: whether what lies below the marker is seen through it.
-    """
+    """Observed means with their 95 % intervals; a mean without an interval stands alone."""
     seen = np.isfinite(y)
     axes.errorbar(
         x[seen],
@@ -241,7 +218,7 @@ def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool =
     )
 
 
-def _observed_rows(shown: StudyView) -> list[Row]:
+def _observed_rows(shown: StudyView) -> list[PanelRow]:
     reading = shown.at_rate_reading
     speed = shown.scale("m/s", "observed_forward_velocity", "forward_velocity_at_observed_rate", friction=[reading])
     inferring = [name for name in ("rotor", "paper") if name in shown.readings]
@@ -261,10 +238,10 @@ def _observed_rows(shown: StudyView) -> list[Row]:
         draw_means(axes, x, seen / Hz, half / Hz)
 
     rows = [
-        Row(
+        PanelRow(
             f"forward velocity\n$U_x$ ({speed.unit})", velocity, tells="Models run at the observed rates, tail by tail."
         ),
-        Row(
+        PanelRow(
             "motor rate\n$\\omega_m$ (Hz)",
             rate,
             tells="Where tail and body alone were observed, the motor rate is their difference, trial by trial; "
@@ -276,7 +253,7 @@ def _observed_rows(shown: StudyView) -> list[Row]:
     return rows
 
 
-def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> Row:
+def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelRow:
     name = "effective_friction_at_observed_rate"
     scale = shown.scale("N m s/rad", name, friction=list(inferring))
 
@@ -288,16 +265,11 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> Row:
 
     words = ", rings: ".join(f"'{reading}'" for reading in inferring)
     tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction reading of filled marks: {words}."
-    return Row(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
+    return PanelRow(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
 
 
 def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
-    """Legend entries for models, readings and observations.
-
-    Args:
-        shown: the study.
-        own_drive: whether filled and hollow marks tell the readings of free swimming apart.
-    """
+    """Legend entries for models, readings and observations."""
     readings = _reading_entries(shown) if own_drive else ()
     return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
 
@@ -344,7 +316,7 @@ def amplitude_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
     places = drawn_amplitudes(shown)
     amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)
-    scale = Scale.of(amplitudes, "m")
+    scale = UnitPrefix.of(amplitudes, "m")
     entries = []
     for number, place in enumerate(places):
         colour, marker = _amplitude_look(number, len(places))

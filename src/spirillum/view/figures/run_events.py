@@ -15,8 +15,6 @@ from spirillum.view.figures.style import plain
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["event_words", "events_of", "mark_events"]
-
 _MOST_EVENTS = 12
 """Events that are named."""
 _WIDE = (0.04, 0.08)

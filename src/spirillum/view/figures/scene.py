@@ -13,9 +13,7 @@ from matplotlib.patheffects import withStroke
 from spirillum.arrays import Values
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.solids import crests
-from spirillum.view.figures.style import PAGE, Scale
-
-__all__ = ["FAINT", "HALO", "INK", "PHASE", "Scene", "dimension_line", "label", "length_words", "thin_line"]
+from spirillum.view.figures.style import PAGE, UnitPrefix
 
 PHASE = 0.35 * np.pi
 """Phase of the tail in the picture, rad."""
@@ -26,11 +24,11 @@ HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)
 
 
 @dataclass(frozen=True)
-class Scene:
+class DrawingLayout:
     """Places of everything, in the drawing's unit; the motor axis lies at z = 0."""
 
     robot: Robot
-    scale: Scale
+    scale: UnitPrefix
     total: float
     """Length of the robot, or twice its height if that is more: the measure of margins and text."""
     nose: float
@@ -47,10 +45,10 @@ class Scene:
     """Thickness with which walls are drawn; the true one is unknown."""
 
     @classmethod
-    def of(cls, robot: Robot) -> Scene:
+    def of(cls, robot: Robot) -> DrawingLayout:
         """The scene of a robot."""
         length = robot.body.length + robot.coupling.length + robot.tail.length
-        scale = Scale.of(np.array([length]), "m")
+        scale = UnitPrefix.of(np.array([length]), "m")
         total, nose = length / scale.factor, 0.5 * robot.body.length / scale.factor
         root = -nose - robot.coupling.length / scale.factor
         radius = 0.5 * robot.body.diameter / scale.factor
@@ -140,7 +138,7 @@ class Scene:
 
     def words(self, symbol: str, value: float) -> str:
         """``symbol = value unit`` of an SI length."""
-        scale = Scale.of(np.array([value]), "m")
+        scale = UnitPrefix.of(np.array([value]), "m")
         return f"${symbol}$ = {value / scale.factor:.4g} {scale.unit}"
 
 
@@ -166,5 +164,5 @@ def label(axes: Axes, x: float, z: float, text: str, **more: str | float) -> Non
 
 def length_words(value: float) -> str:
     """An SI length in a readable unit."""
-    scale = Scale.of(np.array([value]), "m")
+    scale = UnitPrefix.of(np.array([value]), "m")
     return f"{value / scale.factor:.4g} {scale.unit}"

@@ -12,9 +12,7 @@ from matplotlib.lines import Line2D
 from spirillum.dynamics.settling import Settling
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
-
-__all__ = ["settling_figure"]
+from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
 
 _SHORT = 0.2
 """Time constant over the length of the run above which the way does not reach the steady motion."""
@@ -23,11 +21,7 @@ _TILTS = {"pitch": "green", "yaw": "purple"}
 
 
 def settling_figure(settling: Settling) -> Figure:
-    """Three panels over time: gap, azimuth, pitch and yaw; dashed where the robot comes to lie.
-
-    Args:
-        settling: what `spirillum.settle` returns.
-    """
+    """Three panels over time: gap, azimuth, pitch and yaw; dashed where the robot comes to lie."""
     with styled():
         motion = settling.prediction
         sheet = Sheet(
@@ -63,7 +57,7 @@ def _notes(settling: Settling) -> list[str]:
 
 def _gap(axes: Axes, settling: Settling) -> None:
     gap = settling.way("gap")
-    lengths = Scale.of(gap, "m")
+    lengths = UnitPrefix.of(gap, "m")
     axes.semilogy(settling.way("time"), lengths(gap), color=COLOURS["blue"])
     if settling.lying.state == "steady":
         _steady(axes, float(lengths(np.array(settling.lying.gap))))

@@ -14,8 +14,6 @@ from matplotlib.text import Text
 
 from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure
 
-__all__ = ["Sheet", "add_letters", "width_of"]
-
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14
 """Typical room for the labels beside a row of panels, and between panels, inches."""
@@ -96,11 +94,7 @@ class Sheet:
             axes.tick_params(grid_color="#dddddd", grid_linewidth=0.5)
 
     def finished(self, shape: float | None = None) -> Figure:
-        """The figure, as high as its panels need; nothing moves any more.
-
-        Args:
-            shape: height over width of the panels of the first row, instead of their height.
-        """
+        """The figure, as high as its panels need; nothing moves any more."""
         beside = self.panels[:, 1:].ravel()
         for axes in beside if shape is None else ():  # one column tells the height, in a fraction of the time
             axes.set_in_layout(False)

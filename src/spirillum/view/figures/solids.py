@@ -11,8 +11,6 @@ from spirillum.arrays import Values
 from spirillum.robot.geometry import centreline
 from spirillum.robot.robot import Robot
 
-__all__ = ["Metal", "centreline_of", "crests", "draw_solid", "draw_wire", "wire_line"]
-
 Metal = tuple[str, str, str]
 """Colours of a shaded surface: shadow, middle, highlight."""
 
@@ -28,15 +26,7 @@ def _shades(colours: Metal, amount: Values) -> Values:
 
 
 def draw_solid(axes: Axes, x: Values, radius: Values, colours: Metal, *, order: float) -> None:
-    """A body of revolution about the horizontal axis, lit from above: nested shells, brighter inwards.
-
-    Args:
-        axes: where to draw, in the unit of `x`.
-        x: outline along the axis.
-        radius: outline across it.
-        colours: shadow, middle, highlight.
-        order: drawing order.
-    """
+    """A body of revolution about the horizontal axis, lit from above: nested shells, brighter inwards."""
     inward = np.linspace(0.0, 1.0, _SHELLS)
     shells = []
     for share in inward:

@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.rows import (
-    Row,
+    PanelRow,
     amplitude_handles,
     bound_row,
     grid_rows,
@@ -25,13 +25,11 @@ from spirillum.view.figures.rows import (
 )
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
-from spirillum.view.figures.style import Scale, plain, told_apart
+from spirillum.view.figures.style import UnitPrefix, plain, told_apart
 from spirillum.view.figures.tail_panels import head_column, tail_axis
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["study_figures"]
 
 PANEL = (1.72, 1.5)
 """Width and height of a panel of a grid of tails, inches."""
@@ -54,10 +52,6 @@ _DASHED = (0, (4.0, 2.0))
 
 def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> dict[str, Picture]:
     """The figures of a study by file name (lower-case letters, digits and hyphens).
-
-    Args:
-        dataset: what `spirillum.study` returns.
-        paper_figures: figures of a paper by channel, for a study that repeats it.
 
     Returns:
         For channels of a paper its figures' names, for others `channel-<name>`, with `-part1`, `-part2` where
@@ -107,7 +101,7 @@ def _channel_title(shown: StudyView, channel: int) -> str:
     diameter = np.asarray(shown.whole["channel_diameter"].values, dtype=float)[[channel]]
     if not np.isfinite(diameter[0]):
         return f"{name}: no channel"
-    scale = Scale.of(diameter, "m")
+    scale = UnitPrefix.of(diameter, "m")
     return f"{name[:1].upper()}{name[1:]} channel, $D_{{ch}}$ = {diameter[0] / scale.factor:.4g} {scale.unit}"
 
 
@@ -151,7 +145,7 @@ def _draw_channel(
     wavelengths: list[int],
     amplitudes: list[int],
     title: str,
-    rows: Sequence[Row],
+    rows: Sequence[PanelRow],
     notes: Sequence[str],
 ) -> Figure:
     sheet = Sheet(
@@ -165,7 +159,7 @@ def _draw_channel(
         legend_below=amplitude_handles(shown) if rows[-1].across == "rates" else (),
     )
     add_letters(sheet.panels.flat)
-    scale = Scale.of(np.asarray(shown.whole["amplitude"].values, dtype=float), "m")
+    scale = UnitPrefix.of(np.asarray(shown.whole["amplitude"].values, dtype=float), "m")
     for number, row in enumerate(rows):
         labelled = number == len(rows) - 1 or rows[number + 1].across != row.across
         for axes, wavelength in zip(sheet.panels[number], wavelengths, strict=True):
@@ -184,7 +178,7 @@ def _draw_channel(
     return sheet.finished()
 
 
-def _finish_row(panels: Sequence[Axes], row: Row) -> None:
+def _finish_row(panels: Sequence[Axes], row: PanelRow) -> None:
     """Vertical axis of a row: shared, from zero where everything is positive."""
     panels[0].set_ylabel(row.label)
     heights = [
@@ -273,7 +267,7 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
     add_letters(sheet.panels.flat)
     amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
-    scale = Scale.of(values, "m")
+    scale = UnitPrefix.of(values, "m")
     x = scale(values[amplitudes])
     row = bound_row(shown)
     for number, channel in enumerate(channels):
@@ -290,14 +284,14 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
             speed = shown.paper_speed(channel)
             if speed is not None:
                 axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)
-        _finish_row(sheet.panels[number], Row(f"{name}\n{shown.bound_words} $U_x$ ({speed_scale.unit})", row.draw))
+        _finish_row(sheet.panels[number], PanelRow(f"{name}\n{shown.bound_words} $U_x$ ({speed_scale.unit})", row.draw))
     ends = [sheet.panels[number][0].get_ylim() for number in range(len(channels))]
     for number in range(len(channels)):  # one scale for all rows, which are there to be compared
         sheet.panels[number][0].set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     return sheet.finished()
 
 
-def _paper_entry(shown: StudyView, channels: Sequence[int], scale: Scale) -> list[Line2D]:
+def _paper_entry(shown: StudyView, channels: Sequence[int], scale: UnitPrefix) -> list[Line2D]:
     """Legend entry of the speeds behind the paper's largest Reynolds numbers."""
     found = {channel: shown.paper_speed(channel) for channel in channels}
     words = [
@@ -327,7 +321,9 @@ def _robots_picture(shown: StudyView) -> Picture:
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
 
 
-def _draw_robots(shown: StudyView, places: list[int], title: str, rows: Sequence[Row], notes: Sequence[str]) -> Figure:
+def _draw_robots(
+    shown: StudyView, places: list[int], title: str, rows: Sequence[PanelRow], notes: Sequence[str]
+) -> Figure:
     names = told_apart([str(name) for name in shown.whole["robot"].values[places]], 28)
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)

@@ -15,12 +15,10 @@ from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.studies.band import reference_place
 from spirillum.units import Hz
-from spirillum.view.figures.style import Scale, plain
+from spirillum.view.figures.style import UnitPrefix, plain
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["NOTHING_MEASURED", "PaperFigure", "StudyView", "spread"]
 
 NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
 
@@ -121,11 +119,7 @@ class StudyView:
         return "no contact friction" if self.shaded else "upper bound"
 
     def bound_sentence(self, what: str) -> str:
-        """What values under the robots' own drive bound, for a note; empty where they bound nothing.
-
-        Args:
-            what: the quantity in the plural, with a capital.
-        """
+        """What values under the robots' own drive bound, for a note; empty where they bound nothing."""
         if not self.upper_bound:
             return ""
         if not self.shaded:
@@ -177,7 +171,7 @@ class StudyView:
         found: Values = np.asarray(self.dataset[name].sel(labels).values, dtype=float)
         return found
 
-    def scale(self, unit: str, *names: str, **labels: str | list[str]) -> Scale:
+    def scale(self, unit: str, *names: str, **labels: str | list[str]) -> UnitPrefix:
         """One scale for some quantities all over the study."""
         everything = [
             np.asarray(
@@ -186,7 +180,7 @@ class StudyView:
             for name in names
             if name in self.whole
         ]
-        return Scale.of(np.concatenate([np.ravel(item) for item in everything]), unit)
+        return UnitPrefix.of(np.concatenate([np.ravel(item) for item in everything]), unit)
 
     def advance_per_turn(self, model: str) -> Values:
         """Forward velocity over the tail's rate, m/turn; without friction, where readings differ."""

@@ -22,26 +22,6 @@ from spirillum.arrays import Values
 from spirillum.files import MARK, whole_file
 from spirillum.units import for_people, shown_in
 
-__all__ = [
-    "COLOURS",
-    "COLUMN",
-    "DPI",
-    "PAGE",
-    "PATCH",
-    "Look",
-    "Scale",
-    "label_of_model",
-    "lay_out",
-    "look_of_model",
-    "new_figure",
-    "plain",
-    "readable",
-    "save",
-    "save_as",
-    "styled",
-    "told_apart",
-]
-
 COLOURS = {
     "black": "#000000",
     "orange": "#E69F00",
@@ -139,7 +119,7 @@ def label_of_model(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Scale:
+class UnitPrefix:
     """A unit with a prefix that makes a set of values readable."""
 
     factor: float
@@ -147,7 +127,7 @@ class Scale:
     unit: str
 
     @classmethod
-    def of(cls, values: Values, unit: str) -> Scale:
+    def of(cls, values: Values, unit: str) -> UnitPrefix:
         """Unit for SI `values` of an SI `unit`, with a prefix by which the largest is between 0.1 and 100, if possible.
 
         Rates are shown in Hz, angles in degrees, shares as they are: none of them with a prefix.
@@ -232,10 +212,6 @@ def _spelled(formula: str) -> str:
 def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
     """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all.
 
-    Args:
-        figure: the figure.
-        path_without_suffix: folder and name; the suffixes are added.
-
     Returns:
         Paths of PNG and SVG.
     """
@@ -250,12 +226,7 @@ def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
 
 
 def save_as(figure: Figure, path: Path) -> None:
-    """Write one picture whole or not at all, without dates: PNG (200 dpi), PDF or SVG (text as paths).
-
-    Args:
-        figure: the figure.
-        path: the file; its suffix is `.png`, `.pdf` or `.svg`.
-    """
+    """Write one picture whole or not at all, without dates: PNG (200 dpi), PDF or SVG (text as paths)."""
     kind = path.suffix.removeprefix(".")
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
         figure.set_layout_engine(None)  # else everything is laid out once more before it is drawn

@@ -8,15 +8,13 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.view.figures.study_view import StudyView
-from spirillum.view.figures.style import Scale
-
-__all__ = ["head_column", "tail_axis"]
+from spirillum.view.figures.style import UnitPrefix
 
 
 def head_column(axes: Axes, shown: StudyView, wavelength: int) -> None:
     """Head a column of panels with its wavelength, by its place in the study."""
     values = np.asarray(shown.whole["wavelength"].values, dtype=float)
-    scale = Scale.of(values, "m")
+    scale = UnitPrefix.of(values, "m")
     axes.set_title(f"$\\lambda$ = {values[wavelength] / scale.factor:.4g} {scale.unit}", loc="center", pad=3)
 
 

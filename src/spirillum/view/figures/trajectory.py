@@ -22,12 +22,10 @@ from spirillum.robot.robot import Robot
 from spirillum.view.figures.cross_section import draw_cross_section
 from spirillum.view.figures.run_events import event_words, events_of, mark_events
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["COLUMNS", "check_column", "trajectory_figure"]
 
 COLUMNS = {"single": COLUMN, "double": PAGE}
 """Widths of a figure that fills one or both columns of a page, inches."""
@@ -133,16 +131,7 @@ _LINE_OF: dict[str, Any] = {
 
 
 def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
-    """A run in time. Panels without data are left out; events are numbered on the time axes and named below.
-
-    Args:
-        dataset: what `spirillum.simulate` returns: a free run, one in a tube, a magnetic one, or an axial one.
-        column: `single` or `double`: width of the figure, see `COLUMNS`.
-
-    Raises:
-        InputError: for an unknown column, or a run with less than two samples of time or no variable that a panel
-            shows.
-    """
+    """A run in time. Panels without data are left out; events are numbered on the time axes and named below."""
     check_column(column)
     time = _time_of(dataset)
     path = _path_of(dataset, time)
@@ -192,11 +181,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
 
 
 def check_column(column: str) -> None:
-    """Refuse a width that no page has.
-
-    Raises:
-        InputError: for an unknown column.
-    """
+    """Refuse a width that no page has."""
     if column not in COLUMNS:
         raise InputError(f"column = {str(column)[:40]!r}; allowed: {', '.join(COLUMNS)}")
 
@@ -290,7 +275,7 @@ def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> list[tuple[str,
 
 
 def _draw_path(axes: Axes, path: Samples, across: int, name: str) -> None:
-    lengths = Scale.of(np.ptp(path[np.isfinite(path).all(axis=1)], axis=0), "m")
+    lengths = UnitPrefix.of(np.ptp(path[np.isfinite(path).all(axis=1)], axis=0), "m")
     x, y = lengths(path[:, 0]), lengths(path[:, across])
     axes.plot(x, y, color=COLOURS["blue"])
     axes.plot(x[:1], y[:1], marker="o", color="white", markeredgecolor=COLOURS["blue"], linestyle="none")
@@ -317,7 +302,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
     """
     lines = _lines(dataset, panel, time)
     values = np.concatenate([line for _, line in lines])
-    scale = Scale.of(values, unit_of(panel.lines[0][0]))
+    scale = UnitPrefix.of(values, unit_of(panel.lines[0][0]))
     film = panel.film and bool(np.all(values[np.isfinite(values)] > 0))
     largest = [float(np.nanmax(np.abs(line))) for _, line in lines]
     steep = panel.logarithmic and min(largest) > 0 and max(largest) > _SPREAD * min(largest)
@@ -358,7 +343,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
         _make_room(axes, -(-len(lines) // columns) * (1.0 if beside > 1 else 2.0))
 
 
-def _draw_film(axes: Axes, dataset: xr.Dataset, values: Samples, scale: Scale) -> None:
+def _draw_film(axes: Axes, dataset: xr.Dataset, values: Samples, scale: UnitPrefix) -> None:
     """A logarithmic axis for gaps, with the height of the asperities: below it they carry."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     roughness = float(dataset.attrs.get("roughness", np.nan))

@@ -11,8 +11,6 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 
-__all__ = ["VIEWS", "Camera", "Margins", "View", "checked_view", "fitted"]
-
 View = Literal["perspective", "side", "top", "front", "rear"]
 VIEWS: tuple[View, ...] = ("perspective", "side", "top", "front", "rear")
 """Views of a robot: all but the first are parallel projections, to scale."""
@@ -38,7 +36,7 @@ class Margins:
 
 
 @dataclass(frozen=True)
-class Camera:
+class SceneCamera:
     """A camera; lengths in m, the lab's axes."""
 
     focal: Samples
@@ -88,24 +86,20 @@ class Camera:
         ray = self.sight if self.parallel else self.focal + across - self.position
         return np.asarray(start + ray * (((point - start) @ normal) / (ray @ normal)))
 
-    def moved(self, shift: Samples) -> Camera:
+    def moved(self, shift: Samples) -> SceneCamera:
         """The camera translated by a vector, m."""
         return replace(self, focal=self.focal + shift)
 
 
 def checked_view(view: str) -> View:
-    """The view of that name.
-
-    Raises:
-        InputError: if there is none.
-    """
+    """The view of that name."""
     for name in VIEWS:
         if view == name:
             return name
     raise InputError(f"view = {str(view)[:40]!r}{did_you_mean(str(view), VIEWS)}; allowed: {', '.join(VIEWS)}")
 
 
-def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins | None = None) -> Camera:
+def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins | None = None) -> SceneCamera:
     """The camera of a view that has all points within the margins, as near as they allow.
 
     Args:
@@ -120,11 +114,13 @@ def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins 
     up = up / np.linalg.norm(up)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     reach = float(np.linalg.norm(np.ptp(points, axis=0)))
-    camera = Camera(middle, sight, up, reach / np.tan(0.5 * _FIELD_OF_VIEW), reach, view != "perspective")
+    camera = SceneCamera(middle, sight, up, reach / np.tan(0.5 * _FIELD_OF_VIEW), reach, view != "perspective")
     return _framed(camera, lambda c: c.pixels(points, size), size, margins or Margins())
 
 
-def _framed(camera: Camera, seen: Callable[[Camera], Samples], size: tuple[int, int], margins: Margins) -> Camera:
+def _framed(
+    camera: SceneCamera, seen: Callable[[SceneCamera], Samples], size: tuple[int, int], margins: Margins
+) -> SceneCamera:
     """Shift and approach until the margins are touched: a fixed-point iteration, one step without perspective."""
     width, height = size
     left, right = margins.side * width, (1.0 - margins.side) * width

@@ -13,8 +13,6 @@ import numpy as np
 
 from spirillum.formats.h264 import h264_writer
 
-__all__ = ["FILMS", "Writer", "film_writer"]
-
 FILMS = {".mp4": "a film", ".gif": "a film"}
 """Endings of the films that can be written, for `output_target`."""
 _PALETTE_FRAMES = 9
@@ -29,17 +27,7 @@ class Writer(Protocol):
 
 
 def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> AbstractContextManager[Writer]:
-    """A writer for frames of one size; the file is complete when the block ends.
-
-    Args:
-        path: the file, `.mp4` or `.gif`.
-        size: width and height, even numbers.
-        fps: frames a second.
-        words: title and comment of the file.
-
-    Raises:
-        InputError: if PyAV is missing or has no encoder for H.264.
-    """
+    """A writer for frames of one size; the file is complete when the block ends."""
     if path.suffix == ".gif":
         return _gif(path, fps, words)
     return h264_writer(path, size, Fraction(fps), words, quality=_QUALITY, instead="a .gif", extra="3d")

@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.dynamics.poses import Pose, Poses, poses_of
+from spirillum.display import DisplayMixin
+from spirillum.dynamics.poses import Poses, RobotPose, poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
-from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
+from spirillum.view.figures.cross_section import silhouette
+from spirillum.view.figures.scene import FAINT, INK
+from spirillum.view.figures.style import COLOURS
+from spirillum.view.scene3d.camera import Margins, SceneCamera, View, checked_view, fitted
 from spirillum.view.scene3d.encode import FILMS, film_writer
-from spirillum.view.scene3d.inset import CrossSection
 from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 
 if TYPE_CHECKING:
@@ -28,7 +30,64 @@ if TYPE_CHECKING:
 
     from spirillum.view.scene3d.scene import DrawnRobot, Scene
 
-__all__ = ["CAMERAS", "Film", "film"]
+
+_SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
+"""Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
+_FINE = 3
+"""Pixels that are drawn for one that is shown, along each side."""
+_RIM, _ROOM = 0.93, 0.90
+"""Radius of the glass, drawn and within, over half of the square."""
+_GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
+_MOST = 600
+"""Points of the path that are drawn."""
+
+
+class CrossSection:
+    """The inset of all frames of one film: seen from the front, y to the right and z up."""
+
+    def __init__(self, size: tuple[int, int], robot: Robot, poses: Poses) -> None:
+        """Prepare the inset."""
+        from matplotlib import font_manager
+        from PIL import ImageFont
+
+        assert robot.channel is not None  # noqa: S101 - the caller's promise
+        self._robot, self._poses = robot, poses
+        self._side = max(int(_SIDE * min(size[1], 0.5625 * size[0])), 16)
+        left = int(_LEFT * size[0])
+        foot = size[1] - int(_FOOT * size[1])
+        self._box = np.s_[foot - self._side : foot, left : left + self._side]
+        self._scale = _ROOM * 0.5 * self._side * _FINE / (0.5 * robot.channel.diameter)
+        self._font = ImageFont.truetype(font_manager.findfont("DejaVu Sans"), max(int(0.085 * self._side), 6) * _FINE)
+
+    def write(self, image: np.ndarray, time: float, pose: RobotPose) -> None:
+        """Draw into a frame.
+
+        Args:
+            image: the frame.
+            time: of the run, s.
+            pose: the robot then.
+        """
+        from PIL import Image, ImageDraw
+
+        square = Image.fromarray(image[self._box]).resize((self._side * _FINE,) * 2)
+        draw = ImageDraw.Draw(square)
+        middle, rim = 0.5 * self._side * _FINE, _RIM * 0.5 * self._side * _FINE
+        draw.ellipse([middle - rim, middle - rim, middle + rim, middle + rim], fill=_WATER, outline=_GLASS, width=6)
+        body = self._pixels(silhouette(self._robot, pose.position, pose.attitude))
+        draw.polygon(body, fill=_BODY, outline=INK, width=3)
+        way = self._poses.position[self._poses.time <= time, 1:]
+        way = np.concatenate([way[:: max(way.shape[0] // _MOST, 1)], pose.position[None, 1:]])
+        draw.line(self._pixels(way), fill=COLOURS["blue"], width=5, joint="curve")
+        x, y = self._pixels(pose.position[None, 1:])[0]
+        draw.ellipse([x - 7, y - 7, x + 7, y + 7], fill=COLOURS["blue"])
+        draw.text((middle, 0.25 * middle), "front", anchor="mm", font=self._font, fill=FAINT)
+        image[self._box] = np.asarray(square.resize((self._side,) * 2, Image.Resampling.BOX))
+
+    def _pixels(self, places: Samples) -> list[tuple[float, float]]:
+        """Pixels of the fine square for y and z, m, (n, 2)."""
+        middle = 0.5 * self._side * _FINE
+        return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in places]
+
 
 CAMERAS = ("auto", "fixed", "follow")
 """Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
@@ -41,7 +100,7 @@ _LARGEST_TURN = 0.25
 
 
 @dataclass(frozen=True)
-class Film(Shown):
+class Film(DisplayMixin):
     """A film that was written."""
 
     path: Path
@@ -166,7 +225,7 @@ class _Shots:
         self._glass = glass_around(solids, float(x.min()) - beyond, float(x.max()) + beyond, middle)
         self._camera, self._rows = self._framed()
 
-    def _framed(self) -> tuple[Camera, int | None]:
+    def _framed(self) -> tuple[SceneCamera, int | None]:
         """The camera of the first frame, and the rows about the middle in which all frames have all that is drawn."""
         several = [self._poses.at(float(time)) for time in np.linspace(self._poses.time[0], self._poses.time[-1], 60)]
         glass = self._glass
@@ -205,7 +264,7 @@ class _Shots:
                     self._inset.write(image, float(time), pose)
                 yield image
 
-    def _camera_at(self, pose: Pose, first: Pose) -> Camera:
+    def _camera_at(self, pose: RobotPose, first: RobotPose) -> SceneCamera:
         if not self._follows:
             return self._camera
         return self._camera.moved((pose.position - first.position) * self._free)

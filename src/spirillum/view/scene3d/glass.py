@@ -9,8 +9,6 @@ from matplotlib.colors import to_rgb
 
 from spirillum.arrays import Samples
 
-__all__ = ["WALL", "add_glass", "ruler_steps"]
-
 WALL = 0.035
 """Thickness with which the glass is drawn, in radii: the true one is unknown."""
 _SIDES = 144

@@ -14,11 +14,9 @@ from matplotlib.patches import FancyArrowPatch
 
 from spirillum.arrays import Samples
 from spirillum.view.figures.scene import FAINT, HALO, INK, length_words
-from spirillum.view.figures.style import Scale, plain, styled
-from spirillum.view.scene3d.camera import Camera
+from spirillum.view.figures.style import UnitPrefix, plain, styled
+from spirillum.view.scene3d.camera import SceneCamera
 from spirillum.view.scene3d.glass import ruler_steps
-
-__all__ = ["Bar", "Stamp", "blended_into", "scale_bar", "words_on"]
 
 _DPI = 200
 _REFERENCE = 900.0
@@ -37,7 +35,7 @@ class Bar:
     """Pixel of its right end."""
 
 
-def scale_bar(camera: Camera, size: tuple[int, int], middle: Samples) -> Bar:
+def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Bar:
     """The bar at the lower right: in the upright plane along the robot's axis, or across it where one looks along.
 
     Args:
@@ -59,16 +57,8 @@ def scale_bar(camera: Camera, size: tuple[int, int], middle: Samples) -> Bar:
     return Bar(length, (float(start_x), float(start_y)), (float(end_x), float(end_y)))
 
 
-def words_on(size: tuple[int, int], camera: Camera, bar: Bar, title: str, lines: Sequence[str]) -> np.ndarray:
-    """(height, width, 4) the words alone, straight alpha.
-
-    Args:
-        size: width and height of the picture.
-        camera: the camera, for the axes.
-        bar: the bar of known length.
-        title: bold, upper left.
-        lines: below it.
-    """
+def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, lines: Sequence[str]) -> np.ndarray:
+    """(height, width, 4) the words alone, straight alpha."""
     with styled():
         figure, axes, unit = _canvas(size)
         left, top = 0.022 * size[0], 0.035 * size[1]
@@ -83,9 +73,6 @@ def words_on(size: tuple[int, int], camera: Camera, bar: Bar, title: str, lines:
 
 def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Words over pictures of one size; only the rows and columns that have words are touched.
-
-    Args:
-        words: what `words_on` returns.
 
     Returns:
         A function that writes the words into a picture and gives it back.
@@ -128,7 +115,7 @@ class Stamp:
 
         span = float(times[-1] - times[0])
         power = int(np.clip(np.floor(np.log10(max(span, 1e-300))), -9, 3))
-        self._scale = Scale.of(np.array([10.0**power]), "s") if span < 1.0 else Scale(1.0, "s")
+        self._scale = UnitPrefix.of(np.array([10.0**power]), "s") if span < 1.0 else UnitPrefix(1.0, "s")
         smallest = float(np.diff(times).min()) / self._scale.factor
         self._digits = int(np.clip(np.ceil(-np.log10(smallest)), 0, 3))
         self._width = len(f"{times[-1] / self._scale.factor:.{self._digits}f}")
@@ -182,7 +169,7 @@ def _draw_bar(axes: Axes, bar: Bar, unit: float, size: tuple[int, int]) -> None:
     )
 
 
-def _draw_axes(axes: Axes, camera: Camera, unit: float, size: tuple[int, int]) -> None:
+def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, int]) -> None:
     """Directions of the lab's axes; one that points along the line of sight is left out."""
     reach = 0.075 * size[1]
     shown = {

@@ -11,17 +11,174 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.poses import Pose
-from spirillum.extras import required
+from spirillum.dynamics.poses import RobotPose
+from spirillum.optional_dependencies import import_optional
+from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
-from spirillum.view.scene3d.camera import Camera, View
+from spirillum.view.scene3d.camera import SceneCamera, View
 from spirillum.view.scene3d.glass import add_glass, ruler_steps
-from spirillum.view.scene3d.ground import add_grid
-from spirillum.view.scene3d.light import add_light
-from spirillum.view.scene3d.shadow import add_shade
 from spirillum.view.scene3d.window import new_plotter
 
-__all__ = ["DrawnRobot", "Scene", "level_height", "resting"]
+_ALONG, _ACROSS = 160, 49
+_HALF_ANGLE = 0.9
+_DARKEST = 0.5
+_REACH = 0.30
+"""Distance from the floor over which the shadow fades, in radii of the channel."""
+
+
+def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
+    """Darkness, 0 to 1, of places on the inner side of a tube under a level robot.
+
+    Args:
+        robot: the robot.
+        radius: inner radius of the tube, m.
+        height: z of the motor axis in the tube's axes, m.
+        x: (n,) places along the tube, m.
+        angle: (m,) angles from the lowest line of the tube, rad.
+
+    Returns:
+        (n, m) a decay with the vertical distance to body and coupling; no computation of light.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    y, floor = radius * np.sin(angle), -radius * np.cos(angle)
+    dark = np.zeros((x.size, angle.size))
+    for outline in outlines_of(robot).values():
+        around = np.nan_to_num(np.fmax.reduce([piece.radius(x) for piece in outline.pieces]), nan=0.0)
+        below = np.sqrt(np.maximum(around[:, None] ** 2 - y**2, 0.0))
+        distance = height - below - floor
+        covered = np.abs(y) < around[:, None]
+        dark = np.maximum(dark, np.where(covered, np.exp(-np.maximum(distance, 0.0) / (_REACH * radius)), 0.0))
+    spread = 0.10 * radius
+    steps = (spread / (x[1] - x[0]), spread / (radius * (angle[1] - angle[0])))
+    return np.asarray(gaussian_filter(dark, steps, mode="constant"))
+
+
+def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: float) -> Any:
+    """Add the shadow of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it.
+
+    Args:
+        plotter: the scene's plotter.
+        pyvista: the library.
+        robot: a robot in a channel.
+        unit: length of one unit of the scene, m.
+        height: z of the motor axis in the tube's axes, m.
+    """
+    if robot.channel is None:
+        raise ValueError("a robot without a channel has no floor to shade")
+    radius = 0.5 * robot.channel.diameter
+    reach = 0.5 * robot.body.length + 0.5 * radius
+    x = np.linspace(-reach - robot.coupling.length, reach, _ALONG)
+    angle = np.linspace(-_HALF_ANGLE, _HALF_ANGLE, _ACROSS)
+    along, around = np.meshgrid(x, angle, indexing="ij")
+    near = 0.9985 * radius
+    points = np.stack([along, near * np.sin(around), -near * np.cos(around)], axis=-1).reshape(-1, 3) / unit
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(_ALONG - 1), np.arange(_ACROSS - 1), indexing="ij"))
+    corner = i * _ACROSS + j
+    faces = np.stack([np.full(i.size, 4), corner, corner + 1, corner + _ACROSS + 1, corner + _ACROSS], axis=-1)
+    mesh = pyvista.PolyData(points, faces.ravel())
+    colour = np.zeros((len(points), 4), dtype=np.uint8)
+    colour[:, :3] = (28, 48, 62)
+    dark = shade(robot, radius, height, x, angle)
+    colour[:, 3] = np.round(255 * _DARKEST * np.clip(dark, 0.0, 1.0)).ravel()
+    mesh.point_data["shade"] = colour
+    return plotter.add_mesh(mesh, scalars="shade", rgb=True, lighting=False, show_scalar_bar=False)
+
+
+_LAMPS = (  # place about the camera (right, up, towards it), strength
+    ((-0.6, 0.9, 0.8), 0.9),
+    ((0.9, 0.3, 0.7), 0.35),
+    ((0.1, 0.9, -0.6), 0.4),
+)
+
+
+def surroundings(rows: int = 64) -> Samples:
+    """(rows, 2 rows, 3) brightness of the surroundings by latitude and longitude: a pale room, a bright lamp above."""
+    up = np.linspace(1.0, -1.0, rows)[:, None, None]
+    around = np.linspace(-np.pi, np.pi, 2 * rows)[None, :, None]
+    room = 0.42 + 0.26 * up + 0.10 * np.cos(around)
+    lamp = 1.9 * np.exp(-(((up - 0.72) / 0.16) ** 2)) * (0.75 + 0.25 * np.cos(2.0 * around))
+    window = 0.7 * np.exp(-(((up - 0.25) / 0.22) ** 2) - ((np.abs(around) - 1.6) / 0.35) ** 2)
+    tint = np.array([1.0, 0.995, 0.985])
+    return np.asarray(np.maximum(room + lamp + window, 0.12) * tint)
+
+
+def add_light(plotter: Any, pyvista: Any, *, surrounded: bool = True) -> None:
+    """Light a scene.
+
+    Args:
+        plotter: the scene's plotter, without lights.
+        pyvista: the library.
+        surrounded: add bright surroundings, which surfaces with `pbr` reflect.
+    """
+    for place, strength in _LAMPS:
+        lamp = pyvista.Light(position=place, focal_point=(0, 0, 0), color="white", intensity=strength)
+        lamp.positional = False
+        lamp.set_camera_light()
+        plotter.add_light(lamp)
+    if not surrounded:
+        return
+    image = np.asarray(surroundings(), dtype=np.float32)
+    rows, columns, _ = image.shape
+    grid = pyvista.ImageData(dimensions=(columns, rows, 1))
+    grid.point_data["light"] = image[::-1].reshape(-1, 3)
+    grid.set_active_scalars("light")
+    texture = pyvista.Texture(grid)
+    texture.SetColorModeToDirectScalars()
+    texture.MipmapOn()
+    texture.InterpolateOn()
+    renderer = plotter.renderer
+    renderer.UseImageBasedLightingOn()
+    renderer.SetEnvironmentTexture(texture)
+    # Smooth surroundings need few samples; as VTK has it, their preparation takes seconds without a graphics card.
+    table, blurred = renderer.GetEnvMapLookupTable(), renderer.GetEnvMapPrefiltered()
+    table.SetLUTSize(128)
+    table.SetLUTSamples(128)
+    blurred.SetPrefilterMaxSamples(64)
+    renderer.SetEnvironmentUp(0.0, 0.0, 1.0)
+    renderer.SetEnvironmentRight(1.0, 0.0, 0.0)
+
+
+_COLOUR = "#c3d3dd"
+_MOST_LINES = 400
+_BEYOND = 8
+"""Lines beyond what is to be seen, on every side."""
+_WIDTH = 0.014
+"""Width of a line, in distances of lines."""
+_ACROSS: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
+"""Axis across the grid, by view; along x there is none, for the robot swims through it."""
+
+
+def add_grid(plotter: Any, pyvista: Any, view: View, low: Samples, high: Samples, step: float) -> None:
+    """Add a grid below the robot, or behind it where it is seen from the side.
+
+    Args:
+        plotter: the scene's plotter.
+        pyvista: the library.
+        view: the view.
+        low: (3,) smallest coordinates of what is to be seen in front of it.
+        high: (3,) largest ones.
+        step: distance of its lines.
+    """
+    if view not in _ACROSS:
+        return
+    across = _ACROSS[view]
+    level = high[1] + 0.5 * step if across == 1 else low[2] - 0.5 * step
+    first = np.floor(low / step - _BEYOND).astype(int)
+    last = np.ceil(high / step + _BEYOND).astype(int)
+    in_plane = [axis for axis in range(3) if axis != across]
+    points: list[Samples] = []
+    faces: list[list[int]] = []
+    for axis, other in (in_plane, in_plane[::-1]):
+        for line in range(first[axis], min(last[axis], first[axis] + _MOST_LINES) + 1):
+            corners = np.full((4, 3), level)
+            corners[:, axis] = step * (line + _WIDTH * np.array([-0.5, 0.5, 0.5, -0.5]))
+            corners[:, other] = step * np.array([first[other], first[other], last[other], last[other]])
+            faces.append([4, *range(len(points) * 4, len(points) * 4 + 4)])
+            points.append(corners)
+    mesh = pyvista.PolyData(np.concatenate(points), np.concatenate(faces))
+    plotter.add_mesh(mesh, color=_COLOUR, lighting=False, show_scalar_bar=False)
+
 
 _Material = dict[str, float]
 _COPPER: _Material = {"metallic": 0.75, "roughness": 0.3}
@@ -53,12 +210,7 @@ class DrawnRobot:
 
     @classmethod
     def of(cls, robot: Robot, *, fineness: float = 1.0) -> DrawnRobot:
-        """The pieces of a robot.
-
-        Args:
-            robot: a loaded robot.
-            fineness: of `spirillum.robot.mesh.robot_mesh`.
-        """
+        """The pieces of a robot."""
         from spirillum.robot.mesh import robot_mesh
 
         pieces = tuple(robot_mesh(robot, phase=0.0, fineness=fineness))
@@ -67,7 +219,7 @@ class DrawnRobot:
             robot, pieces, float(np.ptp(points, axis=0).max()), float(np.hypot(points[:, 1], points[:, 2]).max())
         )
 
-    def points(self, pose: Pose) -> Samples:
+    def points(self, pose: RobotPose) -> Samples:
         """(n, 3) all vertices in the lab, m."""
         placed = []
         for piece in self.pieces:
@@ -75,7 +227,7 @@ class DrawnRobot:
             placed.append(piece.vertices @ matrix[:3, :3].T + matrix[:3, 3])
         return np.concatenate(placed)
 
-    def corners(self, pose: Pose) -> Samples:
+    def corners(self, pose: RobotPose) -> Samples:
         """Points around the robot that hold it at any angle of its tail, m."""
         x = np.concatenate([piece.vertices[:, 0] for piece in self.pieces])
         angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -93,10 +245,10 @@ def level_height(solids: DrawnRobot) -> float:
     return 0.0 if channel is None else -max(0.5 * channel.diameter - solids.radius, 0.0)
 
 
-def resting(solids: DrawnRobot, phase: float = 0.0) -> Pose:
+def resting(solids: DrawnRobot, phase: float = 0.0) -> RobotPose:
     """The pose of a robot that lies level on its channel's floor, its tail at a phase."""
     height = level_height(solids)
-    return Pose(np.array([0.0, 0.0, height]), np.array([1.0, 0.0, 0.0, 0.0]), phase)
+    return RobotPose(np.array([0.0, 0.0, height]), np.array([1.0, 0.0, 0.0, 0.0]), phase)
 
 
 class Scene:
@@ -123,15 +275,12 @@ class Scene:
             samples: samples of each pixel.
             rows: rows about the middle that are drawn, an even number; what lies above and below stays white.
             quick: lamps alone, without surroundings that the solids reflect.
-
-        Raises:
-            InputError: if nothing here can draw, or PyVista is missing.
         """
         self.solids = solids
         self.unit = solids.length
         self._rows = size[1] if rows is None else min(rows, size[1])
         self.plotter = new_plotter((size[0], self._rows), live=live, samples=samples)
-        self._pyvista = required("pyvista", "a 3D picture")
+        self._pyvista = import_optional("pyvista", "a 3D picture")
         self._size = size
         self._pixels: Any = None
         self._shade: Any = None
@@ -170,7 +319,7 @@ class Scene:
         step = ruler_steps(0.3 * self.solids.length)
         add_grid(self.plotter, self._pyvista, view, low / self.unit, high / self.unit, step / self.unit)
 
-    def place(self, pose: Pose) -> None:
+    def place(self, pose: RobotPose) -> None:
         """Move the robot: rigid motions of its two parts."""
         matrices = {"body": pose.body, "rotor": pose.rotor}
         for matrix in matrices.values():
@@ -180,7 +329,7 @@ class Scene:
         if self._shade is not None:
             self._shade.position = (float(pose.position[0]) / self.unit, 0.0, 0.0)
 
-    def look(self, camera: Camera) -> None:
+    def look(self, camera: SceneCamera) -> None:
         """Set the camera."""
         eye = self.plotter.camera
         eye.position = tuple(camera.position / self.unit)

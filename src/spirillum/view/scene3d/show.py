@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.dynamics.poses import Pose
+from spirillum.display import DisplayMixin
+from spirillum.dynamics.poses import RobotPose
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.shown import Shown
 from spirillum.units import KINDS, parse_option
-from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
+from spirillum.view.scene3d.camera import Margins, SceneCamera, View, checked_view, fitted
 
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
-
-__all__ = ["LARGEST", "SMALLEST", "Picture3D", "checked_size", "glass_around", "show"]
 
 SMALLEST, LARGEST = 64, 4096
 """Allowed widths and heights of a picture, pixels."""
@@ -35,7 +33,7 @@ _MOST_FINER = 5_000_000
 
 
 @dataclass(frozen=True)
-class Picture3D(Shown):
+class Picture3D(DisplayMixin):
     """A picture of a robot."""
 
     robot: Robot
@@ -44,9 +42,9 @@ class Picture3D(Shown):
     """Phase of the tail, rad."""
     pixels: np.ndarray
     """(height, width, 3) the picture, sRGB bytes."""
-    camera: Camera
+    camera: SceneCamera
     """Where it is seen from: `camera.pixels(points, size)` says where points of the lab are in the picture."""
-    pose: Pose
+    pose: RobotPose
     """Where the robot lies: its body's mid-length, attitude, and the angle of its tail."""
     path: Path | None
     """The file that was written."""
@@ -66,11 +64,7 @@ class Picture3D(Shown):
 
 
 def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
-    """Width and height in pixels from ``1600x900`` or a pair.
-
-    Raises:
-        InputError: if it is neither, or out of range.
-    """
+    """Width and height in pixels from ``1600x900`` or a pair."""
     allowed = f"WIDTHxHEIGHT in pixels, {SMALLEST} to {LARGEST} each, for example 1600x900"
     if isinstance(size, str):
         found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", size.strip())
@@ -166,7 +160,7 @@ def glass_around(
     return (start, end) if start < end else None
 
 
-def shown_points(solids: DrawnRobot, pose: Pose, glass: tuple[float, float] | None) -> Samples:
+def shown_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float] | None) -> Samples:
     """(n, 3) points that a picture has to hold: the robot at any angle of its tail, and the ends of the glass, m."""
     from spirillum.view.scene3d.glass import WALL
 
@@ -187,7 +181,7 @@ def _averaged(image: np.ndarray, finer: int) -> np.ndarray:
     return np.asarray((squares.sum(axis=(1, 3)) + finer * finer // 2) // (finer * finer), dtype=np.uint8)
 
 
-def _lines(robot: Robot, camera: Camera, glass: tuple[float, float] | None) -> list[str]:
+def _lines(robot: Robot, camera: SceneCamera, glass: tuple[float, float] | None) -> list[str]:
     from spirillum.view.figures.scene import length_words
 
     lines = ["computed geometry" + (", to scale" if camera.parallel else "")]

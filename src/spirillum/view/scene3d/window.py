@@ -10,9 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from spirillum.errors import InputError
-from spirillum.extras import required
-
-__all__ = ["new_plotter"]
+from spirillum.optional_dependencies import import_optional
 
 _INSTEAD = "allowed: a display, or -o FILE, which needs none"
 _CHOICE = "VTK_DEFAULT_OPENGL_WINDOW"
@@ -28,14 +26,11 @@ def new_plotter(size: tuple[int, int], *, live: bool = False, samples: int = 4) 
         size: width and height, pixels.
         live: a window on the screen instead of a picture in memory.
         samples: samples of each pixel; 0: one.
-
-    Raises:
-        InputError: if PyVista is missing, a live window has no display, or nothing here can draw.
     """
     if live and not _has_display():
         raise InputError(f"--window: DISPLAY is not set; {_INSTEAD}")
     with _quiet_context(live=live):
-        pyvista = required("pyvista", "a 3D picture")
+        pyvista = import_optional("pyvista", "a 3D picture")
         from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
 
         verbosity, talkative = vtkLogger.GetCurrentVerbosityCutoff(), vtkObject.GetGlobalWarningDisplay()

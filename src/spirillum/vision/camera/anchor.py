@@ -16,12 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale
 from spirillum.vision.video.frames import Frame
 from spirillum.vision.video.pictures import reduced, reduction
-
-__all__ = ["Anchor", "Pose", "Steadied", "steadied", "sways"]
 
 _COARSE = 160
 """Width of the reduced picture whose coarse structure is compared, pixels."""
@@ -43,7 +41,7 @@ _OUTLIER = 3.0
 """Residual over the usual one from which on a pixel does not count."""
 
 
-class Pose(NamedTuple):
+class PictureRegistration(NamedTuple):
     """How a picture lies against the anchor."""
 
     right: float
@@ -61,20 +59,20 @@ class Anchor:
     flat: Samples = field(repr=False)
     """High-pass filtered brightness, (h, w)."""
 
-    def pose(self, flat: Samples, start: Pose) -> Pose:
+    def pose(self, flat: Samples, start: PictureRegistration) -> PictureRegistration:
         """How a picture lies against the anchor; `start` where the anchor shows no edge.
 
         Args:
             flat: the picture, high-pass filtered, (h, w).
             start: about that, to less than half of the distance of a ruler's lines.
         """
-        cv2 = required("cv2", "measuring a video", "video")
+        cv2 = import_optional("cv2", "measuring a video", "video")
         rows, columns, slopes, there = self._edges
         if not rows.size:
             return start
         pose = np.array(start)
         for _ in range(_STEPS):
-            matrix = _matrix(Pose(*pose.tolist()), (flat.shape[1], flat.shape[0]))
+            matrix = _matrix(PictureRegistration(*pose.tolist()), (flat.shape[1], flat.shape[0]))
             at = matrix @ np.stack([columns, rows, np.ones(rows.size)])
             at_u, at_v = at.astype(np.float32).reshape(2, -1, _ROW)
             now = cv2.remap(flat, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE).ravel()
@@ -87,16 +85,16 @@ class Anchor:
             pose -= step
             if max(np.abs(step[:2]).max(), 0.5 * flat.shape[1] * abs(step[2])) < _STILL:
                 break
-        return Pose(*pose.tolist())
+        return PictureRegistration(*pose.tolist())
 
-    def steadied(self, image: np.ndarray, pose: Pose) -> np.ndarray:
+    def steadied(self, image: np.ndarray, pose: PictureRegistration) -> np.ndarray:
         """A picture moved to where the anchor is; beyond its borders they go on as they are.
 
         Args:
             image: 8-bit RGB, (h, w, 3).
             pose: how it lies against the anchor.
         """
-        cv2 = required("cv2", "measuring a video", "video")
+        cv2 = import_optional("cv2", "measuring a video", "video")
         size = (image.shape[1], image.shape[0])
         flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
         moved = cv2.warpAffine(image, _matrix(pose, size), size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
@@ -105,7 +103,7 @@ class Anchor:
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray, Samples, Samples]:
         """Rows and columns of the steepest pixels, slopes by right, down and roll, and their brightness."""
-        cv2 = required("cv2", "measuring a video", "video")
+        cv2 = import_optional("cv2", "measuring a video", "video")
         slope_u, slope_v = (0.5 * cv2.Sobel(self.flat, cv2.CV_32F, *order, ksize=1) for order in ((1, 0), (0, 1)))
         steep = np.hypot(slope_u, slope_v)
         margin = _REACH * self.flat.shape[1] // _COARSE
@@ -133,7 +131,7 @@ class Steadied(NamedTuple):
     def frame(self, frame: Frame) -> Frame:
         """A frame as a camera would have taken it that did not move."""
         place = int(np.argmin(np.abs(self.times - frame.time)))
-        pose = Pose(*self.poses[place].tolist())
+        pose = PictureRegistration(*self.poses[place].tolist())
         return replace(frame, image=self.anchor.steadied(frame.image, pose))
 
 
@@ -141,27 +139,22 @@ def sways(frames: Sequence[Frame]) -> bool:
     """Whether some pictures lie higher and lower than others, or are turned, as those of a camera in a hand.
 
     Along the rows a ruler's lines may hide it: a hand does not move in one direction alone.
-
-    Args:
-        frames: frames spread over a film.
     """
     flats = (_flat(frame.reduced(_reduction(frame))) for frame in frames)
     anchor = Anchor(next(flats))
-    poses = np.array([Pose(0.0, 0.0, 0.0), *(anchor.pose(flat, Pose(0.0, 0.0, 0.0)) for flat in flats)])
+    poses = np.array(
+        [PictureRegistration(0.0, 0.0, 0.0), *(anchor.pose(flat, PictureRegistration(0.0, 0.0, 0.0)) for flat in flats)]
+    )
     down, turned = poses[:, 1], 0.5 * anchor.flat.shape[1] * poses[:, 2]
     return max(float(mad_scale(values - np.median(values))) for values in (down, turned)) > _SWAYS
 
 
 def steadied(frames: Iterable[Frame]) -> Steadied:
-    """Register all frames of a film to the first one.
-
-    Args:
-        frames: all of them, in their order.
-    """
+    """Register all frames of a film to the first one."""
     anchor: Anchor | None = None
     before: Samples = np.empty((0, 0, 0))
     times, poses = [], []
-    pose = Pose(0.0, 0.0, 0.0)
+    pose = PictureRegistration(0.0, 0.0, 0.0)
     factor = 1
     for frame in frames:
         factor = _reduction(frame)
@@ -171,7 +164,7 @@ def steadied(frames: Iterable[Frame]) -> Steadied:
             anchor = Anchor(flat)
         else:
             right, down = _coarse_shift(before, now, flat.shape[1])
-            pose = anchor.pose(flat, Pose(pose.right + right, pose.down + down, pose.roll))
+            pose = anchor.pose(flat, PictureRegistration(pose.right + right, pose.down + down, pose.roll))
         before = now
         times.append(frame.time)
         poses.append(pose)
@@ -184,7 +177,7 @@ def _reduction(frame: Frame) -> int:
     return reduction((frame.image.shape[1], frame.image.shape[0]))
 
 
-def _matrix(pose: Pose, size: tuple[int, int]) -> Samples:
+def _matrix(pose: PictureRegistration, size: tuple[int, int]) -> Samples:
     """From places in the anchor to places in the picture, (2, 3)."""
     c, s = np.cos(pose.roll), np.sin(pose.roll)
     x, y = 0.5 * (size[0] - 1), 0.5 * (size[1] - 1)
@@ -193,7 +186,7 @@ def _matrix(pose: Pose, size: tuple[int, int]) -> Samples:
 
 def _flat(image: np.ndarray) -> Samples:
     """High-pass filtered brightness, about 0."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     grey = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_RGB2GRAY)
     wide = max(15.0, grey.shape[1] / 20.0)
     few = max(1, int(wide / _BLUR))
@@ -207,7 +200,7 @@ def _flat(image: np.ndarray) -> Samples:
 
 def _texture(flat: Samples) -> Samples:
     """Coarse structure in a reduced picture, bounded."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     factor = max(1, flat.shape[1] // _COARSE)
     blurred = cv2.GaussianBlur(flat, (0, 0), flat.shape[1] / _COARSE)
     size = flat.shape[1] // factor, flat.shape[0] // factor
@@ -218,7 +211,7 @@ def _texture(flat: Samples) -> Samples:
 
 def _coarse_shift(one: Samples, other: Samples, width: int) -> tuple[float, float]:
     """Shift of the second texture against the first one, pixels of the full picture."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     inside = np.ascontiguousarray(one[:, _REACH:-_REACH, _REACH:-_REACH])
     score = sum(cv2.matchTemplate(b, a, cv2.TM_CCOEFF_NORMED) for a, b in zip(inside, other, strict=True))
     row, column = (int(place) for place in np.unravel_index(int(np.argmax(score)), score.shape))

@@ -12,12 +12,10 @@ from spirillum.errors import InputError
 from spirillum.vision.camera.checkerboard import lens_of
 from spirillum.vision.camera.optics import DIRECTIONS
 from spirillum.vision.camera.ruler import Lines, resolved, ruler_in, still_picture
-from spirillum.vision.camera.scale import Sight, fitted_camera, given_camera
+from spirillum.vision.camera.scale import CalibratedCamera, fitted_camera, given_camera
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Frame, Video, open_video
 from spirillum.vision.video.pictures import reduction
-
-__all__ = ["background", "bounds_of", "opened", "ruler_of", "samples_of", "scale_of", "sight_of"]
 
 _SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 480_000_000
 """Most and fewest frames from which scale and appearance are learnt, and the bytes that they may take between."""
@@ -27,17 +25,8 @@ _UNKNOWN = 10.0
 """Duration from which is learnt where that of the film is unknown, s."""
 
 
-def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[Sight, Video]:
-    """Calibrate the camera and the scale of a video without following the robot.
-
-    Args:
-        video: the film, or a folder of images.
-        setup: its setup.
-        folder: folder of the setup file, to which the checkerboard's folder is relative.
-
-    Raises:
-        InputError: if the video cannot be read, or no ruler is found in it.
-    """
+def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[CalibratedCamera, Video]:
+    """Calibrate the camera and the scale of a video without following the robot."""
     video = opened(video, setup)
     frames = samples_of(video, setup.start, setup.end)
     return sight_of(video, setup, background(frames, reduction(video.size)), folder, frames), video
@@ -58,9 +47,6 @@ def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
         video: the film, or a folder of images.
         start: beginning of that part, s.
         end: its end, s; None: that of the video.
-
-    Raises:
-        InputError: if the start is after the end of the video, or no frame can be decoded.
     """
     if video.duration:
         if start >= video.duration:
@@ -76,11 +62,7 @@ def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
 
 
 def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:
-    """Region of interest in the picture: left, top, right, bottom, pixels.
-
-    Raises:
-        InputError: if it exceeds the picture.
-    """
+    """Region of interest in the picture: left, top, right, bottom, pixels."""
     width, height = video.size
     region = setup.region
     if region is None:
@@ -121,7 +103,9 @@ def ruler_of(
     return found, factor if found is None else 1
 
 
-def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None, frames: Sequence[Frame] = ()) -> Sight:
+def sight_of(
+    video: Video, setup: Setup, still: Samples, folder: Path | None, frames: Sequence[Frame] = ()
+) -> CalibratedCamera:
     """The calibrated camera of a video.
 
     Args:
@@ -130,9 +114,6 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None, fr
         still: its static background, (h, w, 3), or reduced by a whole factor.
         folder: folder of the setup file, to which the checkerboard's folder is relative.
         frames: of the video, where the background was reduced.
-
-    Raises:
-        InputError: if the setup has a ruler and none is found.
     """
     factor = video.size[0] // still.shape[1]
     board = setup.camera.checkerboard

@@ -8,12 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.setup import Checkerboard
 from spirillum.vision.video.display import AS_STORED, Display
 from spirillum.vision.video.pictures import IMAGES, bits_of, eight_bit, read_header, read_image
-
-__all__ = ["Lens", "lens_of"]
 
 _FEWEST = 3
 """Fewest pictures with a detected board."""
@@ -48,11 +46,8 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: D
         folder: folder of the setup file.
         size: width and height of the video and of the calibration pictures as shown, pixels.
         display: how the video's pictures are shown; so are pictures that have the size of the stored ones.
-
-    Raises:
-        InputError: if the folder is missing, fewer than three pictures show the board, or the fit is poor.
     """
-    cv2 = required("cv2", "a checkerboard", "video")
+    cv2 = import_optional("cv2", "a checkerboard", "video")
     images = folder / board.images
     if not images.is_dir():
         raise InputError(f"camera.checkerboard.images = {board.images!r} is no folder; allowed: a folder of pictures")

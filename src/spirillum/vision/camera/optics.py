@@ -15,8 +15,6 @@ from spirillum.vision.setup import Setup
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["DIRECTIONS", "BodyPose", "Optics", "opposite", "optics_of", "placed", "places_seen_by", "seen"]
-
 DIRECTIONS = {"right": 0.0, "left": -np.pi, "up": 0.5 * np.pi, "down": -0.5 * np.pi}
 """Angle by which each direction in the picture lies against the clock from the right, rad."""
 
@@ -126,11 +124,7 @@ class Optics:
         return float(2.0 * step / np.linalg.norm(np.diff(self.pixels(ends), axis=0)))
 
     def reduced(self, factor: int) -> Self:
-        """The camera as pictures show it whose blocks of `factor` by `factor` pixels are made one, from the upper left.
-
-        Args:
-            factor: a whole number.
-        """
+        """Return the camera of pictures binned by `factor` by `factor` pixels, from the upper left."""
         if factor == 1:
             return self
         size = self.size[0] // factor, self.size[1] // factor

@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
-
-__all__ = ["Lines", "lines_in", "resolved", "ruler_in", "still_picture"]
+from spirillum.optional_dependencies import import_optional
 
 _SHORTEST = 3.0
 """Shortest resolved distance of lines, pixels."""
@@ -142,7 +140,7 @@ def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
         image: a full picture, 8-bit RGB, (h, w, 3).
         factor: by which the other one was reduced.
     """
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     way = np.array([math.cos(lines.roll), math.sin(lines.roll)])
     side = np.array([-way[1], way[0]])
     power: Samples = np.zeros(1)
@@ -169,13 +167,7 @@ def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
 
 
 def ruler_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:
-    """Detect a ruler at any roll of the camera; None if there is none.
-
-    Args:
-        picture: 0 to 255, (h, w, 3).
-        bounds: region of interest: left, top, right, bottom; the last two are exclusive.
-        turn: angle of the channel to the rows, positive downwards to the right, rad; off by up to 45 degrees.
-    """
+    """Detect a ruler at any roll of the camera; None if there is none."""
     found = lines_in(picture, bounds, turn)
     if found is None:
         tried = [one for roll in _ROLLS if (one := lines_in(picture, bounds, turn + roll)) is not None]
@@ -187,7 +179,7 @@ def ruler_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
 
 def _turned(part: np.ndarray, turn: float) -> tuple[np.ndarray, Samples]:
     """A picture turned against the clock, and the map from its pixels to those of the first one, (2, 3)."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     height, width = part.shape[:2]
     c, s = abs(math.cos(turn)), abs(math.sin(turn))
     size = math.ceil(c * width + s * height), math.ceil(s * width + c * height)
@@ -202,7 +194,7 @@ def _turned(part: np.ndarray, turn: float) -> tuple[np.ndarray, Samples]:
 
 def _lines_of(part: Samples) -> Lines | None:
     """Detect a ruler in one channel of a region, (h, w)."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     flat = part / np.maximum(cv2.GaussianBlur(part, (0, 0), 15.0), 1.0) - 1.0
     flat = np.clip(flat, -0.6, 0.6)
     frequency = _frequency(flat)

@@ -17,8 +17,6 @@ from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 
-__all__ = ["Scale", "Sight", "first_rotation", "fitted_camera", "given_camera", "with_source"]
-
 _PRIOR_TILT = 0.1
 """Prior standard deviation of the camera's tilts, rad."""
 _PRIOR_K1 = 0.1
@@ -57,7 +55,7 @@ class Scale:
     """Apparent size of the body over that of its file at this scale; NaN where not measured."""
 
 
-class Sight(NamedTuple):
+class CalibratedCamera(NamedTuple):
     """A calibrated camera with its scale and warnings."""
 
     optics: Optics
@@ -67,24 +65,18 @@ class Sight(NamedTuple):
     """Factor by which pictures may be reduced that are looked at as a whole: the ruler is resolved in them."""
 
 
-def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> Sight:
-    """The upright camera of a setup that gives a length per pixel.
-
-    Args:
-        setup: the setup.
-        size: width and height of the picture, pixels.
-        lens: lens calibrated with a checkerboard.
-    """
+def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> CalibratedCamera:
+    """The upright camera of a setup that gives a length per pixel."""
     wanted = setup.markers.length_per_pixel
     assert wanted is not None  # noqa: S101 - the setup has seen to it
     optics = _with_lens(optics_of(setup, size, 1.0), lens)
     optics = optics.moved({"focal": optics.length_per_pixel / wanted})
     share = setup.markers.length_per_pixel_uncertainty / wanted
     sources = {"lens and outline": _MODEL} | ({"markers.length_per_pixel": share} if share else {})
-    return Sight(optics, Scale(optics.length_per_pixel, _total(sources), sources, 0, float("nan")))
+    return CalibratedCamera(optics, Scale(optics.length_per_pixel, _total(sources), sources, 0, float("nan")))
 
 
-def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens | None = None) -> Sight:
+def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens | None = None) -> CalibratedCamera:
     """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines.
 
     The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
@@ -95,9 +87,6 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
         size: width and height of the picture, pixels.
         lines: detected lines of the ruler.
         lens: lens calibrated with a checkerboard.
-
-    Raises:
-        InputError: if the fitted focal length is implausible.
     """
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101 - the setup has seen to it
@@ -127,17 +116,13 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
                 f"{optics.focal:.1f}: heights, spacing or index are not as the setup says, or the lens was refocused",
             )
         )
-    return Sight(optics, Scale(optics.length_per_pixel, _total(sources), sources, lines.lines, residual), tuple(flags))
+    return CalibratedCamera(
+        optics, Scale(optics.length_per_pixel, _total(sources), sources, lines.lines, residual), tuple(flags)
+    )
 
 
 def with_source(scale: Scale, name: str, share: float) -> Scale:
-    """The scale with one more contribution to its uncertainty.
-
-    Args:
-        scale: the scale.
-        name: name of the source.
-        share: its relative standard uncertainty.
-    """
+    """The scale with one more contribution to its uncertainty."""
     sources = {**scale.sources, name: share}
     return replace(scale, sources=sources, relative_uncertainty=_total(sources))
 
@@ -165,12 +150,7 @@ def _first_focal(optics: Optics, lines: Lines, spacing: float, height: float) ->
 
 
 def first_rotation(optics: Optics, lines: Lines) -> float:
-    """Rotation of the camera, by the angle of the channel against the stated direction, rad; 0 where it is small.
-
-    Args:
-        optics: the camera, without rotation.
-        lines: of the ruler.
-    """
+    """Rotation of the camera, by the angle of the channel against the stated direction, rad; 0 where it is small."""
     off = -DIRECTIONS[optics.direction] - lines.roll  # both clockwise, as rows count downwards
     off -= np.pi * round(off / np.pi)  # lines are counted in either sense
     return 0.0 if abs(off) < _SMALL_ROLL else float(off)

@@ -1,40 +1,143 @@
-"""From what was seen on every frame to a track: lengths, continuous angles, true times, and all flags."""
+"""From what was seen on every frame to a track: lengths, continuous angles, true times, and all flags.
+
+Frames on which something else than the robot was followed: its marks are not there, and its place jumps.
+Where a still picture hides a slow robot, or clutter looks like a body, the outline may lie beside the robot for a
+while and then find it. Neither stripes nor tail can be read meanwhile, as they are looked for where they are not.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
+from spirillum.robust import least_squares_line, repeated_median_line, stretches_of
 from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
+from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import CUES, IDENTITY, LOST_FRAMES, STRIPES
+from spirillum.vision.track.constants import CUES, ELSEWHERE, IDENTITY, LOST_FRAMES, STRIPES, SWAY
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cues import Agreement, agreement_of
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
-from spirillum.vision.track.elsewhere import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
-from spirillum.vision.track.learning import Learnt
-from spirillum.vision.track.lost_frames import Reading, restored_times
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.learning import InitialDetection
+from spirillum.vision.track.lost_frames import FrameSeries, restored_times
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import picture_steps
 from spirillum.vision.track.size import LENGTHS, checked_scale
 from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
-from spirillum.vision.track.sway import Swayed, swayed_by
 from spirillum.vision.track.track import Track
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
-from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
+from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Video
 
-__all__ = ["track_of"]
+
+class Swayed(NamedTuple):
+    """Uncertainty and flags by a camera that swayed."""
+
+    drift: float
+    """Standard uncertainty of the velocity, m/s."""
+    flags: tuple[Flag, ...]
+
+
+def swayed_by(still: Steadied, motion: RobotMotion, setup: Setup, sight: CalibratedCamera) -> Swayed:
+    """How much a camera that swayed makes the velocity uncertain, and whether it may be given.
+
+    A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which is
+    nearer than the background, by more: what is not known is the difference, for as much as the camera has drifted.
+
+    Args:
+        still: how the camera swayed.
+        motion: the robot's motion in the pictures that were moved.
+        setup: the setup, for the height of the background.
+        sight: the calibrated camera.
+    """
+    optics, right, down = sight.optics, still.poses[:, 0], still.poses[:, 1]
+    behind = 0.0 if setup.markers.height is None else setup.markers.height
+    pixel = optics.length_per_pixel
+    parallax = optics.moved({"axis_height": behind}).length_per_pixel / pixel - 1.0
+    speed = math.hypot(*(float(least_squares_line(still.times, part).slope) for part in (right, down)))
+    reach = max(float(np.ptp(right)), float(np.ptp(down)))
+    jump = _largest_jump(motion.time, motion.x) / pixel
+    sentence = (
+        f"the camera swayed by {reach:.1f} pixels from end to end: all pictures were moved to where the first lies, "
+        "by what stands still in them; put the camera on a stand to be sure"
+    )
+    drift, flags = abs(parallax) * speed * pixel, [Flag("camera-swayed", sentence)]
+    if jump > SWAY.jump:
+        words = (
+            f"the camera swayed, and the robot jumps by {jump:.1f} pixels against what stands still: the pictures "
+            "could not be moved back well enough; no speed is given: put the camera on a stand"
+        )
+        flags.append(Flag("camera-moved", words, ("forward_velocity", "lateral_position", *SWAY.lateral)))
+    return Swayed(drift, tuple(flags))
+
+
+def _largest_jump(time: Samples, x: Samples) -> float:
+    """Largest lasting step of a position against the lines through some frames on either side, m."""
+    known = np.isfinite(x)
+    t, v, wide = time[known], x[known], SWAY.window
+    if t.size < 2 * wide:
+        return 0.0
+    line = np.polynomial.polynomial.polyfit(t - t.mean(), v, 1)
+    rest = v - np.polynomial.polynomial.polyval(t - t.mean(), line)
+    windows = np.lib.stride_tricks.sliding_window_view(rest, wide)
+    middle = np.median(windows, axis=1)
+    return float(np.abs(middle[wide:] - middle[:-wide]).max())
+
+
+def something_else(time: Samples, place: Samples, marked: np.ndarray, length: float) -> np.ndarray:
+    """Frames of stretches without marks from which the place jumps to frames with marks, a mask, (n,).
+
+    Args:
+        time: time of each frame, s, (n,).
+        place: place of the body, m, (n, 2); NaN where it is unknown.
+        marked: whether stripes or tail were read, (n,).
+        length: of the body, m.
+    """
+    found = np.zeros(time.size, dtype=bool)
+    known = np.isfinite(place).all(axis=1)
+    sure = np.flatnonzero(marked & known)
+    if sure.size < ELSEWHERE.fewest:
+        return found
+    speed = np.array([repeated_median_line(time[sure], place[sure, axis]).slope for axis in (0, 1)])
+    along = place - speed * (time - time[0])[:, None]  # what does not move as the robot does jumps
+    for stretch in stretches_of(~marked & known):
+        beside = sure[(sure > stretch[-1]) | (sure < stretch[0])]
+        after, before = beside[beside > stretch[-1]], beside[beside < stretch[0]]
+        few = ELSEWHERE.beside
+        sides = [(stretch[-few:], after[:few]), (stretch[:few], before[-few:])]
+        jumps = [np.median(along[own], axis=0) - np.median(along[other], axis=0) for own, other in sides if other.size]
+        if stretch.size >= ELSEWHERE.shortest and all(np.hypot(*jump) > ELSEWHERE.jump * length for jump in jumps):
+            found[stretch] = True
+    return found
+
+
+def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
+    """What to say of such frames.
+
+    Args:
+        found: a mask of them, (n,).
+    """
+    count = int(found.sum())
+    if not count:
+        return ()
+    sentence = (
+        f"on {count} frames ({100.0 * count / found.size:.3g} %) something else than the robot was followed: neither "
+        "stripes nor tail are there, and the place jumps to where they are; these frames are left out (a [region] of "
+        "the setup around the robot's way leaves out what looks like it)"
+    )
+    return (Flag("something-else-followed", sentence),)
+
 
 _DOUBTFUL_STRIPES = Flag(
     "stripes-do-not-fit",
@@ -61,21 +164,12 @@ _DOUBTFUL_OUTLINE = Flag(
 def track_of(
     video: Video,
     setup: Setup,
-    learnt: Learnt,
+    learnt: InitialDetection,
     record: Record,
     flags: tuple[Flag, ...],
     still: Steadied | None = None,
 ) -> Track:
-    """The track of a film, with all flags.
-
-    Args:
-        video: the film.
-        setup: its setup.
-        learnt: the calibrated camera, the robot as it looks, and glare on its way.
-        record: what was seen on every frame.
-        flags: those of film, camera and first look.
-        still: how the camera swayed, where its pictures were moved to where the first one lies.
-    """
+    """The track of a film, with all flags."""
     sight, known = learnt.sight, learnt.known
     body, time = known.start.body, np.array(record.time)
     seen = np.array([one.known for one in record.placed])
@@ -112,7 +206,7 @@ def track_of(
     elif size_flags and any(flag.spoils for flag in even.flags):
         roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
-    motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
+    motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
@@ -210,12 +304,12 @@ def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, 
 
 def _readings(
     body: Samples, tail: Samples, x: Samples, known: Identified, optics: Optics
-) -> tuple[Reading, Reading, Reading]:
+) -> tuple[FrameSeries, FrameSeries, FrameSeries]:
     """The series whose steps tell lost frames, with the least standard errors of a step."""
     return (
-        Reading(tail, 2.0 * np.pi, LOST_FRAMES.tail_error),
-        Reading(body, known.stripes.period, LOST_FRAMES.body_error),
-        Reading(x, np.inf, LOST_FRAMES.place_error * optics.length_per_pixel),
+        FrameSeries(tail, 2.0 * np.pi, LOST_FRAMES.tail_error),
+        FrameSeries(body, known.stripes.period, LOST_FRAMES.body_error),
+        FrameSeries(x, np.inf, LOST_FRAMES.place_error * optics.length_per_pixel),
     )
 
 

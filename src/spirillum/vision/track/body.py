@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
@@ -18,8 +18,6 @@ from spirillum.vision.track.contour import GROUPS, Contour, contour_of
 from spirillum.vision.track.cues import cue_shifts
 from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
 from spirillum.vision.track.shape import Shape
-
-__all__ = ["BodyFinder", "Placed", "grey_part"]
 
 
 class Placed(NamedTuple):
@@ -114,11 +112,7 @@ class BodyFinder:
         self._correlation = max(1.0, OUTLINE.noise_correlation / max(spacing, 0.1))
 
     def shape(self, factor: int = 1) -> Shape:
-        """What is looked for in whole pictures.
-
-        Args:
-            factor: by which the pictures are reduced.
-        """
+        """What is looked for in whole pictures."""
         if factor not in self._shapes:
             self._shapes[factor] = Shape.of(self.contour, self.optics.reduced(factor), self.bounds, factor)
         return self._shapes[factor]
@@ -429,7 +423,7 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray
 
 def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:
     """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(image[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
     return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur), dtype=float)

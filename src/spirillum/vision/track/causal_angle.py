@@ -9,8 +9,6 @@ import numpy as np
 from spirillum.vision.track.constants import UNWRAPPING
 from spirillum.vision.track.unwrapping import likeliest_rate
 
-__all__ = ["CausalAngle"]
-
 _GAP = 10.0
 """Time between two readings over the usual one from which on whole periods may be missing."""
 
@@ -19,11 +17,7 @@ class CausalAngle:
     """Gives each angle the whole periods that bring it nearest to its prediction by an alpha-beta filter."""
 
     def __init__(self, period: float) -> None:
-        """Begin.
-
-        Args:
-            period: of the angle, rad.
-        """
+        """Begin."""
         self.period = period
         self.restarts = 0
         """How often it was begun anew, so that angles before and after do not hang together."""

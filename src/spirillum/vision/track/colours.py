@@ -11,19 +11,6 @@ from spirillum.arrays import Samples
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.vision.track.constants import COLOURS
 
-__all__ = [
-    "colour_classes",
-    "colours_named",
-    "named_colours",
-    "named_rightly",
-    "order_seen",
-    "pattern_period",
-    "runs_of",
-    "told_apart",
-    "width_seen",
-    "without_glare",
-]
-
 _MANY = 6
 """Most classes for which all assignments of names are tried; more are assigned by the least total distance."""
 
@@ -104,12 +91,7 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
 
 
 def without_glare(profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> Samples:
-    """Colours with NaN where they are nearer to glare than to any stripe.
-
-    Args:
-        profiles: colours, (..., 3).
-        palettes: result of `colour_classes`.
-    """
+    """Colours with NaN where they are nearer to glare than to any stripe."""
     palette, _, glare = palettes
     nearest = _nearest(np.nan_to_num(profiles), np.concatenate([palette, glare]))
     return np.asarray(np.where((nearest < len(palette))[..., None], profiles, np.nan))
@@ -199,10 +181,6 @@ def told_apart(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> 
 
     Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may be
     learnt as colours: they differ by much less.
-
-    Args:
-        samples: colours of pixels of the stripes, (m, 3).
-        palettes: result of `colour_classes`.
     """
     palette, start, glare = palettes
     nearest = _nearest(samples, np.concatenate([palette, glare]))

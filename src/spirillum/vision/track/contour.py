@@ -13,15 +13,13 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
 from spirillum.kernels.contours import edge_places, edge_points
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
-from spirillum.robot.outline import Line, Outline
+from spirillum.robot.outline import Outline, Segment
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, placed
 from spirillum.vision.track.constants import CONTOUR
-
-__all__ = ["EDGE_CUES", "GROUPS", "Contour", "contour_of"]
 
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""
@@ -105,12 +103,7 @@ class Contour:
 
 
 def contour_of(robot: Robot, optics: Optics) -> Contour:
-    """Compute the apparent contour of a robot's body.
-
-    Args:
-        robot: the robot.
-        optics: the camera.
-    """
+    """Compute the apparent contour of a robot's body."""
     outlines = {name: outline for name, outline in outlines_of(robot).items() if name in ("body", "coupling")}
     outline, radius = outlines["body"], 0.5 * robot.body.diameter
     spacing = 1.2 * optics.length_per_pixel
@@ -189,7 +182,7 @@ def _surface(outline: Outline) -> Samples:
     """Points on the surface of a solid of revolution, m, (k, 3)."""
     pieces = []
     for piece in outline.pieces:
-        turn = 0.0 if isinstance(piece, Line) else abs(piece.angles[1] - piece.angles[0])
+        turn = 0.0 if isinstance(piece, Segment) else abs(piece.angles[1] - piece.angles[0])
         pieces.append(piece.points(np.linspace(0.0, 1.0, 2 + int(_PER_TURN * turn / (2.0 * np.pi)))))
     x, rho = (np.concatenate(part) for part in zip(*pieces, strict=True))
     around = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)[:, None]
@@ -200,7 +193,7 @@ def _surface(outline: Outline) -> Samples:
 def _flat(outline: Outline, end: int) -> tuple[float, float] | None:
     """Axial position and radius of a flat end's sharp rim, m; None if the end is round."""
     piece = outline.pieces[end]
-    if isinstance(piece, Line) and piece.start[0] == piece.end[0] and outline.corners and outline.corners[end]:
+    if isinstance(piece, Segment) and piece.start[0] == piece.end[0] and outline.corners and outline.corners[end]:
         return piece.start[0], max(piece.start[1], piece.end[1])
     return None
 
@@ -238,12 +231,12 @@ def _stations(low: float, high: float, spacing: float) -> Samples:
 def _straight(outline: Outline) -> tuple[float, float]:
     """Range of x in which the sides of a solid are straight; without such, its middle half."""
     widest = (
-        max(max(piece.start[1], piece.end[1]) for piece in outline.pieces if isinstance(piece, Line))
-        if any(isinstance(piece, Line) for piece in outline.pieces)
+        max(max(piece.start[1], piece.end[1]) for piece in outline.pieces if isinstance(piece, Segment))
+        if any(isinstance(piece, Segment) for piece in outline.pieces)
         else 0.0
     )
     for piece in outline.pieces:
-        if isinstance(piece, Line) and piece.start[1] == piece.end[1] == widest and piece.start[0] != piece.end[0]:
+        if isinstance(piece, Segment) and piece.start[1] == piece.end[1] == widest and piece.start[0] != piece.end[0]:
             return min(piece.start[0], piece.end[0]), max(piece.start[0], piece.end[0])
     tips = [float(piece.points(np.full(1, t))[0][0]) for piece in outline.pieces for t in (0.0, 1.0)]
     return 0.5 * min(tips), 0.5 * max(tips)
@@ -260,7 +253,7 @@ def _seal(robot: Robot, radius: float, spacing: float) -> Samples:
 
 def _hull(points: Samples) -> Samples:
     """Vertices of the convex hull in their order; chosen in single precision, which is fast, and exact themselves."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     chosen = cv2.convexHull(points.astype(np.float32), returnPoints=False)
     return np.asarray(points[chosen[:, 0]])
 

@@ -14,8 +14,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUES
 from spirillum.vision.track.contour import EDGE_CUES
 
-__all__ = ["Agreement", "Cue", "agreement_of", "cue_shifts"]
-
 _ALONG = 0, 0, 1
 """Coordinate of the pose that each cue of edges tells: x, or y for the coupling, of which the sides are seen."""
 

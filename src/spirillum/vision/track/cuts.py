@@ -18,23 +18,16 @@ from spirillum.arrays import Samples
 from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUTS
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import PictureSteps
 from spirillum.vision.track.size import LENGTHS
-from spirillum.vision.track.warnings import EVERYTHING
-
-__all__ = ["Clock", "Hops", "clock_of", "cuts_in", "hops_in", "one_picture", "stands_still"]
+from spirillum.vision.track.visibility import EVERYTHING
 
 
-def cuts_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
+def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
     """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow.
 
     Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
-        picture: what the pictures say of each step; None: nothing.
     """
     jumps = [jump for jump in _jumps(motion, length_per_pixel) if jump is not None]
     usual = _usual(motion.time)
@@ -61,15 +54,10 @@ class Hops(NamedTuple):
     flags: tuple[Flag, ...]
 
 
-def hops_in(motion: Motion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
+def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
     """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since.
 
     Of a video that is cut nothing is given, and nothing is looked for in it.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
-        picture: what the pictures say of each step; None: nothing.
     """
     if picture is None or cuts_in(motion, length_per_pixel, picture):
         return Hops(0.0, 0.0, 0.0, ())
@@ -104,7 +92,7 @@ class Clock(NamedTuple):
     flags: tuple[Flag, ...]
 
 
-def clock_of(motion: Motion, length_per_pixel: float, period: float, stated: Samples | None = None) -> Clock:
+def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated: Samples | None = None) -> Clock:
     """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?
 
     Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
@@ -149,12 +137,8 @@ def clock_of(motion: Motion, length_per_pixel: float, period: float, stated: Sam
     return Clock(0.5 * (span - usual) / float(closed[-1] - closed[0]), (Flag("clock-in-doubt", sentence),))
 
 
-def one_picture(motion: Motion) -> tuple[Flag, ...]:
-    """Flag frames that are the same to the last digit: a camera that is stuck, or copies of one picture.
-
-    Args:
-        motion: the robot's motion.
-    """
+def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
+    """Flag frames that are the same to the last digit: a camera that is stuck, or copies of one picture."""
     _, *series = motion
     seen = [values[np.isfinite(values)] for values in series]
     frames = seen[0].size
@@ -167,15 +151,11 @@ def one_picture(motion: Motion) -> tuple[Flag, ...]:
     return (Flag("one-picture", sentence, EVERYTHING),)
 
 
-def stands_still(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
+def stands_still(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
     """Flag a robot that turns, but does not advance by half a pixel.
 
     A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong compression
     leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the body.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
     """
     time, x, body_angle, tail_phase = motion
     known = np.isfinite(x)
@@ -232,7 +212,7 @@ class _Jump(NamedTuple):
     """Of the series."""
 
 
-def _jumps(motion: Motion, length_per_pixel: float) -> list[_Jump | None]:
+def _jumps(motion: RobotMotion, length_per_pixel: float) -> list[_Jump | None]:
     """The largest significant jumps of place, body and tail; None where there is none."""
     time, x, body_angle, tail_phase = motion
     if time.size < 2:

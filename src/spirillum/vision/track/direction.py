@@ -11,8 +11,6 @@ from spirillum.robust import mad_scale, repeated_median_line
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import DIRECTION
 
-__all__ = ["Along", "along_its_way"]
-
 
 class Along(NamedTuple):
     """Places and headings against the channel."""

@@ -15,14 +15,14 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.steadiness import camera_flags
-from spirillum.vision.track.steps import Follower, Seen
+from spirillum.vision.track.steps import FrameDetection, FrameTracker
 from spirillum.vision.track.track import Track
 from spirillum.vision.video.frames import Video
 
-__all__ = ["Seen", "Watcher", "follow", "scale_of"]
+__all__ = ["FrameDetection", "Watcher", "follow", "scale_of"]
 
 
-Watcher = Callable[[int, np.ndarray, Seen], None]
+Watcher = Callable[[int, np.ndarray, FrameDetection], None]
 """Called with a frame's number, its picture (8-bit RGB) and its observation."""
 
 
@@ -44,9 +44,6 @@ def follow(
         folder: folder of the setup file, to which the checkerboard's folder is relative; unset: the working directory.
         progress: called with the number of frames done and of all frames, None where unknown.
         on_frame: called with each frame's number, its picture (8-bit RGB) and its observation.
-
-    Raises:
-        InputError: if the video cannot be read, or neither ruler nor robot is found in it.
     """
     video = opened(video, setup)
     frames = samples_of(video, setup.start, setup.end)
@@ -55,7 +52,7 @@ def follow(
         frames = [still.frame(frame) for frame in frames]
     learnt = learnt_from(video, frames, setup, robot, folder)
     frames = [frame.small(learnt.sight.reduction) for frame in frames]  # large pictures have done their duty
-    follower = Follower(learnt.known, learnt.still)
+    follower = FrameTracker(learnt.known, learnt.still)
     aside = ThreadPoolExecutor(1)  # runs while the frames are followed
     moved = aside.submit(camera_flags, frames, learnt.known.start, ruled=setup.markers.spacing is not None)
     aside.shutdown(wait=False)

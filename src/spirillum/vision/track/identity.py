@@ -16,18 +16,16 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE, STANDING
-from spirillum.vision.track.first_look import Start, first_look
+from spirillum.vision.track.initial_detection import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.standing import standing_bodies
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
-from spirillum.vision.track.warnings import EVERYTHING, nose_on_the_other_side
+from spirillum.vision.track.visibility import EVERYTHING, nose_on_the_other_side
 from spirillum.vision.video.frames import Frame
 
 _SIZES = (1.0, 0.3, 3.3)
 """Apparent sizes over the stated one, about which from half to twice is looked through, one after the other."""
-
-__all__ = ["Identified", "identified_at", "identify"]
 
 
 class Identified(NamedTuple):
@@ -51,11 +49,7 @@ class Identified(NamedTuple):
         return wire.readable > IDENTITY.sure_share and not any(flag.spoils for flag in wire.flags)
 
     def tail_size(self, stated: Optics) -> float:
-        """Apparent wavelength of the tail over that of the robot file at the stated scale; NaN where it is not sure.
-
-        Args:
-            stated: the camera at the stated scale.
-        """
+        """Apparent wavelength of the tail over that of the robot file at the stated scale; NaN where it is not sure."""
         return self.wire.stretch * self.start.body.optics.focal / stated.focal
 
     @property
@@ -107,9 +101,6 @@ def identify(
         frames: frames spread over the video.
         still: static background of the frames, (h, w, 3).
         by_seal: whether it is looked for by its coloured seal first, else by its outline alone.
-
-    Raises:
-        InputError: if no object resembles the robot.
     """
     found: Identified | InputError
     try:
@@ -219,9 +210,6 @@ def identified_at(
         still: static background of the frames, (h, w, 3).
         size: of this body over that at the stated scale.
         colours: number of colours of its stripes, if it is looked for by these.
-
-    Raises:
-        InputError: if no object resembles the robot.
     """
     start = first_look(name, body, frames, still, colours)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)

@@ -2,31 +2,218 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from spirillum.arrays import Samples
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, sight_of
-from spirillum.vision.camera.scale import Sight
+from spirillum.vision.camera.optics import BodyPose, seen
+from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import SIZE
-from spirillum.vision.track.glare import Glare, standing_glare
+from spirillum.vision.track.constants import GLARE, OUTLINE, SIZE, STRIPES
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.search import searched_at
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
 
-__all__ = ["Learnt", "learnt_from"]
+
+class Glare(NamedTuple):
+    """What glare that stands still leaves in a track."""
+
+    drift: float
+    """Standard error of the way from the first frame to the last, pixels."""
+    flags: tuple[Flag, ...]
 
 
-class Learnt(NamedTuple):
+def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare:
+    """Look for glare that stands still where edges pass that tell how far the robot has moved.
+
+    Args:
+        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
+        poses: where the robot is on each of them, to a pixel or so.
+        body: the robot's body.
+    """
+    veil = _veil(images, poses, body)
+    if veil is not None:
+        return veil
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    bodies = np.array([_covered(body, pose) for pose in poses])
+    (left, top, right, bottom), wide = body.bounds, int(np.ptp(bodies[0], axis=0).min())
+    low = np.maximum(bodies.min(axis=(0, 1)).astype(int) - wide, (left, top))
+    high = np.minimum(bodies.max(axis=(0, 1)).astype(int) + wide, (right, bottom))
+    if np.any(high <= low):
+        return Glare(0.0, ())
+    around = slice(low[1], high[1]), slice(low[0], high[0])
+    darkest = 3 * (float(np.ceil(STRIPES.white)),)
+    white = [cv2.inRange(image[around], darkest, (255.0, 255.0, 255.0)) > 0 for image in images]
+    spots = _standing(white, bodies - low)
+    if not spots.any() or not _pass(body, poses, spots, low):
+        return Glare(0.0, ())
+    rows, columns = np.nonzero(spots)
+    u, v = low[0] + 0.5 * (columns.min() + columns.max()), low[1] + 0.5 * (rows.min() + rows.max())
+    size = f"{np.ptp(columns) + 1} by {np.ptp(rows) + 1} pixels"
+    sentence = (
+        f"glare stands still on the robot's way, about column {u:.0f} and row {v:.0f} of the picture ({size}): it "
+        "shifts edges of the body that pass there, so that the interval of the speed is wider; move the lamp or soften "
+        "its light until none lies there"
+    )
+    return Glare(GLARE.drift, (Flag("standing-glare", sentence),))
+
+
+def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare | None:
+    """Look beside the body for a lamp mirrored in the surface: a sharp step of the brightness across the robot's way.
+
+    It need not be white, and adds to the brightness of body and background alike. Lines of a ruler or a grid are
+    narrower than the medians that are compared; walls run along the way.
+    """
+    robot, pixel = body.robot, body.optics.length_per_pixel
+    x = np.array([pose.x for pose in poses])
+    middle = BodyPose(*np.median(np.array(poses), axis=0).tolist())
+    behind = 0.5 * robot.body.length + robot.coupling.length + robot.tail.length
+    first, last = x.min() - middle.x - behind, x.max() - middle.x + 0.5 * robot.body.length
+    wide = max(4, round(GLARE.veil_width * robot.body.diameter / pixel))
+    along = np.arange(first - wide * pixel, last + wide * pixel, pixel)
+    sides = [side * np.linspace(*GLARE.beside, GLARE.lines) * robot.body.diameter for side in (1.0, -1.0)]
+    profiles = [_brightness(images, middle, body, along, across) for across in sides]
+    if any(profile is None or profile.size <= 4 * wide for profile in profiles):
+        return None
+    place, size = _common_step(*(_sharp_steps(profile, wide) for profile in profiles if profile is not None))
+    if size < GLARE.veil_step:
+        return None
+    there, beside = float(along[place]), float(sides[0].mean())
+    u, v = seen(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
+    sentence = (
+        f"a reflection stands still on the robot's way: its edge is about column {u:.0f} and row {v:.0f} of the "
+        f"picture, {size:.0f} of 255 brighter than what is beside it: edges of the body and the wire are hidden or "
+        "shifted there, so that the interval of the speed is wider; move the lamp or soften its light until none lies "
+        "there"
+    )
+    return Glare(GLARE.veil_drift, (Flag("standing-glare", sentence),))
+
+
+def _brightness(
+    images: Sequence[np.ndarray], pose: BodyPose, body: BodyFinder, along: Samples, across: Samples
+) -> Samples | None:
+    """Median brightness at places along the way of a robot, of 255, (n,); None where much of it is out of view.
+
+    Args:
+        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
+        pose: of the robot halfway.
+        body: the robot's body.
+        along: places along its axis from its mid-length, m, (n,).
+        across: places across, m, (k,).
+    """
+    grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    pixels = np.nan_to_num(seen(grid, pose, body.optics), nan=-1.0).round().astype(int)
+    left, top, right, bottom = body.bounds
+    inside = np.all((pixels >= (left, top)) & (pixels < (right, bottom)), axis=1).reshape(along.size, across.size)
+    kept = inside.all(axis=1)
+    if kept.sum() < GLARE.in_view * along.size:
+        return None
+    columns, rows = np.clip(pixels, (left, top), (right - 1, bottom - 1)).T
+    grey = np.median([image[rows, columns].mean(axis=1) for image in images], axis=0).reshape(inside.shape)
+    profile = np.median(grey, axis=1)
+    return np.asarray(np.interp(np.arange(along.size), np.flatnonzero(kept), profile[kept]))
+
+
+def _sharp_steps(profile: Samples, wide: int) -> Samples:
+    """Step of a profile at each place, by the medians of both sides; 0 where it is not sharp, (n,)."""
+    gap = 2
+    windows = np.median(np.lib.stride_tricks.sliding_window_view(profile, wide), axis=1)
+    places = np.arange(wide + gap, profile.size - wide - gap)
+    steps = windows[places + gap] - windows[places - gap - wide]
+    near = profile[places + 2 * gap] - profile[places - 2 * gap]
+    out = np.zeros(profile.size)
+    out[places] = np.where(near * steps > GLARE.sharp * steps**2, steps, 0.0)
+    return out
+
+
+def _common_step(one: Samples, other: Samples) -> tuple[int, float]:
+    """Place and size of the largest step on both sides of the body at about the same place: what lies aside has one."""
+    found = [(0, 0.0)]
+    for sign in (1.0, -1.0):
+        rises = [np.maximum(sign * steps, 0.0) for steps in (one, other)]
+        around = [
+            np.lib.stride_tricks.sliding_window_view(np.pad(rise, GLARE.slant), 2 * GLARE.slant + 1).max(axis=1)
+            for rise in rises
+        ]
+        best = int(np.argmax(np.minimum(*around)))
+        near = np.arange(max(0, best - GLARE.slant), min(one.size, best + GLARE.slant + 1))
+        found.append((int(near[np.argmax((rises[0] + rises[1])[near])]), float(np.minimum(*around)[best])))
+    return max(found, key=lambda step: step[1])
+
+
+def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
+    """Corners of a part of the picture that body and coupling hide, but for what lies beside the coupling, (7, 2)."""
+    robot = body.robot
+    radius = GLARE.covered * 0.5 * robot.body.diameter
+    rear, front = -0.5 * robot.body.length - robot.coupling.length, 0.5 * (robot.body.length - robot.body.diameter)
+    nose = np.deg2rad([-90.0, -45.0, 0.0, 45.0, 90.0])
+    x = np.concatenate([[rear], front + radius * np.cos(nose), [rear]])
+    y = np.concatenate([[-radius], radius * np.sin(nose), [radius]])
+    return seen(np.column_stack([x, y, np.zeros(x.size)]), pose, body.optics)
+
+
+def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
+    """Spots that stay white where they are, on the way of the body, (h, w).
+
+    What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
+    shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
+    highlight that reaches over the body's rim would else lose there, and seem to stand.
+
+    Args:
+        white: what is white on each of n frames, (h, w).
+        bodies: corners of what body and coupling cover on each frame, (n, k, 2).
+    """
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    middle, shape = len(white) // 2, white[0].shape
+    moved = np.round(bodies.mean(axis=1) - bodies[middle].mean(axis=0)).astype(int)
+    covered, here = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.uint8)
+    cv2.fillConvexPoly(here, np.round(bodies[middle]).astype(np.int32), 1)
+    stays, moves = np.zeros(shape, dtype=np.uint16), np.zeros(shape, dtype=np.uint16)  # on how many frames
+    for one, corners, (right, down) in zip(white, bodies, moved, strict=True):
+        cv2.fillConvexPoly(covered, np.round(corners).astype(np.int32), 1)
+        stays += one
+        moves += np.roll(one, (-down, -right), axis=(0, 1))
+    often = GLARE.share * len(white)
+    (_, still), (_, along) = (cv2.connectedComponents((count >= often).astype(np.uint8)) for count in (stays, moves))
+    way, body = covered > 0, np.count_nonzero(here)
+    spots = np.zeros(way.shape, dtype=bool)
+    for label in np.unique(still[way & (still > 0)]):
+        spot = still == label
+        moving = np.isin(along, np.setdiff1d(along[spot], [0])) & way
+        inside = np.count_nonzero(spot & way)
+        if inside > max(GLARE.least * body, np.count_nonzero(moving)) and np.count_nonzero(spot) < GLARE.most * body:
+            spots |= spot
+    return spots
+
+
+def _pass(body: BodyFinder, poses: Sequence[BodyPose], spots: np.ndarray, low: np.ndarray) -> bool:
+    """Whether edges that tell how far the robot has moved come nearer to spots, or farther away, within their rims."""
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    reach = OUTLINE.half_profile + GLARE.rim * np.sqrt(np.count_nonzero(spots) / np.pi)
+    far = np.pad(cv2.distanceTransform((~spots).astype(np.uint8), cv2.DIST_L2, 5), 1, constant_values=reach)
+    last, seen_at = np.array(far.shape) - 1, []
+    for pose in poses:
+        pixels, _, _, slopes = body.contour.places(pose, body.optics)
+        row, column = np.clip(np.round(pixels - low).astype(int)[:, ::-1] + 1, 0, last).T
+        across = np.abs(slopes[:, 0]) * body.optics.length_per_pixel > GLARE.across
+        seen_at.append(np.where(across, np.minimum(far[row, column], reach), reach))
+    return bool(np.count_nonzero(np.ptp(seen_at, axis=0) > GLARE.passes) >= GLARE.fewest)
+
+
+class InitialDetection(NamedTuple):
     """Camera, scale, and the robot as it looks."""
 
-    sight: Sight
+    sight: CalibratedCamera
     """The calibrated camera."""
     known: Identified
     """The robot."""
@@ -46,7 +233,7 @@ class Learnt(NamedTuple):
 
 def learnt_from(
     video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None, *, by_seal: bool = True
-) -> Learnt:
+) -> InitialDetection:
     """Learn from some frames.
 
     Args:
@@ -56,9 +243,6 @@ def learnt_from(
         robot: the robot in front of the camera.
         folder: folder of the setup file, to which the checkerboard's folder is relative.
         by_seal: whether the robot is looked for by its coloured seal first, else by its outline alone.
-
-    Raises:
-        InputError: if neither ruler nor robot is found.
     """
     factor = reduction(video.size)
     still = background(frames, factor)
@@ -70,4 +254,4 @@ def learnt_from(
     poses = [known.start.expected(frame.time) for frame in frames]
     glare = standing_glare([frame.image for frame in frames], poses, known.start.body)
     known = known._replace(start=replace(known.start, seen=[]))  # what was learnt from is not needed any longer
-    return Learnt(sight, known, still, glare)
+    return InitialDetection(sight, known, still, glare)

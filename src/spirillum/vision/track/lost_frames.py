@@ -23,12 +23,10 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
 from spirillum.vision.track.multiples import Multiples, all_alike, multiples_of, near_their_mean
 from spirillum.vision.track.picture_change import PictureSteps
-from spirillum.vision.track.warnings import EVERYTHING
-
-__all__ = ["Reading", "Restored", "restored_times"]
+from spirillum.vision.track.visibility import EVERYTHING
 
 
-class Reading(NamedTuple):
+class FrameSeries(NamedTuple):
     """One series of a film, as it was read on each frame."""
 
     values: Samples
@@ -71,7 +69,7 @@ class _Jumps(NamedTuple):
     period: float
 
 
-def restored_times(time: Samples, readings: tuple[Reading, ...], picture: PictureSteps | None = None) -> Restored:
+def restored_times(time: Samples, readings: tuple[FrameSeries, ...], picture: PictureSteps | None = None) -> Restored:
     """Find frames that are missing although the times go on evenly, and correct the times where that is clear.
 
     A loss counts where the jumps prefer it to none by `LOST_FRAMES.clear` in chi-square, and to any other number by
@@ -121,7 +119,7 @@ def restored_times(time: Samples, readings: tuple[Reading, ...], picture: Pictur
     return Restored(found.time, found.relative_error + doubt, (*found.flags, _repeats(repeats, lost.size)))
 
 
-def _in_multiples(time: Samples, readings: tuple[Reading, ...], frame: float) -> Multiples | None:
+def _in_multiples(time: Samples, readings: tuple[FrameSeries, ...], frame: float) -> Multiples | None:
     """Of the first series whose steps are multiples of one; None where those of a clear series are alike."""
     if any(all_alike(time, reading.values, reading.period, frame) for reading in readings):
         return None
@@ -130,7 +128,7 @@ def _in_multiples(time: Samples, readings: tuple[Reading, ...], frame: float) ->
 
 
 def _put_back(
-    time: Samples, readings: tuple[Reading, ...], frame: float, lost: np.ndarray, odd: np.ndarray
+    time: Samples, readings: tuple[FrameSeries, ...], frame: float, lost: np.ndarray, odd: np.ndarray
 ) -> Restored:
     """Times with the losses that were found put back, or why nothing is given.
 
@@ -159,7 +157,7 @@ def _put_back(
     return Restored(corrected, doubt * frame / length, (_corrected(lost, doubtful=doubt > 0),))
 
 
-def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float, picture: PictureSteps | None) -> int:
+def _repeated(time: Samples, readings: tuple[FrameSeries, ...], frame: float, picture: PictureSteps | None) -> int:
     """Number of frames that show no motion between frames that do.
 
     Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
@@ -181,7 +179,7 @@ def _power(series: list[_Jumps]) -> float:
     return sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series)
 
 
-def _change_of_motion(time: Samples, readings: tuple[Reading, ...]) -> _Change | None:
+def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...]) -> _Change | None:
     """What changes in a film in which nothing moves for a while, or everything the other way; None of any other."""
     few = LOST_FRAMES.standing // 3
     means = []
@@ -235,7 +233,7 @@ def _losses(series: list[_Jumps], wide: int, picture: PictureSteps | None) -> tu
     return lost, odd
 
 
-def _all_jumps(time: Samples, readings: tuple[Reading, ...], frame: float, wide: int) -> list[_Jumps]:
+def _all_jumps(time: Samples, readings: tuple[FrameSeries, ...], frame: float, wide: int) -> list[_Jumps]:
     """Jumps of the series that move enough to tell lost frames.
 
     Args:
@@ -248,7 +246,7 @@ def _all_jumps(time: Samples, readings: tuple[Reading, ...], frame: float, wide:
     return [one for one in found if one is not None]
 
 
-def _jumps(time: Samples, reading: Reading, frame: float, wide: int) -> _Jumps | None:
+def _jumps(time: Samples, reading: FrameSeries, frame: float, wide: int) -> _Jumps | None:
     known = np.flatnonzero(np.isfinite(reading.values))
     if known.size <= LOST_FRAMES.fewest:
         return None

@@ -6,10 +6,8 @@ from typing import NamedTuple
 
 from spirillum.arrays import Samples
 
-__all__ = ["Motion"]
 
-
-class Motion(NamedTuple):
+class RobotMotion(NamedTuple):
     """Position and unwrapped angles of a robot on every frame; NaN where unknown."""
 
     time: Samples

@@ -15,8 +15,6 @@ from spirillum.arrays import Samples
 from spirillum.robust import stretches_of
 from spirillum.vision.track.constants import MULTIPLES
 
-__all__ = ["Multiples", "all_alike", "multiples_of", "near_their_mean"]
-
 
 class Multiples(NamedTuple):
     """How often which multiple of the smallest step is taken."""
@@ -30,14 +28,7 @@ class Multiples(NamedTuple):
 
 
 def multiples_of(time: Samples, values: Samples, period: float, frame: float) -> Multiples | None:
-    """Repeated and lost frames of a series whose steps are multiples of one; None where they are all alike, or differ.
-
-    Args:
-        time: time of each frame, s, (n,).
-        values: the series, as it was read on each frame; NaN where unreadable, (n,).
-        period: period of an angle; infinite for a position.
-        frame: usual time between two frames, s.
-    """
+    """Repeated and lost frames of a series whose steps are multiples of one; None where they are equal, or differ."""
     each = _steps(time, values, period, frame)
     if each.size <= MULTIPLES.fewest:
         return None
@@ -59,14 +50,7 @@ def multiples_of(time: Samples, values: Samples, period: float, frame: float) ->
 
 
 def all_alike(time: Samples, values: Samples, period: float, frame: float) -> bool:
-    """Whether nearly all steps of a series are about as large as their median: it is clear, and has no multiples.
-
-    Args:
-        time: time of each frame, s, (n,).
-        values: the series, as it was read on each frame; NaN where unreadable, (n,).
-        period: period of an angle; infinite for a position.
-        frame: usual time between two frames, s.
-    """
+    """Whether nearly all steps of a series are about as large as their median: it is clear, and has no multiples."""
     each = _steps(time, values, period, frame)
     if each.size <= MULTIPLES.fewest:
         return False

@@ -12,32 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale, running_median
 from spirillum.vision.track.constants import PICTURE_CHANGE
-
-__all__ = ["PictureChange", "PictureSteps", "picture_steps"]
 
 
 class PictureChange:
     """Compares each picture with the last two."""
 
     def __init__(self, bounds: tuple[int, int, int, int]) -> None:
-        """Begin.
-
-        Args:
-            bounds: part of the picture to look at: left, top, right, bottom.
-        """
+        """Begin."""
         self.bounds = bounds
         self._last: list[np.ndarray] = []
 
     def of(self, image: np.ndarray) -> tuple[float, float]:
-        """Root mean square change of brightness against the last picture and the one before, of 255; NaN without one.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-        """
-        cv2 = required("cv2", "measuring a video", "video")
+        """Root mean square change of brightness from the last picture and the one before, of 255; NaN without one."""
+        cv2 = import_optional("cv2", "measuring a video", "video")
         left, top, right, bottom = self.bounds
         part = cv2.cvtColor(image[top:bottom, left:right], cv2.COLOR_RGB2GRAY)
         share = min(1.0, PICTURE_CHANGE.width / max(part.shape))

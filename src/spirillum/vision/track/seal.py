@@ -12,12 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
-
-__all__ = ["ColourPart", "SealEdges", "SealShifts", "colour_part"]
 
 _SIDES = tuple(GROUPS.index(name) for name in ("rear", "left", "right", "seal"))
 _FLANKS = False, True, True, False
@@ -61,12 +59,7 @@ class SealEdges:
     """Finds the edges of the seal near expected places; learns its colours and the bias of each of them."""
 
     def __init__(self, contour: Contour, classes: int) -> None:
-        """Begin.
-
-        Args:
-            contour: apparent contour of the body.
-            classes: number of different colours of the stripes.
-        """
+        """Begin."""
         every = np.flatnonzero(contour.seal)
         self.chosen = every[:: max(1, round(every.size / SEAL.edges))]
         groups = contour.group[self.chosen]
@@ -111,7 +104,7 @@ class SealEdges:
             parts: surroundings of the robot on some frames.
             places: pixels and normals of the edges on each of them.
         """
-        cv2 = required("cv2", "measuring a video", "video")
+        cv2 = import_optional("cv2", "measuring a video", "video")
         flanks = np.concatenate(self._sides[1:3])
         inside = self._offsets <= -1.0
         colours = [
@@ -242,7 +235,7 @@ class SealEdges:
 
 def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> ColourPart:
     """Blurred colours of a part (left, top, right, bottom) of a picture, 0 to 255."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     part = cv2.GaussianBlur(image[top:bottom, left:right].astype(np.float32), (0, 0), blur)
     red, green, blue = (np.ascontiguousarray(part[..., channel], dtype=float) for channel in range(3))

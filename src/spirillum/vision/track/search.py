@@ -8,17 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.camera.optics import BodyPose
 from spirillum.vision.track.constants import SEARCH
 from spirillum.vision.track.contour import GROUPS
 from spirillum.vision.track.shape import Shape
 
-__all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined", "searched_at"]
 
-
-class Candidate(NamedTuple):
+class PoseCandidate(NamedTuple):
     """A candidate pose of the body."""
 
     pose: BodyPose
@@ -26,15 +24,8 @@ class Candidate(NamedTuple):
     """Edge score at the pose, over the mean gradient of the picture."""
 
 
-def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[Candidate]:
-    """Candidate poses of the body by a grid search over the reduced picture, best first, a body's width apart.
-
-    Args:
-        image: 8-bit RGB, (h, w, 3).
-        still: static background of the video, (h, w, 3).
-        body: the robot's body, before the camera of these pictures.
-        turn: offset of the trial headings, rad.
-    """
+def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[PoseCandidate]:
+    """Candidate poses of the body by a grid search over the reduced picture, best first, a body's width apart."""
     contour, optics, bounds = body.thin, body.optics, body.bounds
     left, top, _, bottom = bounds
     width = body.width
@@ -64,7 +55,7 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
     return _apart(np.concatenate(peaks) / usual, poses, width * optics.length_per_pixel)
 
 
-def _apart(scores: Samples, poses: Samples, far: float) -> list[Candidate]:
+def _apart(scores: Samples, poses: Samples, far: float) -> list[PoseCandidate]:
     """The best candidates without near duplicates.
 
     Args:
@@ -72,12 +63,12 @@ def _apart(scores: Samples, poses: Samples, far: float) -> list[Candidate]:
         poses: x, y and heading there, (n, 3).
         far: least distance between two candidates, m.
     """
-    kept: list[Candidate] = []
+    kept: list[PoseCandidate] = []
     left = np.argsort(-scores, kind="stable")
     left = left[scores[left] > 0.0]
     while left.size and len(kept) < SEARCH.candidates:
         best = left[0]
-        kept.append(Candidate(BodyPose(*poses[best].tolist()), float(scores[best])))
+        kept.append(PoseCandidate(BodyPose(*poses[best].tolist()), float(scores[best])))
         left = left[np.hypot(*(poses[left, :2] - poses[best, :2]).T) > far]
     return kept
 
@@ -92,21 +83,14 @@ def searched_at(width: float, most: int) -> int:
     return max(1, min(most, int(width / SEARCH.reduced_width)))
 
 
-def close_places(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[Candidate]:
-    """The three best candidates, refined in the full picture, best first.
-
-    Args:
-        image: 8-bit RGB, (h, w, 3).
-        still: static background of the video, (h, w, 3).
-        body: the robot's body, before the camera of these pictures.
-        turn: offset of the trial headings, rad.
-    """
+def close_places(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[PoseCandidate]:
+    """The three best candidates, refined in the full picture, best first."""
     rough = candidates(image, still, body, turn=turn)[:3]
     close = [refined(image, still, body, one) for one in rough]
     return sorted(close, key=lambda one: -one.score)
 
 
-def refined(image: np.ndarray, still: Samples, body: Shape, start: Candidate) -> Candidate:
+def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate) -> PoseCandidate:
     """Refine a candidate to a pixel in the full picture; its score is a gradient, grey values per pixel.
 
     Args:
@@ -118,14 +102,14 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: Candidate) ->
     contour, optics, bounds = body.thin, body.optics, body.bounds
     first = body.contour.places(start.pose, optics)[0]
     if not np.isfinite(first).all():
-        return Candidate(start.pose, 0.0)
+        return PoseCandidate(start.pose, 0.0)
     low = np.maximum(first.min(axis=0) - SEARCH.margin, bounds[:2]).astype(int)
     high = np.minimum(first.max(axis=0) + SEARCH.margin, bounds[2:]).astype(int)
     if np.any(high - low < 2 * SEARCH.margin):
-        return Candidate(start.pose, 0.0)
+        return PoseCandidate(start.pose, 0.0)
     part = int(low[0]), int(low[1]), int(high[0]), int(high[1])
     slope_u, slope_v, _ = _slopes(image, still, part, 1, SEARCH.fine_blur, bounded=False)
-    best = Candidate(start.pose, 0.0)
+    best = PoseCandidate(start.pose, 0.0)
     reach = SEARCH.reach
     scores, shift = np.empty((2 * reach + 1, 2 * reach + 1)), np.full(2, -float(reach))
     for _ in range(2):
@@ -138,18 +122,18 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: Candidate) ->
                 place = shift + np.unravel_index(np.argmax(scores), scores.shape)
                 middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + place
                 at = optics.points(middle, optics.axis_height)[0]
-                best = Candidate(BodyPose(float(at[0]), float(at[1]), heading), float(scores.max()))
+                best = PoseCandidate(BodyPose(float(at[0]), float(at[1]), heading), float(scores.max()))
     return best
 
 
-def most_likely(found: list[list[Candidate]], size: float) -> list[Candidate | None]:
+def most_likely(found: list[list[PoseCandidate]], size: float) -> list[PoseCandidate | None]:
     """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm).
 
     Args:
         found: candidates on each frame; may be empty. A frame on which none has a score above 0 shows no robot.
         size: the body's length, m.
     """
-    chosen: list[Candidate | None] = [None] * len(found)
+    chosen: list[PoseCandidate | None] = [None] * len(found)
     seen = [index for index, some in enumerate(found) if some and some[0].score > 0.0]
     if not seen:
         return chosen
@@ -175,7 +159,7 @@ def _background(still: Samples, bounds: tuple[int, int, int, int], factor: int) 
     left, top, right, bottom = bounds
     if factor == 1:
         return still[top:bottom, left:right]
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     low, high = np.array([left, top]) // factor, -(-np.array([right, bottom]) // factor)
     part = still[low[1] : high[1], low[0] : high[0]]
     large = cv2.resize(part, (part.shape[1] * factor, part.shape[0] * factor), interpolation=cv2.INTER_LINEAR)
@@ -197,7 +181,7 @@ def _slopes(
 
     The gradients are transposed, (w, h).
     """
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     whole, background = (
         cv2.cvtColor(part.astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)

@@ -10,8 +10,6 @@ from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.constants import SEARCH
 from spirillum.vision.track.contour import Contour
 
-__all__ = ["Shape"]
-
 
 class Shape(NamedTuple):
     """A body's edges before a camera, for the search of a whole picture."""
@@ -27,14 +25,7 @@ class Shape(NamedTuple):
 
     @classmethod
     def of(cls, contour: Contour, optics: Optics, bounds: tuple[int, int, int, int], factor: int = 1) -> Self:
-        """The edges of a body before a camera.
-
-        Args:
-            contour: the apparent edges of the body.
-            optics: the camera, as its reduced pictures show.
-            bounds: part of the full picture to look at.
-            factor: by which the pictures are reduced.
-        """
+        """The edges of a body before a camera."""
         left, top, right, bottom = bounds
         return cls(
             contour,

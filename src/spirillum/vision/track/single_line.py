@@ -16,8 +16,6 @@ from spirillum.robust import mad_scale
 from spirillum.vision.track.colours import runs_of
 from spirillum.vision.track.constants import SINGLE_LINE
 
-__all__ = ["SeenLine", "is_single", "seen_line"]
-
 
 class SeenLine(NamedTuple):
     """What a seal and the line on it look like."""

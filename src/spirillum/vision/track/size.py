@@ -23,19 +23,8 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SIZE
 from spirillum.vision.track.contour import contour_of
-from spirillum.vision.track.search import Candidate, close_places
+from spirillum.vision.track.search import PoseCandidate, close_places
 from spirillum.vision.track.shape import Shape
-
-__all__ = [
-    "LENGTHS",
-    "CheckedScale",
-    "OutlineFit",
-    "best_other_size",
-    "checked_scale",
-    "clearness",
-    "outline_seen",
-    "resized",
-]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
@@ -53,16 +42,12 @@ LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate"
 """Quantities that are proportional to the scale."""
 
 
-def clearness(found: Sequence[Sequence[Candidate]]) -> float:
-    """Clearness of a detection: median score of the best candidate over that of the third best, which is clutter.
-
-    Args:
-        found: candidates on some frames, best first.
-    """
+def clearness(found: Sequence[Sequence[PoseCandidate]]) -> float:
+    """Clearness of a detection: median score of the best candidate over that of the third best, which is clutter."""
     return float(np.median([some[0].score / max(some[2].score, 1e-9) if len(some) > 2 else 0.0 for some in found]))
 
 
-def _resemblance(found: Sequence[Sequence[Candidate]]) -> float:
+def _resemblance(found: Sequence[Sequence[PoseCandidate]]) -> float:
     """Clearness times the median score: a part of a robot may be as clear, but has fainter edges."""
     return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
 
@@ -90,7 +75,7 @@ def best_other_size(
     def at(size: float) -> float:
         [contour] = [contour for run, contour in contours.items() if size in run]
         other = Shape.of(contour, _magnified(expected, size).reduced(factor), body.bounds, factor)
-        places: list[list[Candidate]] = []
+        places: list[list[PoseCandidate]] = []
         for image in few:
             places.append(close_places(image, still, other))
             unclear = [one for one in places if clearness([one]) <= least]
@@ -105,12 +90,7 @@ def best_other_size(
 
 
 def resized(body: BodyFinder, size: float) -> BodyFinder:
-    """An untrained finder of a body under a camera with a larger magnification.
-
-    Args:
-        body: the body.
-        size: factor.
-    """
+    """An untrained finder of a body under a camera with a larger magnification."""
     contour = body.contour if size == 1.0 else None
     return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds, contour, colours=body.colours)
 
@@ -149,10 +129,6 @@ def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
 
     Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare and
     shadows agree on no size, so that they do not bias the maximum.
-
-    Args:
-        body: the body, after learning.
-        pose: pose of the body.
     """
     pixels, normals, _, slopes = body.contour.places(pose, body.optics)
     middle = body.optics.pixels(np.array([[pose.x, pose.y, body.optics.axis_height]]))

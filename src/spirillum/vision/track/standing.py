@@ -14,10 +14,8 @@ from spirillum.vision.camera.optics import BodyPose, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import STANDING
-from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.search import close_places
-
-__all__ = ["standing_bodies", "stands_flag"]
 
 
 def standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
@@ -52,13 +50,8 @@ def _surroundings(body: BodyFinder, pose: BodyPose) -> tuple[int, int, int, int]
     return low[0], low[1], high[0], high[1]
 
 
-def stands_flag(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
-    """Flag a robot that neither advances nor turns, whose stripes or tail were read.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
-    """
+def stands_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
+    """Flag a robot that neither advances nor turns, whose stripes or tail were read."""
     time, x, body_angle, tail_phase = motion
     limits = [(x, STANDING.moved * length_per_pixel), *((angle, STANDING.turned) for angle in (body_angle, tail_phase))]
     read = [(values[known], limit) for values, limit in limits if (known := np.isfinite(values)).any()]

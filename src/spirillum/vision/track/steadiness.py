@@ -10,16 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import STEADINESS
-from spirillum.vision.track.first_look import Start
+from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.video.frames import Frame
-
-__all__ = ["View", "camera_flags", "shift_between", "shift_of", "view_of"]
 
 _STEPS, _STILL = 8, 0.01
 """Most Gauss-Newton steps, and the step below which they end, pixels."""
@@ -27,7 +25,7 @@ _THREADS, _LARGE = 2, 6_000_000
 """Threads, and the bytes of a picture from which on one has to do, for its memory."""
 
 
-class View(NamedTuple):
+class StillPicture(NamedTuple):
     """What stands still in some pictures."""
 
     lines: Lines | None
@@ -36,7 +34,7 @@ class View(NamedTuple):
     """High-pass filtered brightness; 0 in the rows of the robot, (h, w)."""
 
 
-def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> View:
+def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> StillPicture:
     """What stands still in some pictures, three or more.
 
     Args:
@@ -49,10 +47,10 @@ def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> View:
     if start.body.optics.upright:  # the channel's shift is looked for along the rows
         left, top, right, bottom = bounds
         still, bounds = np.ascontiguousarray(np.swapaxes(still, 0, 1)), (top, left, bottom, right)
-    return View(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start, factor)))
+    return StillPicture(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start, factor)))
 
 
-def shift_of(first: View, other: View) -> tuple[float, bool]:
+def shift_of(first: StillPicture, other: StillPicture) -> tuple[float, bool]:
     """Shift of a view along the channel against another one, pixels, and whether it says that the camera moved."""
     rough = shift_between(first.flat, other.flat)
     if first.lines is None:
@@ -118,7 +116,7 @@ def shift_between(one: Samples, other: Samples) -> float:
         one: the first picture, high-pass filtered, (h, w).
         other: the second picture, (h, w).
     """
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
     correlation = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
     peaks = np.argwhere(
@@ -152,7 +150,7 @@ def shift_between(one: Samples, other: Samples) -> float:
 
 def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, int]) -> Samples:
     """High-pass filtered brightness; 0 in the rows of the robot."""
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(still[top:bottom, left:right].astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
     flat = np.clip(grey / np.maximum(cv2.GaussianBlur(grey, (0, 0), 15.0), 1.0) - 1.0, -0.6, 0.6)

@@ -15,18 +15,16 @@ from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import Placed
 from spirillum.vision.track.constants import FOLLOWING
-from spirillum.vision.track.first_look import close_place, on_the_way
 from spirillum.vision.track.identity import Identified
+from spirillum.vision.track.initial_detection import close_place, on_the_way
 from spirillum.vision.track.picture_change import PictureChange
-from spirillum.vision.track.search import Candidate, candidates
+from spirillum.vision.track.search import PoseCandidate, candidates
 from spirillum.vision.video.frames import Frame
-
-__all__ = ["Follower", "Record", "Seen"]
 
 _UNREAD = (np.nan, np.nan)
 
 
-class Seen(NamedTuple):
+class FrameDetection(NamedTuple):
     """The observation on one frame, for drawing."""
 
     time: float
@@ -61,7 +59,7 @@ class Record:
     """Change of the picture against the last one and the one before, of 255; NaN where there is none."""
 
 
-class Follower:
+class FrameTracker:
     """Follows a robot that is known from frame to frame."""
 
     def __init__(self, known: Identified, still: Samples, *, ahead: bool = True) -> None:
@@ -78,7 +76,7 @@ class Follower:
         self._last: BodyPose | None = None
         self._shares: deque[float] = deque(maxlen=FOLLOWING.usual_edges)
 
-    def step(self, frame: Frame) -> Seen:
+    def step(self, frame: Frame) -> FrameDetection:
         """Place the robot on the next frame, and read its stripes and tail."""
         start, record = self.known.start, self.record
         found = self._placed(frame, self._guess(frame.time))
@@ -99,7 +97,7 @@ class Follower:
         if found.known:
             self._last = found.pose
             self._shares.append(found.share)
-        return Seen(frame.time, found.pose if found.known else None, roll[0], tail[0], start.body.optics)
+        return FrameDetection(frame.time, found.pose if found.known else None, roll[0], tail[0], start.body.optics)
 
     def _guess(self, time: float) -> BodyPose | None:
         """Pose predicted from the last frames; None where the body was not detected on the last one."""
@@ -174,7 +172,7 @@ class Follower:
                     return found
         return lost
 
-    def _candidates(self, frame: Frame) -> list[Candidate]:
+    def _candidates(self, frame: Frame) -> list[PoseCandidate]:
         """Where the body may be in the whole picture, to a pixel, best first."""
         start, still = self.known.start, self.still
         if start.search is not None:

@@ -29,8 +29,6 @@ from spirillum.vision.track.constants import SINGLE_LINE, STRIPES
 from spirillum.vision.track.single_line import is_single, seen_line
 from spirillum.vision.track.widths import edge_shifts
 
-__all__ = ["Stripes"]
-
 _ROWS = 16
 """Samples along the axis."""
 _BLURRED = 2
@@ -99,11 +97,7 @@ class Stripes:
         return any(np.cos(angle + 2.0 * np.pi / count * (edge - 0.5)) >= np.cos(STRIPES.faces) - 1e-9 for edge in edges)
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
-        """Learn colours, shading and blur of the stripes from some frames of the video.
-
-        Args:
-            samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body in each.
-        """
+        """Learn colours, shading and blur of the stripes from some frames of the video."""
         if len(self.names) < 2 or self.robot.seal is None:
             sentence = "the robot has no stripes, so that its body's rotation cannot be seen; it is not given"
             self.flags = (Flag("no-stripes", sentence, ("body_rotation_rate",)),)
@@ -213,21 +207,11 @@ class Stripes:
         return np.asarray(fits[:, 3] >= STRIPES.ambiguous * fits[:, 2])
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
-        """Rotation angle of the body about +x, modulo `period`, and its standard error, rad; NaN where unreadable.
-
-        Args:
-            image: the picture, 8-bit RGB (h, w, 3).
-            pose: pose of the body.
-        """
+        """Rotation angle of the body about +x, modulo `period`, and its standard error, rad; NaN where unreadable."""
         return self.read_with_edges(image, pose)[0]
 
     def read_with_edges(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], Samples]:
-        """Rotation angle of the body and its standard error, and how far the edges lie off an even pattern of stripes.
-
-        Args:
-            image: the picture, 8-bit RGB (h, w, 3).
-            pose: pose of the body.
-        """
+        """Body angle with its standard error, and the deviations of the edges from an even pattern of stripes."""
         unread = (np.nan, np.nan), np.full(len(self.stripes), np.nan)
         if self.appearance is None:
             return unread

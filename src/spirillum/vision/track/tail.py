@@ -18,8 +18,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import TAIL
 
-__all__ = ["TailWave"]
-
 _TAIL = ("tail_rotation_rate",)
 _COARSE = 13
 """Stations along the tail at which the optics are evaluated."""
@@ -104,11 +102,7 @@ class TailWave:
         self._slope = np.gradient(np.eye(_COARSE), coarse[1] - coarse[0], axis=0, edge_order=2)
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
-        """Learn the contrast of the wire to its surroundings, and check its shape against the robot file.
-
-        Args:
-            samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body in each.
-        """
+        """Learn the contrast of the wire to its surroundings, and check its shape against the robot file."""
         strips = [(image, self._strip(pose)) for image, pose in samples]
         best, chosen = 0.0, None
         for weights in _CONTRASTS:
@@ -162,12 +156,7 @@ class TailWave:
         return [self._fit(image, strip) for image, strip in strips]
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
-        """Phase of the tail and its standard error, rad; NaN where it is unreadable.
-
-        Args:
-            image: the picture, 8-bit RGB (h, w, 3).
-            pose: pose of the body.
-        """
+        """Phase of the tail and its standard error, rad; NaN where it is unreadable."""
         found, hand = self._reading(image, pose)
         if hand is not None:
             self._hand.append(hand)
@@ -202,11 +191,7 @@ class TailWave:
         return tuple(flags)
 
     def flags_beside(self, *, doubtful: bool) -> tuple[Flag, ...]:
-        """Warnings, where the place of the body or the light may be the reason why the tail does not fit its file.
-
-        Args:
-            doubtful: whether it may be: then the file is not blamed.
-        """
+        """Warnings, where the place of the body or the light may be the reason why the tail does not fit its file."""
         if not doubtful:
             return self.flags
         other = [flag for flag in self.flags if flag.name != "tail-does-not-fit"]

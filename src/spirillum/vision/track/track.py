@@ -13,8 +13,6 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.cues import Cue
 
-__all__ = ["Track"]
-
 
 @dataclass(frozen=True)
 class Track:

@@ -17,9 +17,7 @@ from spirillum.robust import least_squares_line, running_median
 from spirillum.units import show
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import UNWRAPPING
-from spirillum.vision.track.motion import Motion
-
-__all__ = ["contradictions", "likeliest_rate", "no_stripe_passes", "nothing_moves", "unwrapped"]
+from spirillum.vision.track.motion import RobotMotion
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -251,13 +249,8 @@ def _slope(time: Samples, value: Samples) -> tuple[float, float]:
     return rate, rate * float(t[-1] - t[0])
 
 
-def nothing_moves(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
-    """Flag an object that neither moves nor turns and has no tail: it may belong to the background.
-
-    Args:
-        motion: the robot's motion.
-        robot: the robot.
-    """
+def nothing_moves(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
+    """Flag an object that neither moves nor turns and has no tail: it may belong to the background."""
     time, x, body_angle, tail_phase = motion
     if time.size < UNWRAPPING.fewest_frames:
         return ()
@@ -271,7 +264,7 @@ def nothing_moves(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
     return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
 
 
-def no_stripe_passes(motion: Motion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:
+def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:
     """Flag a body that stays where it is while its tail turns: shades of the lamp may have been taken for stripes.
 
     Args:
@@ -297,7 +290,7 @@ def no_stripe_passes(motion: Motion, robot: Robot, *, readable: float = 1.0) -> 
     return (Flag("stripes-do-not-pass", sentence, _RATES["body"]),)
 
 
-def contradictions(motion: Motion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:
+def contradictions(motion: RobotMotion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:
     """Flag rates that no torque-free swimmer has: signs of aliasing, or of a wrong robot file.
 
     Without an external torque the body counter-rotates. The tail propels in the sense of its rotation and handedness,

@@ -17,8 +17,6 @@ from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import WIDTHS
 
-__all__ = ["Evened", "edge_shifts", "evened"]
-
 
 class Evened(NamedTuple):
     """Angles of a body without what its stripes' widths do to them."""
@@ -124,9 +122,6 @@ def _not_of_paint(places: Samples) -> Flag | None:
 
     All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
     deviation s sqrt((n - k)/(k (n - 1))).
-
-    Args:
-        places: shift of each edge, rad, (stripes,); NaN where unknown.
     """
     count, off = places.size, _off_even(places)
     if not off.size:
@@ -151,9 +146,6 @@ def _another_size(places: Samples) -> tuple[float, Flag] | None:
     A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
     than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
     other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the size.
-
-    Args:
-        places: shift of each edge, rad, (stripes,); NaN where unknown.
     """
     count, off = places.size, _off_even(places)
     if not 1 < off.size < count:

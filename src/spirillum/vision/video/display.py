@@ -9,10 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
-
-__all__ = ["ASPECTS", "AS_STORED", "Display", "converter", "display_flags", "frame_display", "stated_aspect"]
 
 ASPECTS = (0.2, 5.0)
 """Least and largest width of a pixel over its height."""
@@ -63,7 +61,7 @@ class Display(NamedTuple):
         height, stored = picture.shape[:2]
         width = max(1, round(stored * self.aspect))
         if width != stored:
-            cv2 = required("cv2", "measuring a video", "video")
+            cv2 = import_optional("cv2", "measuring a video", "video")
             how = cv2.INTER_CUBIC if width > stored else cv2.INTER_AREA
             picture = cv2.resize(picture, (width, height), interpolation=how)
         if self.transposed:
@@ -112,9 +110,6 @@ def stated_aspect(name: str, stated: float | None, given: float | None) -> float
         name: of the video, for the sentence of an error.
         stated: what the file states; None where it says nothing.
         given: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-
-    Raises:
-        InputError: if no camera has such pixels.
     """
     aspect = (stated or 1.0) if given is None else given
     if not ASPECTS[0] <= aspect <= ASPECTS[1]:
@@ -178,12 +173,8 @@ def _turned(display: Display) -> str:
 
 
 def converter(display: Display) -> Callable[[Any], np.ndarray]:
-    """A function that gives a decoded frame's picture as shown, for one thread: its converter is set up once.
-
-    Args:
-        display: how the frames are shown.
-    """
-    av = required("av", "measuring a video", "video")
+    """A function that gives a decoded frame's picture as shown, for one thread: its converter is set up once."""
+    av = import_optional("av", "measuring a video", "video")
     reformatter = av.video.reformatter.VideoReformatter()
 
     def rgb(frame: Any) -> np.ndarray:

@@ -8,20 +8,21 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from queue import Full, Queue
+from threading import Event, Thread
+from typing import Any, TypeVar
 
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
 from spirillum.files import checked_path, opened
 from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 from spirillum.vision.video.display import AS_STORED, Display, converter, display_flags, frame_display, stated_aspect
 from spirillum.vision.video.image_sequence import ImageSequence, image_folder, image_stack
 from spirillum.vision.video.pictures import STACKS, reduced
 from spirillum.vision.video.provenance import one_line, words_of_images
-from spirillum.vision.video.read_ahead import ahead
 from spirillum.vision.video.streams import (
     UNSTATED,
     VIDEO,
@@ -33,7 +34,41 @@ from spirillum.vision.video.streams import (
     stated_length,
 )
 
-__all__ = ["FILMS", "Frame", "Video", "open_video"]
+T = TypeVar("T")
+
+
+def ahead(items: Iterator[T], count: int) -> Iterator[T]:
+    """Items of an iterable, taken by a thread of its own before they are asked for."""
+    queue: Queue[T | BaseException | None] = Queue(count)
+    left = Event()
+
+    def put(item: T | BaseException | None) -> None:
+        while not left.is_set():
+            with suppress(Full):
+                queue.put(item, timeout=0.2)
+                return
+
+    def read() -> None:
+        try:
+            for item in items:
+                put(item)
+                if left.is_set():
+                    return
+            put(None)
+        except BaseException as error:  # handed over to the thread that asked
+            put(error)
+
+    thread = Thread(target=read, name="decoding", daemon=True)
+    thread.start()
+    try:
+        while (item := queue.get()) is not None:
+            if isinstance(item, BaseException):
+                raise item
+            yield item
+    finally:
+        left.set()
+        thread.join()
+
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
 """Endings of films."""
@@ -126,19 +161,11 @@ class Video:
         return max(fewest, min(size // (3 * self.size[0] * self.size[1]), most))
 
     def frames(self, start: float = 0.0, end: float | None = None) -> Iterator[Frame]:
-        """The frames from one time to another, decoded ahead by a thread of its own.
-
-        Raises:
-            InputError: if there is none, or the first cannot be read.
-        """
+        """The frames from one time to another, decoded ahead by a thread of its own."""
         return ahead(self._read(start, end), self.waiting)
 
     def samples(self, times: Sequence[float]) -> list[Frame]:
-        """The first frames at or after some rising times; fewer where the video has ended.
-
-        Raises:
-            InputError: if there is none at all.
-        """
+        """The first frames at or after some rising times; fewer where the video has ended."""
         if self.images is not None:
             stamps = self._stamps()
             chosen = sorted({int(np.searchsorted(stamps, time - 1e-9)) for time in times})
@@ -219,12 +246,8 @@ class Video:
             self._note("frames-not-read", sentence)
 
     def _decoded(self) -> Iterator[tuple[Any, float | None]]:
-        """The film's frames, each with its time, until its end, or until it cannot be decoded any further.
-
-        Raises:
-            InputError: if not even the first can be decoded.
-        """
-        av = required("av", _PURPOSE, "video")
+        """The film's frames, each with its time, until its end, or until it cannot be decoded any further."""
+        av = import_optional("av", _PURPOSE, "video")
         count = 0
         with open_container(self.path) as container:
             stream = _threaded(container)
@@ -245,7 +268,7 @@ class Video:
     def _film_samples(self, times: list[float]) -> list[Frame]:
         if self.given_rate or not self.duration:  # its own time stamps do not count
             return self._some(self._passed(times))
-        av = required("av", _PURPOSE, "video")
+        av = import_optional("av", _PURPOSE, "video")
         found: list[Frame] = []
         with open_container(self.path) as container, suppress(av.error.FFmpegError, ValueError):  # what can be read
             stream = _threaded(container)
@@ -294,9 +317,6 @@ def open_video(
         path: the film, TIFF file or folder.
         frames_per_second: rate of images, or instead of a film's own time stamps.
         pixel_aspect_ratio: width of a pixel over its height, instead of what the file states.
-
-    Raises:
-        InputError: if it is missing, empty, not a video, has no pictures or an absurd size, or images have no rate.
     """
     path = checked_path(path, VIDEO)
     try:
@@ -313,7 +333,7 @@ def open_video(
 
 
 def _film(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:
-    av = required("av", _PURPOSE, "video")
+    av = import_optional("av", _PURPOSE, "video")
     with open_container(path) as container:
         if not container.streams.video:
             raise InputError(f"{path} has no pictures; allowed: {VIDEO}")

@@ -19,8 +19,6 @@ from spirillum.vision.video.pictures import IMAGES, Header, bits_of, eight_bit, 
 from spirillum.vision.video.provenance import stated_size
 from spirillum.vision.video.streams import VIDEO
 
-__all__ = ["ImageSequence", "image_folder", "image_stack"]
-
 _FEW = 10
 """First images, whose usual size is that of all; and images spread over all, whose brightest value is."""
 
@@ -53,20 +51,11 @@ class ImageSequence:
         return f"page {index + 1} of {self.files[0].name}" if self.pages else self.files[index].name
 
     def read(self, index: int) -> np.ndarray | None:
-        """An image as it is shown, 8-bit RGB, (height, width, 3); None where it cannot be read.
-
-        Raises:
-            InputError: if it has another size than the others.
-        """
+        """An image as it is shown, 8-bit RGB, (height, width, 3); None where it cannot be read."""
         return next(self.read_from(index, 1))
 
     def read_from(self, index: int, batch: int) -> Iterator[np.ndarray | None]:
-        """The images from one on, as `read` gives them.
-
-        Args:
-            index: the first one.
-            batch: number of pages that are decoded at a time: each time, the file is gone through from its start.
-        """
+        """The images from one on, as `read` gives them."""
         if self.pages:
             for start in range(index, self.pages, batch):
                 count = min(batch, self.pages - start)
@@ -87,13 +76,6 @@ def image_folder(path: Path, aspect: float | None) -> ImageSequence:
 
     Numbers at the end of the names count the images as they were recorded, if they rise in steps of which the smallest
     is 1: a number that is missing is an image that was dropped.
-
-    Args:
-        path: the folder.
-        aspect: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-
-    Raises:
-        InputError: if it holds no image or too many, none can be read, or their sizes or orientations differ.
     """
     found = (entry for entry in path.iterdir() if entry.suffix.lower() in IMAGES and entry.is_file())
     files = [entry for entry in found if not entry.name.startswith(".")]
@@ -121,15 +103,7 @@ def image_folder(path: Path, aspect: float | None) -> ImageSequence:
 
 
 def image_stack(path: Path, aspect: float | None) -> ImageSequence:
-    """The pages of a TIFF file.
-
-    Args:
-        path: the file.
-        aspect: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-
-    Raises:
-        InputError: if it is no such file, its pages have several sizes, or the first ones cannot be decoded.
-    """
+    """The pages of a TIFF file."""
     header = read_header(path)
     spread = [] if header is None else [read_pages(path, header, place, 1)[0] for place in _spread(header.pages)]
     if header is None or all(picture is None for picture in spread):

@@ -12,13 +12,10 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
 from spirillum.files import opened, read_bytes
 from spirillum.files.limits import LARGEST_PICTURE, MOST_IMAGES, MOST_PIXELS
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.video.display import Display
-
-__all__ = ["IMAGES", "STACKS", "Header", "bits_of", "eight_bit", "read_header", "read_image", "read_pages", "reduced"]
-__all__ += ["reduction"]
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 """Endings of images."""
@@ -57,16 +54,7 @@ class Header(NamedTuple):
     """Whether it is a TIFF file."""
 
     def aspect(self, path: Path, given: float | None) -> float | None:
-        """Width of a pixel over its height by the densities; None where they state nothing.
-
-        Args:
-            path: the file.
-            given: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-
-        Raises:
-            InputError: if the densities differ and have no unit, and the setup does not say: programs write them
-                either way round.
-        """
+        """Width of a pixel over its height by the densities; None where they state nothing."""
         across, down, bare = self.densities
         if not (across > 0 and down > 0 and abs(down / across - 1.0) > _SQUARE):
             return None
@@ -81,11 +69,7 @@ class Header(NamedTuple):
 
 
 def reduction(size: tuple[int, int]) -> int:
-    """Factor by which pictures of a size are reduced where they are looked at as a whole; 1 for usual ones.
-
-    Args:
-        size: width and height, pixels.
-    """
+    """Factor by which pictures of a size are reduced where they are looked at as a whole; 1 for usual ones."""
     return -(-max(size) // _USUAL)
 
 
@@ -98,28 +82,19 @@ def reduced(image: np.ndarray, factor: int) -> np.ndarray:
     """
     if factor == 1:
         return image
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     height, width = image.shape[0] // factor, image.shape[1] // factor
     whole = image[: height * factor, : width * factor]
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))
 
 
 def bits_of(image: np.ndarray) -> int:
-    """Number of bits, 8 at least, that the values of an image fill: 12 of a 12-bit camera's in 16.
-
-    Args:
-        image: 8-bit or 16-bit.
-    """
+    """Number of bits, 8 at least, that the values of an image fill: 12 of a 12-bit camera's in 16."""
     return max(8, int(image.max()).bit_length())
 
 
 def eight_bit(image: np.ndarray, bits: int) -> np.ndarray:
-    """An image of 8-bit values; what is brighter than `bits` bits is white.
-
-    Args:
-        image: 8-bit or 16-bit.
-        bits: that its values may fill.
-    """
+    """An image of 8-bit values; what is brighter than `bits` bits is white."""
     if image.dtype == np.uint8:
         return image
     bright: np.ndarray = np.minimum(image >> (bits - 8), 255)
@@ -133,12 +108,8 @@ def read_image(path: Path, *, grey: bool = False, display: Display | None = None
         path: the file.
         grey: grey values, (height, width), in place of colours, (height, width, 3).
         display: of the other images of its folder; None: of any orientation.
-
-    Raises:
-        InputError: if it is no regular file, too large, has too many pixels, several pages, another orientation, or
-            values of a kind whose white is not known.
     """
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     data = read_bytes(path, _WHAT, LARGEST_PICTURE)
     header = _header(BytesIO(data), path)
     if header is None:
@@ -163,7 +134,7 @@ def read_pages(path: Path, header: Header, start: int, count: int) -> list[np.nd
         start: first page, from 0.
         count: number of pages.
     """
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     try:
         _, found = cv2.imreadmulti(str(path), start, count, flags=_flags(grey=False))
     except cv2.error:
@@ -174,22 +145,14 @@ def read_pages(path: Path, header: Header, start: int, count: int) -> list[np.nd
 
 
 def read_header(path: Path) -> Header | None:
-    """What an image states of itself; None where it is none.
-
-    Args:
-        path: the file.
-
-    Raises:
-        InputError: if it is no regular file, has too many pixels or pages, pages of several sizes, or values of a kind
-            whose white is not known.
-    """
+    """What an image states of itself; None where it is none."""
     largest = sys.maxsize if path.suffix.lower() in STACKS else LARGEST_PICTURE
     with opened(path, _WHAT, largest) as stream:
         return _header(stream, path)
 
 
 def _flags(*, grey: bool) -> int:
-    cv2 = required("cv2", "measuring a video", "video")
+    cv2 = import_optional("cv2", "measuring a video", "video")
     kind = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
     return int(kind | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION)
 
@@ -202,11 +165,7 @@ def _stored(image: np.ndarray | None, header: Header) -> np.ndarray | None:
 
 
 def _header(stream: BinaryIO | BytesIO, path: Path) -> Header | None:
-    """What an image states of itself; None where it is none.
-
-    Raises:
-        InputError: if it is too large, or of a kind that is not read.
-    """
+    """What an image states of itself; None where it is none."""
     from PIL import Image
 
     try:

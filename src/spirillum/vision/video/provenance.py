@@ -10,18 +10,11 @@ from spirillum.errors import InputError
 from spirillum.files import opened, read_bytes
 from spirillum.files.limits import LARGEST_PICTURE
 
-__all__ = ["one_line", "stated_size", "words_of_images"]
-
 _MOST_WORDS = 2000
 
 
 def words_of_images(folder: Path, image: Path) -> str:
-    """Texts in a PNG file, and of a README in its folder or beside it.
-
-    Args:
-        folder: folder of the images.
-        image: the first of them.
-    """
+    """Texts in a PNG file, and of a README in its folder or beside it."""
     found = []
     if image.suffix.lower() == ".png":
         data = read_bytes(image, "an image", LARGEST_PICTURE)
@@ -39,11 +32,7 @@ def words_of_images(folder: Path, image: Path) -> str:
 
 
 def stated_size(image: Path) -> tuple[int, int] | None:
-    """Width and height that a PNG file states at its start, pixels; None for any other file.
-
-    Args:
-        image: the file.
-    """
+    """Width and height that a PNG file states at its start, pixels; None for any other file."""
     with suppress(InputError), opened(image, "an image", LARGEST_PICTURE) as file:
         start = file.read(24)
         if start[:8] == b"\x89PNG\r\n\x1a\n" and start[12:16] == b"IHDR" and len(start) == 24:

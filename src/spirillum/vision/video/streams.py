@@ -8,19 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
-from spirillum.extras import required
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
-
-__all__ = [
-    "UNSTATED",
-    "VIDEO",
-    "Stated",
-    "film_stream",
-    "frame_clock",
-    "open_container",
-    "short_reason",
-    "stated_length",
-]
 
 VIDEO = "a film (mp4, avi, mov, mkv, webm), a TIFF file of several pages, or a folder of images (png, jpg, tif, bmp)"
 """What a video may be, for sentences."""
@@ -55,12 +44,8 @@ UNSTATED = Stated(None, 0, _LOOSE)
 
 
 def open_container(path: Path) -> Any:
-    """A film's file, opened by PyAV.
-
-    Raises:
-        InputError: if it is none.
-    """
-    av = required("av", "measuring a video", "video")
+    """A film's file, opened by PyAV."""
+    av = import_optional("av", "measuring a video", "video")
     try:
         return av.open(f"file:{path}", options=_OPENING, metadata_errors="replace")
     except (av.error.FFmpegError, ValueError, OSError) as error:
@@ -71,11 +56,8 @@ def film_stream(container: Any) -> tuple[Any, list[Flag]]:
     """The longest stream of pictures that is no thumbnail, and a flag where several are films.
 
     Of streams that are about as long, the largest pictures are taken, else the first.
-
-    Args:
-        container: the opened file; it has at least one stream of pictures.
     """
-    av = required("av", "measuring a video", "video")
+    av = import_optional("av", "measuring a video", "video")
     attached = av.stream.Disposition.attached_pic
     streams = list(container.streams.video)
     films = [one for one in streams if not one.disposition & attached and not 0 < one.frames < _FEW] or streams
@@ -104,10 +86,6 @@ def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
 
     AVI numbers the frames as they are stored. Where codecs store them in another order than they are shown (B frames),
     these numbers rise with the decoder's time stamps alone.
-
-    Args:
-        container: the opened file.
-        stream: its stream of pictures.
     """
     if container.format.name != "avi":
         return lambda frame: frame.time
@@ -128,12 +106,8 @@ def stated_length(container: Any, stream: Any) -> Stated:
     """How long a film is by what its file states of it.
 
     AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
-
-    Args:
-        container: the opened file.
-        stream: its stream of pictures.
     """
-    av = required("av", "measuring a video", "video")
+    av = import_optional("av", "measuring a video", "video")
     rate = float(stream.average_rate or 0.0)
     tight = 3.0 / rate if rate else _LOOSE
     if container.format.name == "avi" and stream.frames and rate:

@@ -1,0 +1,200 @@
+"""Arguments of public functions against their annotations: a wrong kind is named in one sentence before any work.
+
+An annotation is read as it stands in the source, so that nothing has to be imported for it: ``str | Path | None``,
+``Sequence[str]``, ``Robot``. What it does not tell, such as the range of a number, the function itself looks at.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import os
+import sys
+import types
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cache, wraps
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
+
+from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.scalars import is_number, is_true_or_false, is_whole
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from spirillum.arrays import Samples, Whole
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class _Kind(NamedTuple):
+    """One kind of values."""
+
+    words: str
+    """For the sentence of an error."""
+    holds: Callable[[Any], bool]
+    """Whether a value is of it; of a list, whether it is a list at all."""
+    items: tuple[_Kind, ...] = ()
+    """Kinds of the items of a list; empty: any."""
+
+
+def _is_list(value: Any) -> bool:
+    """Several values whose number is known, but no text, no mapping, and no array of one value without a length."""
+    return (
+        isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping)) and getattr(value, "ndim", 1) > 0
+    )
+
+
+def _is_named(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+
+
+_BASIC = {
+    "str": _Kind("text", lambda value: isinstance(value, str)),
+    "Path": _Kind("a path", lambda value: isinstance(value, os.PathLike)),
+    "int": _Kind("a whole number", is_whole),
+    "float": _Kind("a number", is_number),
+    "bool": _Kind("True or False", is_true_or_false),
+    "None": _Kind("None", lambda value: value is None),
+    "Mapping": _Kind("a mapping of names", _is_named),
+    "Callable": _Kind("a function", callable),
+    "Samples": _Kind("an array", lambda value: hasattr(value, "ndim")),
+    "PerRobot": _Kind("an array", lambda value: hasattr(value, "ndim")),
+}
+_ANY = _Kind("anything", lambda _value: True)
+_LISTS = ("Sequence", "tuple", "list")
+
+
+def validate_arguments(function: Callable[P, R]) -> Callable[P, R]:
+    """A function that looks at the kinds of its arguments first.
+
+    Returns:
+        The function; it raises `InputError` for an argument of a wrong kind, or one that it does not have.
+    """
+    signature = inspect.signature(function)
+    names = [name for name, item in signature.parameters.items() if item.kind is not item.VAR_KEYWORD]
+    open_ended = len(names) < len(signature.parameters)
+    own = names[1:] if names[:1] in (["self"], ["cls"]) else names
+    called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
+
+    @cache
+    def kinds_of(name: str) -> tuple[_Kind, ...]:
+        annotation = signature.parameters[name].annotation
+        if not isinstance(annotation, str):
+            return (_ANY,)
+        return _kinds(ast.parse(annotation, mode="eval").body, function.__globals__)
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name in kwargs:
+            if name not in names and not open_ended:
+                raise InputError(
+                    f"{name} is no argument of {called}(){did_you_mean(name, own)}; allowed: {', '.join(own)}"
+                )
+        for name, value in {**dict(zip(names, args, strict=False)), **kwargs}.items():
+            if name in own:
+                _check(name, value, kinds_of(name))
+        return function(*args, **kwargs)
+
+    return call
+
+
+def check_kind(name: str, value: Any, annotation: str) -> None:
+    """Refuse a value of a wrong kind.
+
+    Args:
+        name: what it is called.
+        value: the value.
+        annotation: kinds that are allowed, such as ``int | None``.
+    """
+    _check(name, value, _kinds(ast.parse(annotation, mode="eval").body, {}))
+
+
+def as_number(value: Any) -> float:
+    """A value as a number; NaN, which is in no range, for what is none, and for one too large to be a float."""
+    if not is_number(value):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
+
+def number_array(name: str, value: Any, allowed: str = "numbers") -> Samples:
+    """A number, or numbers of any shape, as an array of floats."""
+    found = _array_of(name, value, "iuf", allowed)
+    return found.astype(float, copy=False)
+
+
+def whole_array(name: str, value: Any, allowed: str = "whole numbers") -> Whole:
+    """A whole number, or whole numbers of any shape, as an array of indices."""
+    import numpy as np
+
+    found = _array_of(name, value, "iu", allowed)
+    return found.astype(np.intp, copy=False)
+
+
+def _array_of(name: str, value: Any, kinds: str, allowed: str) -> np.ndarray:
+    """An array whose items are of one of these kinds, letters of `numpy.dtype.kind`."""
+    import numpy as np
+
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}") from error
+    if found.dtype.kind not in kinds or np.any(np.ma.getmask(value)):
+        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")
+    return found
+
+
+def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:
+    """Refuse a value of none of these kinds."""
+    fitting = [kind for kind in kinds if kind.holds(value)]
+    if fitting == [_BASIC["float"]] and is_whole(value) and abs(int(value)) > sys.float_info.max:
+        raise InputError(f"{name} = {clipped(value)}; allowed: at most {sys.float_info.max:.2g} in size")
+    if not fitting:
+        allowed = list(dict.fromkeys(kind.words for kind in kinds))
+        words = allowed[0] if len(allowed) == 1 else f"{', '.join(allowed[:-1])} or {allowed[-1]}"
+        raise InputError(f"{name} = {clipped(value)}; allowed: {words}")
+    if all(kind.items for kind in fitting):
+        for number, item in enumerate(value):
+            _check(f"{name}[{number}]", item, fitting[0].items)
+
+
+def _kinds(node: ast.expr, known: Mapping[str, Any]) -> tuple[_Kind, ...]:
+    """The kinds that an annotation allows; `known` has the names of its module."""
+    match node:
+        case ast.BinOp():
+            return *_kinds(node.left, known), *_kinds(node.right, known)
+        case ast.Constant(value=None):
+            return (_BASIC["None"],)
+        case ast.Subscript(value=ast.Name(id=name)) if name in _LISTS:
+            first = node.slice.elts[0] if isinstance(node.slice, ast.Tuple) else node.slice
+            return (_Kind("a list", _is_list, _kinds(first, known)),)
+        case ast.Subscript():
+            return _kinds(node.value, known)
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return _meant(name, known.get(name))
+        case _:
+            return (_ANY,)
+
+
+def _meant(name: str, found: Any) -> tuple[_Kind, ...]:
+    """The kinds behind a name: those of an alias, else a class, which may not have been imported."""
+    if name in ("Any", "object"):
+        return (_ANY,)
+    if name in _BASIC:
+        return (_BASIC[name],)
+    if found is None or (isinstance(found, type) and get_origin(found) is None):
+        return (_named(name),)
+    if isinstance(found, types.UnionType):
+        return tuple(kind for part in get_args(found) for kind in _meant(getattr(part, "__name__", ""), part))
+    origin = get_origin(found)
+    return (_BASIC.get(getattr(origin, "__name__", ""), _ANY),)
+
+
+def _named(name: str) -> _Kind:
+    """A class by its name, or that of one that it derives from."""
+    article = "an" if name[0] in "AEIOU" else "a"
+    return _Kind(f"{article} {name}", lambda value: any(one.__name__ == name for one in type(value).__mro__))

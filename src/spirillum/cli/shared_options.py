@@ -1,0 +1,234 @@
+"""Options that several commands share, and what the shell completes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+MODEL_PANEL = "Model"
+"""Panel of the help: which model answers, with which friction and calibration, how finely."""
+PLACE_PANEL = "Place in the channel (model tube)"
+"""Panel of the help: where in its channel the robot lies."""
+
+
+def starting(words: Iterable[str], incomplete: str) -> list[str]:
+    """Words that begin with what is typed."""
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def complete_presets(incomplete: str) -> list[str]:
+    """Names of presets."""
+    folder = Path(__file__).parent.parent / "robot" / "presets"
+    return starting(sorted(path.stem for path in folder.glob("*.toml")), incomplete)
+
+
+def complete_robots(incomplete: str) -> list[str]:
+    """Presets and robot files."""
+    folder = Path(incomplete).parent
+    files = sorted(str(path) for path in folder.glob("*.toml")) if folder.is_dir() else []
+    return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
+
+
+def complete_models(incomplete: str) -> list[str]:
+    """Names of models that make a robot swim."""
+    from spirillum.fluid.registry import SWIMMER_MODELS
+
+    return starting(sorted(SWIMMER_MODELS), incomplete)
+
+
+def complete_auto_models(incomplete: str) -> list[str]:
+    """Names of models that make a robot swim, and the word that leaves the choice open."""
+    return [*starting(("auto",), incomplete), *complete_models(incomplete)]
+
+
+def complete_resistance_models(incomplete: str) -> list[str]:
+    """Names of models that give a resistance matrix."""
+    from spirillum.fluid.registry import MODELS
+
+    return starting(sorted(MODELS), incomplete)
+
+
+def complete_parts(incomplete: str) -> list[str]:
+    """Parts of a robot."""
+    return starting(("body", "both", "coupling", "robot", "rotor", "tail"), incomplete)
+
+
+def complete_planes(incomplete: str) -> list[str]:
+    """Planes through a robot."""
+    return starting(("xy", "xz", "yz"), incomplete)
+
+
+def complete_frames(incomplete: str) -> list[str]:
+    """Frames of a flow."""
+    return starting(("body", "lab"), incomplete)
+
+
+def complete_schemas(incomplete: str) -> list[str]:
+    """Names of schemas."""
+    return starting(("calibration", "robot", "setup", "study"), incomplete)
+
+
+def _complete_accuracies(incomplete: str) -> list[str]:
+    return starting(("high", "standard"), incomplete)
+
+
+def _complete_ends(incomplete: str) -> list[str]:
+    return starting(("closed", "open"), incomplete)
+
+
+def _complete_motions(incomplete: str) -> list[str]:
+    return starting(("free", "held"), incomplete)
+
+
+def _complete_friction(incomplete: str) -> list[str]:
+    return starting(("body", "none", "paper", "rotor"), incomplete)
+
+
+RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
+Model = Annotated[
+    str,
+    typer.Option(
+        autocompletion=complete_auto_models,
+        help="Hydrodynamic model: sbt, rft, slender, tube; or auto: that of the posterior or calibration, else tube in "
+        "a channel and slender without.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+Accuracy = Annotated[
+    str | None,
+    typer.Option(
+        autocompletion=_complete_accuracies,
+        help="Of the models slender and tube: standard or high; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+Friction = Annotated[
+    str | None,
+    typer.Option(
+        autocompletion=_complete_friction,
+        help="Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall "
+        "brakes the body; paper: as eq. (19) is printed, on the tail from outside.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+Motion = Annotated[
+    str,
+    typer.Option(
+        autocompletion=_complete_motions, help="Lateral motion and tilt held, as the channel's floor does, or free."
+    ),
+]
+NoCalibration = Annotated[
+    bool, typer.Option("--no-calibration", help="Leave the calibration factors out.", rich_help_panel=MODEL_PANEL)
+]
+Calibration = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Calibration file whose factors replace the robot's.", rich_help_panel=MODEL_PANEL
+    ),
+]
+Posterior = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Posterior of a calibration: its middle replaces the robot's values; intervals.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+PosteriorFor = Annotated[
+    str,
+    typer.Option(
+        "--for",
+        metavar="new|measured",
+        help="With --posterior: intervals of a new tail like those fitted, or of this one, which was measured.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
+    ),
+]
+All = Annotated[bool, typer.Option("--all", help="All quantities instead of those that matter most.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
+Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
+Picture = Annotated[
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
+]
+TailRate = Annotated[
+    str | None,
+    typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
+]
+Gap = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Model tube: smallest distance of body and glass, such as 0.5mm.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+Eccentricity = Annotated[
+    float | None,
+    typer.Option(
+        help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+Pitch = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ANGLE",
+        help="Model tube: angle by which the nose is raised, such as 2deg; below 0 lowered.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+Yaw = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ANGLE",
+        help="Model tube: angle by which the nose is turned to +y, such as 2deg.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+TailDrop = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Model tube: distance by which the tail's axis is lowered (a surrogate).",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+Ends = Annotated[
+    str | None,
+    typer.Option(
+        autocompletion=_complete_ends,
+        help="Model tube: open or closed ends of the channel; else open if it has a length.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+ImposedFlow = Annotated[
+    str | None,
+    typer.Option(
+        "--flow",
+        metavar="VELOCITY",
+        help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s.",
+        rich_help_panel=PLACE_PANEL,
+    ),
+]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(
+        help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
+Phases = Annotated[
+    int | None,
+    typer.Option(
+        help="Model tube: number of phases of the tail to average over, 1 to 64; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]

@@ -1,0 +1,186 @@
+"""What becomes of a robot that is laid down in its tube and swims on: the run itself, and where it leads.
+
+The run is followed turn by turn. Now and then the place that a turn brings back is looked for from where the run has
+come (`turn_map`); found and stable, it is what the run approaches, often for many minutes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.return_map import STEPS, ReturnMap, Turn, fixed_place
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.errors import InputError
+from spirillum.kernels import rigid_links
+from spirillum.swimming.steady_state import State, SteadyState
+
+_MOST_TURNS = 300
+"""Turns that are followed at most."""
+_BLOCK = 30
+"""Turns between two searches for the place that a turn brings back."""
+STABLE = 1.0 + 1e-4
+"""Largest multiplier of a motion that stays where it is."""
+_PLACES = {name: place for place, name in enumerate(STEPS)}
+
+
+@dataclass
+class Path:
+    """Place and attitude at every step of a run, from where it was laid down."""
+
+    steps: list[Samples] = field(default_factory=list)
+    """What is in `turn_map.STEPS`, turn after turn; time, x and roll count on, and the azimuth has no jumps."""
+
+    def add(self, turn: Turn) -> None:
+        """Add a turn."""
+        steps = turn.steps.copy()
+        if self.steps and steps.size:
+            last = self.steps[-1][-1]
+            steps[:, :3] += self._end
+            azimuth = _PLACES["azimuth"]
+            steps[:, azimuth] += 2.0 * np.pi * np.round((last[azimuth] - steps[0, azimuth]) / (2.0 * np.pi))
+        azimuth = _PLACES["azimuth"]
+        steps[:, azimuth] = np.unwrap(steps[:, azimuth])
+        self._end = (0.0 if not self.steps else self._end) + np.array(
+            [turn.time, turn.state[rigid_links.POSITION], turn.state[rigid_links.ROLL]]
+        )
+        self.steps.append(steps)
+
+    _end: Samples = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def turns(self) -> int:
+        """Number of turns."""
+        return len(self.steps)
+
+    def of(self, name: str) -> Samples:
+        """One of `turn_map.STEPS` over the run."""
+        return np.concatenate([steps[:, _PLACES[name]] for steps in self.steps])
+
+    def first_below(self, gap: float) -> float:
+        """Time at which the gap first falls to a value, s; NaN if it never does."""
+        gaps, times = self.of("gap"), self.of("time")
+        below = np.flatnonzero(gaps <= gap)
+        if not below.size:
+            return float("nan")
+        at = int(below[0])
+        if at == 0:
+            return 0.0
+        return float(np.interp(-gap, -gaps[at - 1 : at + 1], times[at - 1 : at + 1]))
+
+
+class LongRun(NamedTuple):
+    """A run and what it leads to."""
+
+    path: Path
+    """The run that was followed."""
+    turn: Turn
+    """The last turn: of the motion that it leads to, where one was found."""
+    start: Samples
+    """The state at the start of `time`, (19,)."""
+    time: float
+    """Time from then on over which means are taken, s: that turn; around the tube, the last circuit."""
+    lying: SteadyState
+    """Where it lies over that time."""
+
+
+def long_run(
+    robot: TubeRobot, state: Samples, sign: float, *, heavy: bool, until: float | None, progress: Progress
+) -> LongRun:
+    """Follow a robot in its tube to where its motion no longer changes.
+
+    Args:
+        robot: the robot at its duty.
+        state: where it is laid down, (19,).
+        sign: sense in which its tail turns.
+        heavy: whether weight or buoyancy tells one azimuth from another.
+        until: gap that the run has to reach before anything is looked for, m; None: no such gap.
+        progress: told what is being computed, how much is done, and of how much.
+    """
+    turns, path = ReturnMap(robot, sign), Path()
+    states, ended = [state], ""
+    while path.turns < _MOST_TURNS:
+        progress("free motion in the tube: turns of the tail", path.turns, _MOST_TURNS)
+        try:
+            turn = turns.after(state)
+        except InputError as error:
+            if not path.turns:
+                raise
+            ended = f"after {path.of('time')[-1]:.4g} s {str(error).partition(';')[0]}"
+            break
+        path.add(turn)
+        state = turn.state
+        states.append(state)
+        if abs(path.of("azimuth")[-1] - path.of("azimuth")[0]) > 4.0 * np.pi and heavy:
+            return _around(path, turn, states)
+        waiting = until is not None and path.of("gap").min() > until
+        if path.turns % _BLOCK == 0 and not waiting:
+            progress("free motion in the tube: its steady place", path.turns, _MOST_TURNS)
+            found = fixed_place(turns, state, heavy=heavy)
+            if found is not None and np.all(np.abs(found.multipliers) < STABLE):
+                progress("free motion in the tube", _MOST_TURNS, _MOST_TURNS)
+                largest = float(np.abs(found.multipliers[0]))
+                slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - STABLE else float("nan")
+                name: State = "steady" if heavy else "orbits"
+                return LongRun(path, found.turn, found.state, found.turn.time, _lying(name, found.turn, path, slow))
+    if not ended:
+        ended = f"the motion still changes after {path.of('time')[-1]:.4g} s, and was not followed on"
+    return LongRun(path, turn, states[-2], turn.time, _lying("changing", turn, path, float("nan"), ended))
+
+
+def _lying(state: State, turn: Turn, path: Path, approach: float, ended: str = "") -> SteadyState:
+    steps = {name: turn.steps[:, place] for name, place in _PLACES.items()}
+    azimuth = np.unwrap(steps["azimuth"])
+    time = np.append(steps["time"], turn.time)
+    length = np.diff(np.append(0.0, 0.5 * (time[:-1] + time[1:])))
+
+    def mean(values: Samples) -> float:
+        return float(np.sum(length * values) / np.sum(length))
+
+    slope = (azimuth[-1] - azimuth[0]) / (steps["time"][-1] - steps["time"][0])
+    return SteadyState(
+        state=state,
+        azimuth=np.nan if state == "orbits" else mean(azimuth),
+        gap=mean(steps["gap"]),
+        gap_range=(float(steps["gap"].min()), float(steps["gap"].max())),
+        pitch=mean(steps["pitch"]),
+        yaw=mean(steps["yaw"]),
+        orbit_rate=0.0 if state == "steady" else float(slope),
+        contact_force=mean(steps["contact_force"]),
+        time=float(path.of("time")[-1]),
+        approach_time=approach,
+        ended=ended,
+    )
+
+
+def _around(path: Path, turn: Turn, states: list[Samples]) -> LongRun:
+    """A robot that its weight does not hold: over the last circuit; `states` are those at the ends of all turns."""
+    values = {name: path.of(name) for name in STEPS}
+    azimuth, time = values["azimuth"], values["time"]
+    begin = int(np.argmin(np.abs(azimuth - azimuth[-1] + np.sign(azimuth[-1] - azimuth[0]) * 2.0 * np.pi)))
+    last = slice(begin, None)
+    length = np.gradient(time[last])
+
+    def mean(name: str) -> float:
+        return float(np.sum(length * values[name][last]) / np.sum(length))
+
+    lying = SteadyState(
+        state="goes around",
+        azimuth=np.nan,
+        gap=mean("gap"),
+        gap_range=(float(values["gap"][last].min()), float(values["gap"][last].max())),
+        pitch=mean("pitch"),
+        yaw=mean("yaw"),
+        orbit_rate=float((azimuth[-1] - azimuth[begin]) / (time[-1] - time[begin])),
+        contact_force=mean("contact_force"),
+        time=float(time[-1]),
+        approach_time=np.nan,
+    )
+    circuit = float(time[-1] - time[begin])
+    ends = np.cumsum([0.0, *(steps.shape[0] for steps in path.steps)]).astype(int)
+    first = int(np.searchsorted(ends, begin, side="right")) - 1  # the turn in which the circuit begins
+    return LongRun(path, turn, states[first], circuit, lying)

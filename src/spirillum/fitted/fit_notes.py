@@ -1,0 +1,248 @@
+"""What has to be said where fitted numbers are used: whose B_eff it is, under which reading, and on what it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.fitted.calibration_file import (
+    CalibrationFile,
+    FittedContact,
+    FittedFriction,
+    FittedValues,
+    friction_of_tails,
+    placement_in,
+    read_calibration,
+)
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.model import SwimmerModel
+from spirillum.robot.robot import Robot
+from spirillum.units import show
+
+_COEFFICIENTS = ("normal_factor", "tangential_factor")
+"""Fitted fields that act on `rft` alone."""
+
+FITTED_HELD = (
+    "the posterior was fitted to robots that are held at their places; this one is let go and finds its own: its "
+    "intervals are of that motion, and need not hold the observations that were fitted"
+)
+"""Said of a free motion in the tube over a posterior."""
+CALIBRATED_HELD = (
+    "the calibration is of robots that are held at their places; this one is let go and finds its own, and need not "
+    "swim as it was observed"
+)
+"""Said of a free motion in the tube with a calibration file."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a calibration file or a posterior says of its friction and its origin."""
+
+    friction: tuple[FittedFriction, ...] = ()
+    """B_eff, tail by tail."""
+    reading: str = ""
+    """Reading of the friction under which it was inferred."""
+    synthetic: str = ""
+    """Name of the observations, if they say that they are synthetic."""
+    model: str = ""
+    """Model whose torque B_eff was inferred with."""
+    drawn: bool = False
+    """Whether it is a posterior, so that answers have intervals."""
+    file: CalibrationFile | None = None
+    """The calibration file; None without one."""
+    name: str = ""
+    """Name of the file, with the observations of a posterior."""
+    channels: tuple[float, ...] = ()
+    """Diameters of the channels in which it was fitted, m; none where the file does not say."""
+    friction_coefficient: float | None = None
+    """Coefficient of dry friction under a robot that was fitted; None: none was."""
+
+    def dry_friction(self, model: SwimmerModel) -> float | None:
+        """Coefficient of dry friction under a robot with a model: only one that places it knows of any."""
+        return self.friction_coefficient if model.placed else None
+
+    def serves(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> bool:
+        """Whether anything of it acts on a robot's answer with a model."""
+        if self.file is None or model.name in self.file.calibration:
+            return True
+        left_out = (*(() if model.name == "rft" else _COEFFICIENTS), *(() if friction else ("friction",)))
+        values = [getattr(self.file.fitted, name) for name in FittedValues.model_fields if name not in left_out]
+        placed = model.placed and (placement_in(self.file, robot) is not None or self.file.contact != FittedContact())
+        known = any(value is not None for value in values)
+        return placed or known or (friction and friction_of_tails(robot, self.friction) != (None, ()))
+
+    def source_of(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> str:
+        """Name of the file whose values act on a robot's answer with a model; empty where none does."""
+        name = self.name if self.file is None else Path(self.name).name
+        return name if self.serves(robot, model, friction=friction) else ""
+
+    def idle_warnings(
+        self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
+    ) -> list[str]:
+        """Models to which nothing of a calibration file applies."""
+        replaced = self.file is not None and self.file.calibration
+        instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
+        idle = [model for model in models if not any(self.serves(robot, model, friction=friction) for robot in robots)]
+        return [
+            f"nothing in {self.name or 'the calibration'} is for {self._not_for(robots, model)}: {instead}"
+            for model in idle
+        ]
+
+    def _not_for(self, robots: Sequence[Robot], model: SwimmerModel) -> str:
+        """Whom nothing of it is for: robots in another channel than the fitted ones, or the model."""
+        own = [robot.channel.diameter for robot in robots if robot.channel is not None]
+        inside = any(np.isclose(diameter, self.channels, rtol=1e-6, atol=0.0).any() for diameter in own)
+        if model.name != self.model or not self.channels or inside or (self.file is not None and self.file.calibration):
+            return f"model '{model.name}'"
+        fitted = " and ".join(show(diameter, "mm") for diameter in self.channels)
+        which = "this robot" if len(robots) == 1 else "these robots"
+        return f"the channel of {which} (it was fitted in {fitted})"
+
+    def outside_warnings(
+        self, robot: Robot, model: SwimmerModel, posterior: PosteriorFile, *, friction: bool = True
+    ) -> list[str]:
+        """Whether draws of a posterior leave a robot's answer as it is without them."""
+        if posterior.acts_on(robot, walls=model.placed, friction=friction):
+            return []
+        whom = self._not_for([robot], model)
+        return [f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over places are used"]
+
+    def origin_warnings(
+        self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
+    ) -> list[str]:
+        """Whether anything of it that is used was measured."""
+        pairs = ((robot, model) for robot in robots for model in models)
+        if not self.synthetic or not any(self.serves(*pair, friction=friction) for pair in pairs):
+            return []
+        return [
+            f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
+        ]
+
+    def reading_warnings(self, readings: Sequence[str]) -> list[str]:
+        """Whether B_eff is used under another reading than the one under which it was inferred."""
+        other = [name for name in readings if name in ("rotor", "paper") and name != self.reading]
+        if not (self.friction and self.reading and other):
+            return []
+        return [
+            f"B_eff was inferred under friction reading '{self.reading}' and is used under '{other[0]}', where it "
+            "means another torque: rates and speeds of that reading do not follow from the observations"
+        ]
+
+    def model_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[str]:
+        """Whether B_eff is used with another model than the one whose torque it was inferred with."""
+        other = [name for name in models if name != self.model]
+        if not (self.friction and self.model and other and {"rotor", "paper"} & set(readings)):
+            return []
+        names = " and ".join(f"'{name}'" for name in other)
+        return [
+            f"B_eff was inferred with the torque of model '{self.model}' and is used with {names}, where it makes up "
+            "for another torque: rates and speeds of the robot's own drive do not follow from the observations there"
+        ]
+
+    def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[str]:
+        """All that has to be said beside a steady motion.
+
+        Args:
+            robot: the robot.
+            model: the hydrodynamic model.
+            reading: reading of the friction.
+            rate: prescribed tail rate; None: the robot's own drive, whose friction then matters.
+        """
+        acts = friction_acts(reading, rate)
+        idle = self.idle_warnings([robot], [model], friction=acts)
+        if rate is None:
+            return [*idle, *self.run_warnings(robot, model, reading)]
+        return [*idle, *self.origin_warnings([robot], [model], friction=acts)]
+
+    def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[str]:
+        """All that has to be said of a robot that is driven by its own motor."""
+        return [
+            *self.tail_warnings(robot),
+            *self.reading_warnings([reading]),
+            *self.model_warnings([model.name], [reading]),
+            *self.origin_warnings([robot], [model]),
+        ]
+
+    def tail_warnings(self, robot: Robot) -> list[str]:
+        """Whose B_eff a robot that is driven by its own motor has."""
+        own, others = friction_of_tails(robot, self.friction)
+        if own is not None and own > 0:
+            return []
+        if own is not None:
+            return [
+                "B_eff of this tail came out negative in the calibration: zero is used, and the rates are upper bounds"
+            ]
+        if not others:
+            return []
+        return [
+            f"B_eff of this tail was not fitted: the middle of {len(others)} fitted tails is used, "
+            f"{np.median(others):.4g} N m s/rad; they range from {min(others):.4g} to {max(others):.4g}"
+        ]
+
+    def tails_warnings(self, robots: Sequence[Robot]) -> list[str]:
+        """How many robots have a B_eff that was not fitted, or came out negative."""
+        found = [friction_of_tails(robot, self.friction) for robot in robots]
+        unknown = sum(1 for own, others in found if own is None and others)
+        zero = sum(1 for own, _ in found if own is not None and own <= 0)
+        sentences = []
+        if unknown:
+            sentences.append(
+                f"B_eff of {unknown} of {len(robots)} tails was not fitted: the middle of the fitted tails in their "
+                "channel is used" + (", and intervals hold their spread" if self.drawn else "")
+            )
+        if zero:
+            sentences.append(
+                f"B_eff of {zero} of {len(robots)} tails came out negative in the calibration: zero is used"
+            )
+        return sentences
+
+
+def friction_acts(reading: str, rate: float | None) -> bool:
+    """Whether B_eff acts on an answer: at a prescribed tail rate it is inferred from it, but where it brakes the body.
+
+    Args:
+        reading: reading of the friction.
+        rate: prescribed tail rate; None: the robot's own drive.
+    """
+    return rate is None or reading == "body"
+
+
+def fitted_of(
+    calibration: str | Path | CalibrationFile | None, posterior: PosteriorFile | None, name: str = ""
+) -> Fitted:
+    """What the file that is used says.
+
+    Args:
+        calibration: calibration file; None without one.
+        posterior: posterior; None without one.
+        name: name of the calibration file, where it was read before.
+    """
+    if posterior is not None:
+        source = posterior.observations if posterior.synthetic else ""
+        rubbing = posterior.middle.get("friction_coefficient")
+        return Fitted(
+            posterior.frictions,
+            posterior.friction_reading,
+            source,
+            posterior.model,
+            drawn=True,
+            name=posterior.source,
+            friction_coefficient=None if rubbing is None else float(rubbing[0]),
+            channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
+        )
+    if calibration is None:
+        return Fitted()
+    file = calibration if isinstance(calibration, CalibrationFile) else read_calibration(calibration)
+    provenance = file.provenance
+    synthetic = (provenance.observations or "the calibration") if provenance.synthetic else ""
+    said = name or ("" if isinstance(calibration, CalibrationFile) else str(calibration))
+    reading, model = provenance.friction_reading, provenance.model
+    dry = file.contact.friction_coefficient
+    places = {place.channel_diameter for place in file.placement} | {tail.channel_diameter for tail in file.friction}
+    channels = tuple(sorted(places))
+    return Fitted(
+        file.friction, reading, synthetic, model, file=file, name=said, channels=channels, friction_coefficient=dry
+    )

@@ -1,0 +1,139 @@
+"""Errors of each model on tails whose surface was resolved, interpolated to a robot's own tail; errors of a speed.
+
+The numbers are those of `docs/accuracy.md`, which `benchmarks/stated_errors.py` computes: bare wires 1 mm thick and
+60 mm long in unbounded fluid, and the paper's tail behind a capsule; model minus truth over truth.
+
+In Stokes flow the relative errors of a tail depend on its shape alone: wavelength, wire diameter and length over the
+amplitude, and the taper. The resolved tails differ in the first two independently. In the logarithms of these the
+logarithm of model over truth is interpolated: a linear trend, and what it leaves at the resolved tails with weights of
+one over the distance squared (D. Shepard, Proc. 23rd ACM National Conference, 517, 1968). That is continuous, and exact
+at the resolved tails; beyond their range the value at its edge is taken. How far the closest of them is, in all four
+numbers, the note says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.batch import RobotBatch
+
+_WIRE, _LENGTH, _TAPER = 1.0, 60.0, 100.0  # mm, mm, c of the envelope
+_SHAPE = ("wavelength over amplitude", "wire diameter over amplitude", "length over amplitude", "mean envelope")
+"""What the errors of a tail depend on."""
+_RESOLVED = 2
+"""How many of them the resolved tails resolve: all are 60 wire diameters long and have one taper."""
+_SAME = 1e-6
+"""Distance below which a tail is a resolved one, to rounding error."""
+
+
+class TailError(NamedTuple):
+    """Errors of one model on one tail, percent."""
+
+    drag: float
+    """Of B_11."""
+    thrust: float
+    """Of B_14."""
+    torque: float
+    """Of B_44."""
+
+
+CHECKED: dict[str, dict[tuple[float, float], TailError]] = {
+    "rft": {
+        (25.0, 2.5): TailError(56, 22, -31),
+        (10.0, 1.5): TailError(168, 57, -36),
+        (15.0, 2.0): TailError(109, 43, -31),
+        (10.0, 3.5): TailError(271, 144, 12),
+    },
+    "sbt": {
+        (25.0, 2.5): TailError(-1.5, 8.7, -11),
+        (10.0, 1.5): TailError(-2.4, 2.2, -18),
+        (15.0, 2.0): TailError(-1.4, 5.3, -14),
+        (10.0, 3.5): TailError(1.9, 5.9, -6.7),
+    },
+    "slender": {
+        (25.0, 2.5): TailError(-0.56, -0.52, -0.76),
+        (10.0, 1.5): TailError(-1.3, 1.0, -1.0),
+        (15.0, 2.0): TailError(-0.81, -0.051, -0.88),
+        (10.0, 3.5): TailError(-0.77, 2.7, -1.0),
+    },
+}
+"""Errors by model (`rft` with the printed coefficients, `slender` at standard accuracy) and by tail: wavelength and
+amplitude, mm."""
+
+
+SPEED_ERRORS = {"rft": 21, "sbt": 31}
+"""Errors of the speed of the reference robot, percent: the paper's tail behind a capsule, in unbounded fluid."""
+WITHOUT_INTERACTION = 14
+"""Error of that speed, percent, from leaving out the flow between body and tail alone."""
+
+
+def validation_note(batch: RobotBatch, errors: Mapping[tuple[float, float], TailError]) -> str:
+    """Return the errors of a model on the tail of a batch of one, and how far the closest resolved tail is."""
+    own = _shape(batch)
+    apart = {tail: np.log(own / _resolved_shape(*tail)) for tail in errors}
+    closest = min(apart, key=lambda tail: float(np.linalg.norm(apart[tail])))
+    name = "wavelength {:g} mm, amplitude {:g} mm".format(*closest)
+    if np.linalg.norm(apart[closest]) < _SAME:
+        of = f"against a resolved wire of this tail ({name})"
+    else:
+        most = int(np.argmax(np.abs(apart[closest])))
+        factor = float(np.exp(abs(apart[closest][most])))
+        of = (
+            f"interpolated between resolved wires, the closest of which ({name}, 1 mm thick, 60 mm long) differs from "
+            f"this tail by up to a factor of {factor:.3g} ({_SHAPE[most]} {_resolved_shape(*closest)[most]:.3g}, here "
+            f"{own[most]:.3g})"
+        )
+    drag, thrust, torque = (f"{value:+.{3 if abs(value) >= 100 else 2}g} %" for value in tail_error(batch, errors))
+    return f"{of}: drag {drag}, thrust {thrust}, axial torque {torque} of the tail"
+
+
+def tail_error(batch: RobotBatch, errors: Mapping[tuple[float, float], TailError]) -> TailError:
+    """Return the errors of a model on the tail of a batch of one, interpolated between the resolved tails."""
+    own = _shape(batch)
+    at = np.log([_resolved_shape(*tail)[:_RESOLVED] for tail in errors])
+    place = np.clip(np.log(own[:_RESOLVED]), at.min(axis=0), at.max(axis=0))
+    known = np.log1p(0.01 * np.array(list(errors.values())))
+    design = np.column_stack([np.ones(len(at)), at])
+    trend = np.linalg.lstsq(design, known, rcond=None)[0]
+    weights = 1.0 / np.maximum(np.sum((at - place) ** 2, axis=1), _SAME**2)
+    left = weights @ (known - design @ trend) / weights.sum()
+    return TailError(*(100.0 * np.expm1(np.array([1.0, *place]) @ trend + left)).tolist())
+
+
+def speed_note(model: str) -> str:
+    """Return by how much a model without the flow between body and tail misses the reference robot's speed."""
+    return (
+        f"body and tail do not interact, which alone adds {WITHOUT_INTERACTION} % to the speed of a robot with the "
+        f"paper's tail; in all that speed is {SPEED_ERRORS[model]:+d} % off"
+    )
+
+
+def what_is_fitted(fitted_by: str) -> str:
+    """What an answer has from observations, in half a sentence."""
+    return f"what {fitted_by} has fitted is taken from it" if fitted_by else "nothing is fitted"
+
+
+def walls_left_out(batch: RobotBatch) -> str:
+    """That the walls of a robot's channel are left out, after a semicolon; empty for a robot without one."""
+    return "; the walls of its channel are not computed" if math.isfinite(float(batch.channel_diameter[0])) else ""
+
+
+def _shape(batch: RobotBatch) -> Samples:
+    """The numbers of `_SHAPE` of the tail of a batch of one, (4,)."""
+    amplitude = float(batch.amplitude[0])
+    lengths = (float(getattr(batch, name)[0]) for name in ("wavelength", "wire_diameter", "tail_length"))
+    return np.array([*(length / amplitude for length in lengths), _mean_envelope(float(batch.taper[0]))])
+
+
+def _resolved_shape(wavelength: float, amplitude: float) -> Samples:
+    return np.array([wavelength / amplitude, _WIRE / amplitude, _LENGTH / amplitude, _mean_envelope(_TAPER)])
+
+
+def _mean_envelope(taper: float) -> float:
+    """Mean of 1 - exp(-c xi/L_t) over the tail; 1 for a plain helix."""
+    return 1.0 if math.isinf(taper) else 1.0 + math.expm1(-taper) / taper

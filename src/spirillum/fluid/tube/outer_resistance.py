@@ -1,0 +1,190 @@
+"""What is left of a robot's resistance in its tube without the film under its body, at the places of a table.
+
+The flow is solved for at every place and phase (`tube`), the film is taken away, and what is left, which is smooth up
+to contact, is kept as a Cholesky factor with logarithms on the diagonal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.fluid.tube.solids import MOTIONS, Fineness
+from spirillum.fluid.tube.tube import is_solved, solved_together
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import MIRROR, cut_of_film
+from spirillum.kernels.tube_table import MOTIONS as RATES
+from spirillum.processes import imap_unordered
+from spirillum.robot.tube_pose import Seat
+from spirillum.units import show
+
+HARMONICS = 4
+"""Harmonics of the tail's phase that a table keeps."""
+PHASES = 2 * HARMONICS + 1
+"""Phases of the tail that give them all."""
+
+Progress = Callable[[str, int, int], None]
+
+_RATES = np.zeros((MOTIONS, RATES))
+"""The 12 twists and the flow from the 8 rates (U, Omega, omega_m, mean flow)."""
+_RATES[:6, :6] = _RATES[6:12, :6] = np.eye(6)
+_RATES[9, 6] = _RATES[12, 7] = 1.0
+
+
+class NodeSolution(NamedTuple):
+    """One place to solve for."""
+
+    tails: tuple[tuple[RobotGeometry, tuple[float, ...]], ...]
+    """Robots that differ in their tails, each with the phases of its tail, rad."""
+    seat: Seat
+    fineness: Fineness
+
+
+def matrix_of(full: Samples) -> Samples:
+    """The 8x8 over U, Omega, omega_m and the mean flow from the (13, 13) of `tube`, over leading axes."""
+    found: Samples = _RATES.T @ full @ _RATES
+    return found
+
+
+def _solve(place: NodeSolution) -> list[Samples]:
+    """(phases, 8, 8) of every tail at one place, viscosity 1."""
+    return [matrix_of(full) for full in solved_together(place.tails, place.seat, place.fineness)]
+
+
+def _solve_numbered(numbered: tuple[int, NodeSolution]) -> list[Samples]:
+    return _solve(numbered[1])
+
+
+def solutions(
+    places: Sequence[NodeSolution], what: str, progress: Progress | None = None, workers: int = 2
+) -> list[list[Samples]]:
+    """The 8x8 at every place, of every tail, (phases, 8, 8).
+
+    What was solved before is read from the cache. Places that differ in their tails only are solved for together.
+    """
+    shared = solved_as_one(places)
+    together = [
+        places[numbers[0]]._replace(tails=tuple(tail for number in numbers for tail in places[number].tails))
+        for numbers in shared
+    ]
+    found: list[list[Samples]] = [[] for _ in places]
+    for numbers, answers in zip(shared, _solutions(together, what, progress, workers), strict=True):
+        ahead = iter(answers)
+        for number in numbers:
+            found[number] = [next(ahead) for _ in places[number].tails]
+    return found
+
+
+def solved_as_one(places: Sequence[NodeSolution]) -> list[list[int]]:
+    """Numbers of the places that differ in their tails only, and are solved for together."""
+    shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
+    for number, place in enumerate(places):
+        bodies = {g.without_tail for g, _ in place.tails}
+        shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
+    return list(shared.values())
+
+
+def all_kept(places: Sequence[NodeSolution]) -> bool:
+    """Whether nothing is left to solve for at some places: all phases of all their tails are kept from before."""
+    return all(
+        is_solved(g, place.seat, place.fineness, p) for place in places for g, phases in place.tails for p in phases
+    )
+
+
+def _solutions(
+    places: Sequence[NodeSolution], what: str, progress: Progress | None, workers: int
+) -> list[list[Samples]]:
+    """As `solutions`, place by place."""
+    tell = progress or (lambda _what, _done, _total: None)
+    found: list[list[Samples]] = [[] for _ in places]
+    tell(what, 0, len(places))
+    numbered, kept = list(enumerate(places)), "; what was solved is kept"
+    answers = imap_unordered(_solve_numbered, numbered, workers, besides=kept, single=True)
+    for done, ((number, _), answer) in enumerate(answers, start=1):
+        found[number] = answer
+        tell(what, done, len(places))
+    return found
+
+
+_LOWER = np.tril_indices(RATES)
+_DIAGONAL = np.flatnonzero(_LOWER[0] == _LOWER[1])
+
+
+def factor_of(matrix: Samples, where: str) -> Samples:
+    """Cholesky factor of positive definite matrices, row by row, with logarithms on the diagonal, (..., 36)."""
+    try:
+        factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"the flow in the tube is resolved too coarsely {where}: without its film the resistance is not positive "
+            "definite; allowed: a finer tolerance"
+        ) from error
+    found = factor[..., _LOWER[0], _LOWER[1]]
+    found[..., _DIAGONAL] = np.log(found[..., _DIAGONAL])
+    return found
+
+
+def fourier(values: Samples, size: int = 0) -> Samples:
+    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0.
+
+    Args:
+        values: (phases, ...).
+        size: least number of coefficients: those that so few phases do not give are zero.
+    """
+    count = len(values)
+    phase = 2.0 * np.pi * np.arange(count) / count
+    rows = [np.full(count, 1.0 / count)]
+    for harmonic in range(1, (count - 1) // 2 + 1):
+        rows += [np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count]
+    rows += [np.zeros(count)] * (size - count)
+    found: Samples = np.tensordot(np.stack(rows), values, axes=1)
+    return found
+
+
+def matrices_at(coefficients: Samples, phases: Samples) -> Samples:
+    """The matrices at phases, (n, 8, 8), whose factors have these Fourier coefficients, (m, 36)."""
+    order = np.arange(len(coefficients))
+    turns = np.outer(phases, (order + 1) // 2)
+    waves = np.where(order % 2 == 0, np.sin(turns), np.cos(turns))
+    waves[:, 0] = 1.0
+    parameters = waves @ coefficients
+    parameters[:, _DIAGONAL] = np.exp(parameters[:, _DIAGONAL])
+    factors = np.zeros((len(phases), RATES, RATES))
+    factors[:, _LOWER[0], _LOWER[1]] = parameters
+    found: Samples = factors @ np.swapaxes(factors, 1, 2)
+    return found
+
+
+def even_phases(count: int = PHASES) -> tuple[float, ...]:
+    """Evenly spread phases from 0, rad."""
+    return tuple(float(phase) for phase in 2.0 * np.pi * np.arange(count) / count)
+
+
+def mirrored(g: RobotGeometry, phases: tuple[float, ...]) -> tuple[RobotGeometry, tuple[float, ...]]:
+    """Mirror image to the side of a robot and the phases of its tail."""
+    return g._replace(hand=-g.hand), tuple((np.pi - phase) % (2.0 * np.pi) for phase in phases)
+
+
+def seen_in_mirror(matrices: Samples) -> Samples:
+    """The 8x8 of the mirror image."""
+    found: Samples = MIRROR[:, None] * matrices * MIRROR
+    return found
+
+
+def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
+    """Fourier coefficients of the factor of what is left without the film, (`PHASES`, 36).
+
+    Args:
+        matrices: at evenly spread phases from 0, as many as matter there, (phases, 8, 8).
+        film: of the body at that seat, (6, 6).
+        t: of the place.
+        seat: named where the rest is not positive definite.
+    """
+    rest = matrices.copy()
+    rest[:, :6, :6] -= cut_of_film(t) * film
+    where = f"at an offset of {show(seat.offset, 'mm')} and a pitch of {show(seat.pitch, 'deg')}"
+    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES)

@@ -1,0 +1,109 @@
+"""What can be taken away from the page: the robot file, the lines that give the same numbers, the run as one file."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shlex
+from importlib.resources import files
+from typing import Any
+
+from spirillum.pages.knobs import Settings
+from spirillum.pages.numbers import quantity_list
+from spirillum.pages.page_robot import PageRobot
+from spirillum.robot.toml_writer import robot_text
+from spirillum.version import own_version
+
+MODULES = ("format.js", "matrix.js", "renderer.js", "layers.js", "stage.js", "section.js", "plots.js", "replay.js")
+"""Modules that a replay needs, each after those that it imports."""
+_IMPORT = re.compile(r'(from|import) "\./([\w-]+\.js)"')
+_PLACE = {"gap": "--gap", "pitch": "--pitch", "flow": "--flow"}
+
+
+def asset(name: str) -> str:
+    """The text of one of the page's own files."""
+    return (files("spirillum.pages") / "static" / name).read_text(encoding="utf-8")
+
+
+def robot_file(lane: PageRobot) -> str:
+    """The robot as it stands, as the text of a robot file."""
+    return robot_text(lane.predicted(), f"From the page of spirillum {own_version()}.")
+
+
+def command_line(lane: PageRobot) -> str:
+    """Commands that give the same steady numbers, and a run like the one that is seen."""
+    settings, model = lane.told(), _model(lane)
+    words = [_source(settings), "--model", model]
+    for field, value in _overrides(settings).items():
+        words += ["--set", f"{field}={value}"]
+    placed = _placed(settings, model)
+    for name, value in placed.items():
+        words += [f"{_PLACE[name]}={value}"]
+    steady = shlex.join(["spirillum", "predict", *words])
+    end = f"{max(lane.moment.time if lane.moment else 0.0, 1.0):.3g}s"
+    return f"{steady}\n{shlex.join(['spirillum', 'simulate', *words, '--duration', end, '-o', 'run.nc'])}\n"
+
+
+def python_lines(lane: PageRobot) -> str:
+    """Lines of Python that give the numbers of a lane, by `predict` and `simulate`."""
+    settings, model = lane.told(), _model(lane)
+    overrides = ", ".join(f"{field!r}: {value!r}" for field, value in _overrides(settings).items())
+    placed = _placed(settings, model)
+    where = f", placement={placed!r}" if placed else ""
+    load = f"sp.load({_source(settings)!r}" + (f", **{{{overrides}}})" if overrides else ")")
+    end = max(lane.moment.time if lane.moment else 0.0, 1.0)
+    return (
+        f"import spirillum as sp\n\nrobot = {load}\n"
+        f"steady = sp.predict(robot, model={model!r}{where})\n"
+        "print(steady.forward_velocity)\n"
+        f"run = sp.simulate(robot, model={model!r}{where}, timing={{'duration': '{end:.3g} s'}})\n"
+    )
+
+
+def _model(lane: PageRobot) -> str:
+    return lane.built.model if lane.built else lane.settings.model
+
+
+def _source(settings: Settings) -> str:
+    return settings.source if isinstance(settings.source, str) else "robot.toml"
+
+
+def _overrides(settings: Settings) -> dict[str, str]:
+    """Fields that are set beside the robot's own: those of a robot file of the page stand in it."""
+    return dict(settings.overrides) if isinstance(settings.source, str) else {}
+
+
+def _placed(settings: Settings, model: str) -> dict[str, str]:
+    return dict(settings.run) if model == "tube" else {k: v for k, v in settings.run.items() if k != "flow"}
+
+
+def replay_page(replay: dict[str, Any]) -> str:
+    """One HTML file that shows a run with no server and no network."""
+    modules = {}
+    for name in MODULES:
+        text = _IMPORT.sub(r'\1 "spirillum/\2"', asset(name))
+        modules[f"spirillum/{name}"] = "data:text/javascript;base64," + base64.b64encode(text.encode()).decode()
+    data = json.dumps({"quantities": quantity_list(), **replay}).replace("<", "\\u003c")
+    policy = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
+    title = re.sub(r"[<>&\"]", "", str(replay["robot"]))[:100]
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}: a run</title>
+<style>{asset("page.css")}</style>
+<script type="importmap">{json.dumps({"imports": modules})}</script>
+</head>
+<body class="alone">
+<main id="replay" class="view"></main>
+<script type="application/json" id="run">{data}</script>
+<script type="module">
+import {{ showReplay }} from "spirillum/replay.js";
+showReplay(document.getElementById("replay"), JSON.parse(document.getElementById("run").textContent));
+</script>
+</body>
+</html>
+"""

@@ -1,0 +1,366 @@
+"""One robot of the page: what is set on it, how it came there, and how it swims."""
+
+from __future__ import annotations
+
+import base64
+import math
+import time
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.errors import InputError, failure_sentence
+from spirillum.pages.commands import report_fault
+from spirillum.pages.job import BackgroundJob, worker
+from spirillum.pages.knobs import MODELS, Settings
+from spirillum.pages.numbers import SERIES, axial_forces_of, quantity_list
+from spirillum.pages.recording import SampleRecording, finite
+from spirillum.pages.shapes import shape_of
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, preset_names
+from spirillum.robot.robot import Robot
+from spirillum.robot.toml_writer import robot_text
+
+if TYPE_CHECKING:
+    from spirillum.dynamics.plant import Plant, Snapshot
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+_RESOLUTION = 96
+"""Points along the plane."""
+_COARSE: Mapping[str, Any] = {"tolerance": 0.05}
+"""Of the tube's flow: the plane is a picture."""
+_FASTEST = 0.98
+"""Share of the points that are slower than what has the fullest colour."""
+
+
+class Flowing(BackgroundJob):
+    """A flow on its way, and the plane once it is there."""
+
+    def __init__(
+        self, robot: Robot, model: str, run: Mapping[str, str], phase: float, tell: Callable[[], None]
+    ) -> None:
+        """Begin.
+
+        Args:
+            robot: the robot that swims.
+            model: model by which it swims.
+            run: `gap`, `pitch`, `flow` where they are set.
+            phase: of the tail, rad.
+            tell: called from a thread when there is progress.
+        """
+        asked = {"robot": robot_text(robot), "model": model, "run": dict(run), "phase": phase}
+        super().__init__(__name__, asked, tell)
+
+    def told(self) -> dict[str, Any]:
+        """How it goes, without the plane itself."""
+        said = self.progress()
+        return {name: said[name] for name in ("what", "failed", "done") if name in said}
+
+
+def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
+    """A plane of the flow as the page draws it: velocities along x and z in rows of rising z, m/s, NaN in solids.
+
+    Args:
+        plane: what `Flow.plane` returns for `xz`.
+        phase: of the tail, rad.
+    """
+    velocity = [plane[name].transpose("z", "x").values for name in ("velocity_x", "velocity_z")]
+    speed = np.hypot(*velocity)
+    warnings = [line for line in str(plane.attrs.get("warnings", "")).split("\n") if line]
+    return {
+        "model": plane.attrs["model"],
+        "phase": phase,
+        "size": [plane.sizes["x"], plane.sizes["z"]],
+        "x": [float(plane["x"].min()), float(plane["x"].max())],
+        "z": [float(plane["z"].min()), float(plane["z"].max())],
+        "fastest": float(np.nanquantile(speed, _FASTEST)),
+        "velocity": [base64.b64encode(part.astype("<f4").tobytes()).decode() for part in velocity],
+        "warnings": warnings,
+    }
+
+
+def _flowing(request: dict[str, Any], progress: Callable[[str, int, int], None]) -> dict[str, Any]:
+    from spirillum.fields.flow import FLOW_MODELS, flow
+
+    model = request["model"] if request["model"] in FLOW_MODELS else "slender"
+    walled = model == "tube"
+    progress("solving for the flow", 0, 0)
+    around = flow(
+        tomllib.loads(request["robot"]),
+        model=model,
+        placement=request["run"] if walled else None,
+        resolution=_COARSE if walled else None,
+        phase=request["phase"],
+    )
+    shown = plane_shown(around.plane("xz", resolution=_RESOLUTION, progress=progress), request["phase"])
+    forces = axial_forces_of(around.prediction) if walled else []  # without walls they stand beside the numbers
+    return {"plane": shown | {"forces": forces}}
+
+
+if __name__ == "__main__":
+    worker(_flowing)
+
+
+_ONE_TURN = 1.0
+"""Changes of one knob within this time are one step of undo, s."""
+_MOST_UNDO = 200
+
+
+_Shape = tuple[Any, dict[str, Any]]
+"""What decides a shape, and the shape."""
+
+
+def _shaped(robot: Robot, before: _Shape | None) -> _Shape:
+    """The shape of a robot; the one before where it is the same."""
+    solid = (robot.body, robot.seal, robot.coupling, robot.tail, robot.channel, robot.motor)
+    return before if before is not None and before[0] == solid else (solid, shape_of(robot))
+
+
+@dataclass(frozen=True)
+class Built:
+    """A robot laid down, by which model, and what to be careful about."""
+
+    plant: Plant
+    model: str
+    reason: str
+    caution: str
+    needs_table: bool
+    """Whether a table would let it swim in its tube."""
+
+
+def build(settings: Settings, robot: Robot) -> Built:
+    """Lay a robot down; without a table for its tube it swims by a model without walls."""
+    from spirillum.dynamics.plant import Plant  # loads compiled loops: the page is there before
+    from spirillum.swimming.model_choice import choose_model, has_table
+
+    placed = settings.placement()
+    if robot.drive is None:
+        raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
+    asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
+    choice = choose_model(asked, robot, placement=placed, tables_only=True)
+    preparable = asked == "auto" and choice.model != "tube" and robot.channel is not None
+    needs = preparable and not has_table(RobotBatch.of(robot, placed))
+    walled = choice.model == "tube"
+    if not walled:
+        placed = placed.model_copy(update={"flow": None})
+    plant = Plant(robot, model=choice.model, placement=placed)
+    caution = choice.caution
+    if settings.run.get("flow") and not walled:
+        caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"
+    return Built(plant, choice.model, choice.reason, caution, needs)
+
+
+@dataclass
+class PageRobot:
+    """One robot; only the thread of the simulation writes to it."""
+
+    settings: Settings
+    robot: Robot
+    remote: bool = True
+    duty: float = 1.0
+    built: Built | None = None
+    moment: Snapshot | None = None
+    numbers: dict[str, Any] | None = None
+    """The prediction, as the page shows it."""
+    trouble: str = ""
+    """Why it does not swim, in a sentence."""
+    generation: int = 0
+    """Counts what was set; what is built for an older one is dropped."""
+    revision: int = 0
+    """Counts what changes the prediction, which duty and imposed flow do while the robot swims on."""
+    recording: SampleRecording = field(default_factory=SampleRecording)
+    preparing: dict[str, Any] | None = None
+    """Progress of a table that is being made."""
+    flowing: Flowing | None = None
+    """The flow that is shown around it, or on its way."""
+    _undo: list[Settings] = field(default_factory=list)
+    _redo: list[Settings] = field(default_factory=list)
+    _last: tuple[str, float] = ("", 0.0)
+    _shape: _Shape | None = None
+
+    @classmethod
+    def of(cls, source: Any) -> PageRobot:
+        """A lane that starts from a preset, a file or a robot."""
+        robot = load(source)
+        own = robot.drive.duty if robot.drive is not None else 1.0
+        return cls(Settings(source), robot, duty=own)
+
+    def set(self, name: str, value: str) -> None:
+        """Turn one knob."""
+        self._become(self.settings.changed(name, value), name)
+
+    def preset(self, name: str, own: Any) -> None:
+        """Start from another robot: a preset, or `own`, the one that the page was started with."""
+        if name != "own" and name not in preset_names():
+            raise InputError(f"preset {name[:60]!r}; allowed: {', '.join(preset_names())}")
+        self._become(Settings(own if name == "own" else name), "")
+
+    def swap(self, source: Robot, overrides: Mapping[str, str]) -> None:
+        """Another robot, with other values of some fields."""
+        preset = source.name in preset_names() and load(source.name) == source
+        chosen = source.name if preset else source  # a preset can be named on the command line
+        self._become(replace(self.settings, source=chosen, overrides=dict(overrides)), "")
+        self.set_duty()
+
+    def set_duty(self, duty: float | None = None) -> None:
+        """Turn the remote's duty; None: that of the robot's own drive."""
+        if duty is None:
+            duty = self.robot.drive.duty if self.robot.drive is not None else 1.0
+        self.duty = duty
+        self.void_numbers()
+
+    def undo(self, *, forward: bool = False) -> None:
+        """Go one change back, or forward again."""
+        source, target = (self._redo, self._undo) if forward else (self._undo, self._redo)
+        if source:
+            target.append(self.settings)
+            self.settings = source.pop()
+            self.robot = self.settings.robot()
+            self._last = ("", 0.0)
+            self.start_anew()
+
+    def start_anew(self) -> None:
+        """Forget the run; the robot is laid down again once it is built."""
+        self.generation += 1
+        self.built = self.moment = None
+        self.trouble = ""
+        self.preparing = None
+        self.recording = SampleRecording()
+        self.void_numbers()
+
+    def void_numbers(self) -> None:
+        """Show no prediction and no flow until those of the present robot, duty and imposed flow are there."""
+        self.revision += 1
+        self.numbers = None
+        self.without_flow()
+
+    def with_flow(self, tell: Callable[[], None]) -> None:
+        """Compute the flow around it, with its tail as it is now."""
+        if self.built is None or self.moment is None:
+            raise InputError("flow: the robot does not swim yet; allowed: one that swims")
+        self.without_flow()
+        phase = self.moment.pose.tail_phase % (2.0 * math.pi)
+        self.flowing = Flowing(self.predicted(), self.built.model, self.settings.run, phase, tell)
+
+    def without_flow(self) -> None:
+        """No flow is shown."""
+        if self.flowing is not None:
+            self.flowing.stop()
+        self.flowing = None
+
+    def take(self, built: Built) -> None:
+        """The robot is laid down."""
+        self.built, self.trouble = built, ""
+        self.moment = built.plant.observe()
+        self.recording = SampleRecording()
+        self.recording.add(self.moment, self.duty if self.remote else 0.0)
+
+    def advance(self, dt: float) -> None:
+        """Swim on for a time, s."""
+        if self.built is None or (self.moment is not None and self.moment.ended) or self.trouble:
+            return
+        duty = self.duty if self.remote else 0.0
+        try:
+            self.moment = self.built.plant.step(dt, duty=duty)
+        except Exception as error:  # the other robots swim on
+            report_fault(error)
+            self.trouble = failure_sentence(error)
+            return
+        self.recording.add(self.moment, duty)
+
+    def flow(self, value: str) -> bool:
+        """Another flow while it swims; False where the robot has to be laid down anew for it."""
+        before = self.settings
+        self.settings = self.settings.changed("run.flow", value)
+        if self.built is None or self.built.model != "tube":
+            self.settings = before
+            return False
+        try:
+            self.built.plant.impose_flow(self.settings.placement().flow)
+        except InputError:
+            self.settings = before
+            raise
+        self.void_numbers()
+        self._remember(before, "run.flow")
+        return True
+
+    def _become(self, settings: Settings, name: str) -> None:
+        robot = settings.robot()
+        settings.placement()
+        self._shape = _shaped(robot, self._shape)
+        self._remember(self.settings, name)
+        self.settings, self.robot = settings, robot
+        self.start_anew()
+
+    def _remember(self, before: Settings, name: str) -> None:
+        now = time.monotonic()
+        if not (name and name == self._last[0] and now - self._last[1] < _ONE_TURN):
+            self._undo.append(before)
+            del self._undo[:-_MOST_UNDO]
+        self._redo.clear()
+        self._last = (name, now)
+
+    def predicted(self) -> Robot:
+        """The robot whose steady swimming is told: at the duty of the remote."""
+        drive = self.robot.drive
+        if drive is None or self.duty == drive.duty:
+            return self.robot
+        return self.robot.model_copy(update={"drive": drive.model_copy(update={"duty": self.duty})})
+
+    def told(self) -> Settings:
+        """The settings of that robot, as a command line gives them."""
+        if self.predicted() is self.robot:
+            return self.settings
+        return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": f"{self.duty:.6g}"})
+
+    def scene(self) -> dict[str, Any]:
+        """What changes when something is set: shape, knobs, model, prediction."""
+        self._shape = _shaped(self.robot, self._shape)
+        built = self.built
+        return {
+            "robot": self.robot.name,
+            "description": self.robot.description or "",
+            "source": self.settings.source if isinstance(self.settings.source, str) else "own",
+            "shape": self._shape[1],
+            "knobs": self.settings.shown(self.robot),
+            "model": self.settings.model,
+            "models": list(MODELS) if self.robot.channel is not None else [m for m in MODELS if m != "tube"],
+            "drive": self.robot.drive.kind if self.robot.drive is not None else "",
+            "swims_by": built.model if built else "",
+            "reason": built.reason if built else "",
+            "caution": built.caution if built else "",
+            "needs_table": built.needs_table if built else False,
+            "roughness": built.plant.roughness if built else None,
+            "preparing": self.preparing,
+            "flow": None if self.flowing is None else self.flowing.told(),
+            "trouble": self.trouble,
+            "numbers": self.numbers,
+            "quantities": quantity_list(self.numbers["rows"] if self.numbers else None),
+            "warnings": list(self.robot.warnings),
+            "undo": len(self._undo),
+            "redo": len(self._redo),
+            "generation": self.generation,
+            "remote": self.remote,
+            "duty": self.duty,
+        }
+
+    def frame(self) -> dict[str, Any]:
+        """What changes all the time: where it is, and its numbers; SI."""
+        moment = self.moment
+        if moment is None:
+            return {"generation": self.generation, "ready": False}
+        return {
+            "generation": self.generation,
+            "ready": True,
+            "time": moment.time,
+            "position": moment.pose.position.tolist(),
+            "attitude": moment.pose.attitude.tolist(),
+            "tail_phase": moment.pose.tail_phase,
+            "values": {name: finite(moment.values[name]) for name in SERIES if name in moment.values},
+            "ended": moment.ended,
+        }

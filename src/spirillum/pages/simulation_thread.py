@@ -1,0 +1,422 @@
+"""The one thread that moves the robots, and what it tells: the newest state, as text that clients are sent."""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+import time
+import tomllib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from spirillum.errors import InputError, failure_sentence
+from spirillum.pages.commands import number_of, refusal_of, report_fault, robot_tables, text_of
+from spirillum.pages.job import BackgroundJob, worker
+from spirillum.pages.knobs import Settings
+from spirillum.pages.numbers import prediction_answer, quantity_list
+from spirillum.pages.page_robot import Built, PageRobot, build
+from spirillum.pages.study_picture import StudyPicture
+from spirillum.robot.load import preset_names
+from spirillum.robot.robot import Robot
+from spirillum.robot.toml_writer import robot_text
+
+
+class Preparing(BackgroundJob):
+    """A table on its way; places that were solved for are kept when it is left off."""
+
+    def __init__(self, robot: Robot, tell: Callable[[], None]) -> None:
+        """Begin."""
+        super().__init__(__name__, {"robot": robot_text(robot)}, tell)
+        self.robot = robot
+
+
+def _prepared(request: dict[str, Any], progress: Callable[[str, int, int], None]) -> dict[str, Any]:
+    from spirillum.swimming.preparation import prepare
+
+    prepare(tomllib.loads(request["robot"]), progress=progress)
+    return {}
+
+
+if __name__ == "__main__":
+    worker(_prepared)
+
+
+RATE = 30.0
+"""Frames a second."""
+_LATE = 1.0
+"""Time by which the run may fall behind before it no longer tries to catch up, s."""
+SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
+_MOST_WAITING = 2_000
+_PAUSE = 0.2
+"""Rest of the thread of the simulation after a fault, s."""
+
+Command = tuple[Mapping[str, Any], Callable[[str], None]]
+"""What a client asks for, and where to say why not."""
+
+
+class SimulationThread:
+    """Robots, clock and commands; made in one thread, run in its own."""
+
+    def __init__(self, source: Any, publish: Callable[[], None]) -> None:
+        """Open the page's robots.
+
+        Args:
+            source: preset's name, robot file, or checked robot to start with.
+            publish: called from the thread when there is something new.
+        """
+        self._own = source if isinstance(source, str) and source in preset_names() else robot_tables(source)
+        self._publish = publish
+        self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
+        self._wanted: dict[int, tuple[int, int, str, Settings, Robot, Robot]] = {}
+        self._work = threading.Condition()
+        self._built: queue.Queue[tuple[int, int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
+        self._lanes = [PageRobot.of(self._own)]
+        self._preparing: Preparing | None = None
+        self._study: StudyPicture | None = None
+        self._playing, self._pace, self._looked_at = True, 1.0, False
+        self._ending = threading.Event()
+        self._asked: list[int] = []
+        self._behind = 0.0
+        self._lock = threading.Lock()
+        self.version, self.scene, self.frame = 0, "", ""
+        self._threads = [
+            threading.Thread(target=self._run, name="page: motion", daemon=True),
+            threading.Thread(target=self._build, name="page: numbers", daemon=True),
+        ]
+
+    def start(self) -> None:
+        """Begin."""
+        self._tell_scene()
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """End both threads, and a table that is being made (what is solved of it is kept)."""
+        self._ending.set()
+        self._inbox.put(None)
+        with self._work:
+            self._work.notify_all()
+        if self._preparing is not None:
+            self._preparing.stop()
+        for lane in self._lanes:
+            lane.without_flow()
+        for thread in self._threads:
+            thread.join(timeout=2.0)
+
+    def ask(self, command: Mapping[str, Any], refuse: Callable[[str], None]) -> None:
+        """Ask for a change; it is made in the thread of the simulation."""
+        try:
+            self._inbox.put_nowait((command, refuse))
+        except queue.Full:
+            refuse(refusal_of(command, "the page is busy; allowed: fewer changes at once"))
+
+    def look(self, watched: bool) -> None:  # noqa: FBT001 - one thing to say
+        """Whether anybody looks; the robots wait for who does."""
+        if watched != self._looked_at:
+            self._looked_at = watched
+            self.ask({"do": "wake"}, lambda _text: None)
+
+    def past(self) -> str:
+        """What the robots have done so far, for a client that comes later."""
+        with self._lock:
+            lanes = [{"generation": lane.generation, **lane.recording.past()} for lane in self._lanes]
+        return json.dumps({"t": "past", "lanes": lanes})
+
+    def lane_number(self, asked: Any) -> int:
+        """The number of a robot that is there."""
+        if isinstance(asked, bool) or not isinstance(asked, int) or not 0 <= asked < len(self._lanes):
+            raise InputError(f"lane = {str(asked)[:20]}; allowed: 0 to {len(self._lanes) - 1}")
+        return asked
+
+    def recording(self, index: int) -> tuple[PageRobot, dict[str, Any]] | None:
+        """A robot and its run so far; None if there is no such robot or no run."""
+        with self._lock:
+            if not 0 <= index < len(self._lanes):
+                return None
+            lane = self._lanes[index]
+            return lane, lane.recording.data()
+
+    def show_study(self, study: StudyPicture) -> None:
+        """Let its tails be pointed at."""
+        self._study = study
+
+    def flow(self, index: int) -> dict[str, Any] | None:
+        """The plane of the flow around a robot; None if there is none."""
+        with self._lock:
+            flowing = self._lanes[index].flowing if 0 <= index < len(self._lanes) else None
+        plane: dict[str, Any] | None = None if flowing is None else flowing.progress().get("plane")
+        return plane
+
+    # the thread of the simulation
+
+    def _run(self) -> None:
+        for index in range(len(self._lanes)):
+            self._want(index)
+        last = time.perf_counter()
+        while not self._ending.is_set():
+            try:
+                last = self._go_on(last)
+            except Exception as error:  # the thread lives on, whatever a robot meets
+                report_fault(error)
+                self._ending.wait(_PAUSE)
+
+    def _go_on(self, last: float) -> float:
+        """Listen, move and tell once; the time of the last motion, which is returned."""
+        moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
+        changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
+        now = time.perf_counter()
+        if moving and now - last >= 0.9 / RATE:
+            self._advance(now - last)
+            last = now
+            changed = True
+        elif not moving:
+            last = now
+        if changed:
+            self._tell_frame()
+        return last
+
+    def _moves(self, lane: PageRobot) -> bool:
+        return lane.built is not None and not lane.trouble and not (lane.moment and lane.moment.ended)
+
+    def _advance(self, elapsed: float) -> None:
+        """All robots by the same time, so that they stay together."""
+        self._behind = max(0.0, elapsed - 1.0 / RATE)
+        dt = min(elapsed, _LATE) * self._pace
+        if not self._all_ready():
+            return
+        with self._lock:
+            for lane in self._lanes:
+                lane.advance(dt)
+
+    def _all_ready(self) -> bool:
+        """Those who are ready wait for those who are not."""
+        return all(lane.built is not None or lane.trouble for lane in self._lanes)
+
+    def _listen(self, wait: float) -> bool:
+        """Do what is asked; wait for something to come if there is nothing."""
+        changed = self._receive()
+        try:
+            item = self._inbox.get(timeout=max(wait, 0.0)) if wait > 0 else self._inbox.get_nowait()
+        except queue.Empty:
+            return changed
+        while item is not None:
+            command, refuse = item
+            try:
+                with self._lock:
+                    self._do(command)
+            except Exception as error:  # the thread lives on, whatever a command meets
+                report_fault(error)
+                refuse(refusal_of(command, failure_sentence(error)))
+            changed = True
+            try:
+                item = self._inbox.get_nowait()
+            except queue.Empty:
+                break
+        for index, lane in enumerate(self._lanes):
+            if self._asked[index : index + 1] != [lane.revision]:
+                self._want(index)
+        self._tell_scene()
+        return changed
+
+    def _do(self, command: Mapping[str, Any]) -> None:
+        what = command.get("do")
+        lane = self._lanes[self.lane_number(command.get("lane", 0))]
+        action = _ACTIONS.get(str(what))
+        if action is None:
+            raise InputError(f"do = {str(what)[:40]!r}; allowed: {', '.join(_ACTIONS)}")
+        action(self, lane, command)
+
+    def _set(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        name, value = text_of(command, "field"), text_of(command, "value")
+        if name != "run.flow" or not lane.flow(value):
+            lane.set(name, value)
+
+    def _preset(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        lane.preset(text_of(command, "value"), self._own)
+        lane.set_duty()
+
+    def _tail(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        if self._study is None:
+            raise InputError("tail: no study is shown; allowed: a study first")
+        lane.swap(*self._study.tail(command))
+
+    def _undo(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        lane.undo()
+
+    def _redo(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        lane.undo(forward=True)
+
+    def _restart(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        for lane in self._lanes:
+            lane.start_anew()
+
+    def _remote(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        lane.remote = bool(command.get("value"))
+
+    def _duty(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        lane.set_duty(number_of(command, 0.0, 1.0))
+
+    def _flow(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+        if command.get("value"):
+            lane.with_flow(self._wake_up)
+        else:
+            lane.without_flow()
+
+    def _play(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
+        self._playing = bool(command.get("value"))
+
+    def _step(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        self._playing = False
+        if self._all_ready():
+            for lane in self._lanes:
+                lane.advance(self._pace / RATE)
+
+    def _set_pace(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
+        self._pace = number_of(command, SLOWEST_PACE, FASTEST_PACE)
+
+    def _wake(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        """Only to be listened to."""
+
+    def _compare(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
+        if not command.get("value"):
+            for lane in self._lanes[1:]:
+                lane.without_flow()
+            del self._lanes[1:]
+        elif len(self._lanes) == 1:
+            first = self._lanes[0]
+            second = PageRobot(first.settings, first.robot, first.remote, first.duty)
+            first.start_anew()
+            self._lanes.append(second)
+
+    def _prepare(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        if self._preparing is not None and self._preparing.running:
+            raise InputError("a table is being made already; allowed: one at a time")
+        self._preparing = Preparing(lane.robot, self._wake_up)
+
+    def _leave_off(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
+        if self._preparing is not None:
+            self._preparing.stop()
+
+    def _wake_up(self) -> None:
+        self.ask({"do": "wake"}, lambda _text: None)
+
+    # the thread of the numbers
+
+    def _want(self, index: int) -> None:
+        lane = self._lanes[index]
+        self._asked[index:] = [lane.revision]
+        with self._work:
+            known = "" if lane.built is None else lane.built.model
+            robots = lane.robot, lane.predicted()
+            self._wanted[index] = (lane.generation, lane.revision, known, lane.settings, *robots)
+            self._work.notify()
+
+    def _build(self) -> None:
+        while not self._ending.is_set():
+            with self._work:
+                while not self._wanted and not self._ending.is_set():
+                    self._work.wait()
+                if self._ending.is_set():
+                    return
+                index = next(iter(self._wanted))
+                generation, revision, model, settings, robot, predicted = self._wanted.pop(index)
+            try:
+                if not model:
+                    built = build(settings, robot)
+                    model = built.model
+                    self._built.put((index, generation, revision, built, None, ""))
+                    self._wake_up()
+                self._built.put((index, generation, revision, None, self._numbers(predicted, settings, model), ""))
+            except Exception as error:  # the thread lives on, whatever a robot's numbers meet
+                report_fault(error)
+                self._built.put((index, generation, revision, None, None, failure_sentence(error)))
+            self._wake_up()
+
+    def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:
+        from spirillum.swimming.prediction import predict
+
+        placement = settings.placement() if model == "tube" else None
+        return prediction_answer(predict(robot, model=model, placement=placement))
+
+    def _receive(self) -> bool:
+        """Take what was built, unless something else was set meanwhile."""
+        changed = False
+        while True:
+            try:
+                index, generation, revision, built, numbers, trouble = self._built.get_nowait()
+            except queue.Empty:
+                break
+            if index >= len(self._lanes) or self._lanes[index].generation != generation:
+                continue
+            lane = self._lanes[index]
+            with self._lock:
+                if built is not None:
+                    lane.take(built)
+                if numbers is not None and revision == lane.revision:
+                    lane.numbers = numbers
+                if trouble and revision == lane.revision:
+                    lane.trouble, lane.numbers = trouble, None
+            changed = True
+        if self._preparing is not None:
+            changed = self._look_at_table(self._preparing) or changed
+        if changed:
+            self._tell_scene()
+        return changed
+
+    def _look_at_table(self, preparing: Preparing) -> bool:
+        """Tell the progress of a table at the robots that it is for; whether it has changed."""
+        said, running = preparing.progress(), preparing.running
+        before = [lane.preparing for lane in self._lanes]
+        for index, lane in enumerate(self._lanes):
+            own = lane.robot == preparing.robot
+            lane.preparing = said if own else None
+            if own and said.get("done") and not running:
+                lane.start_anew()
+                self._want(index)
+        if not running:
+            self._preparing = None
+        return before != [lane.preparing for lane in self._lanes]
+
+    # what is told
+
+    def _tell_scene(self) -> None:
+        scene = {
+            "t": "scene",
+            "lanes": [lane.scene() for lane in self._lanes],
+            "quantities": quantity_list(),
+            "presets": list(preset_names()),
+            "own": self._own if isinstance(self._own, str) else "own",
+            "playing": self._playing,
+            "pace": self._pace,
+        }
+        text = json.dumps(scene)
+        if text != self.scene:
+            self.scene = text
+            self.version += 1
+        self._tell_frame()
+
+    def _tell_frame(self) -> None:
+        lanes = [lane.frame() for lane in self._lanes]
+        self.frame = json.dumps({"t": "frame", "lanes": lanes, "playing": self._playing, "behind": self._behind})
+        self._publish()
+
+
+_ACTIONS: dict[str, Callable[[SimulationThread, PageRobot, Mapping[str, Any]], None]] = {
+    "set": SimulationThread._set,  # noqa: SLF001 - its own
+    "preset": SimulationThread._preset,  # noqa: SLF001
+    "tail": SimulationThread._tail,  # noqa: SLF001
+    "undo": SimulationThread._undo,  # noqa: SLF001
+    "redo": SimulationThread._redo,  # noqa: SLF001
+    "restart": SimulationThread._restart,  # noqa: SLF001
+    "remote": SimulationThread._remote,  # noqa: SLF001
+    "duty": SimulationThread._duty,  # noqa: SLF001
+    "play": SimulationThread._play,  # noqa: SLF001
+    "step": SimulationThread._step,  # noqa: SLF001
+    "pace": SimulationThread._set_pace,  # noqa: SLF001
+    "compare": SimulationThread._compare,  # noqa: SLF001
+    "flow": SimulationThread._flow,  # noqa: SLF001
+    "prepare": SimulationThread._prepare,  # noqa: SLF001
+    "leave-off": SimulationThread._leave_off,  # noqa: SLF001
+    "wake": SimulationThread._wake,  # noqa: SLF001
+}

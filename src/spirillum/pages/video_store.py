@@ -1,0 +1,148 @@
+"""Films that were sent to the page, in its temporary folder under names that are given here."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.errors import InputError
+from spirillum.optional_dependencies import import_optional
+from spirillum.pages.plain_names import plain_names
+from spirillum.pages.uploads import TooLargeError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from spirillum.vision.video.frames import Video
+
+_LARGEST_FILM = 4 << 30
+"""Bytes of one film."""
+_LARGEST_ALL = 16 << 30
+"""Bytes of all films."""
+_MOST_FILMS = 50
+_SPARE = 512 << 20
+"""Bytes that stay free on the disk."""
+_QUALITY = 92
+
+
+@dataclass(frozen=True)
+class _Film:
+    path: Path
+    video: Video
+
+
+class VideoStore:
+    """Films by the names of their trials; its methods may be called from any thread."""
+
+    def __init__(self, folder: Path) -> None:
+        """No film yet."""
+        self._folder = folder
+        self._lock = threading.RLock()
+        self._decoding = threading.Lock()  # one film at a time: a frame of many pixels takes much memory
+        self._films: dict[str, _Film] = {}
+        self._stated: dict[Path, int] = {}
+        self._count = 0
+
+    def room_for(self, kind: str, size: int) -> Path:
+        """A place for a film that is sent: an empty file. It counts with all its bytes as long as it is there.
+
+        Raises:
+            TooLargeError: for too large a film, too many, or a full disk.
+            InputError: for another kind of file.
+        """
+        from spirillum.vision.video.frames import FILMS
+
+        import_optional("av", "measuring a video", "video")
+        import_optional("cv2", "measuring a video", "video")
+        if f".{kind}" not in FILMS:
+            raise InputError(f"a file of kind {kind[:20]!r}; allowed: {', '.join(FILMS)}")
+        with self._lock:
+            written = self._written()
+            self._stated = {path: self._stated[path] for path in written}
+            if len(written) >= _MOST_FILMS:
+                raise TooLargeError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+            stated = sum(self._stated.values())
+            free = shutil.disk_usage(self._folder).free - (stated - sum(written.values())) - _SPARE
+            if size > min(_LARGEST_FILM, _LARGEST_ALL - stated, free):
+                limits = f"{_LARGEST_FILM >> 30} GB a film, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
+                raise TooLargeError(f"a film of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
+            self._count += 1
+            path = self._folder / f"trial-{self._count}.{kind}"
+            path.touch()
+            self._stated[path] = size
+            return path
+
+    def _written(self) -> dict[Path, int]:
+        """The films that are here or on their way, with the bytes that have come."""
+        found = {}
+        for path in self._stated:
+            with suppress(FileNotFoundError):
+                found[path] = path.stat().st_size
+        return found
+
+    def add(self, path: Path) -> str:
+        """Take a film that was sent; its name."""
+        from spirillum.vision.video.frames import open_video
+
+        try:
+            with self._decoding, plain_names(self._folder):
+                video = open_video(path)
+        except InputError:
+            path.unlink(missing_ok=True)
+            raise
+        with self._lock:
+            self._films[path.stem] = _Film(path, video)
+        return path.stem
+
+    def remove(self, name: str) -> None:
+        """Take a film away."""
+        with self._lock:
+            film = self._films.pop(name, None)
+        if film is not None:
+            film.path.unlink(missing_ok=True)
+
+    def video(self, name: str) -> Video:
+        """A film, opened."""
+        with self._lock:
+            film = self._films.get(name)
+        if film is None:
+            raise InputError(f"film {name[:40]!r}; allowed: one of those that are here")
+        return film.video
+
+    def paths(self) -> list[Path]:
+        """The films' files, in the order in which they came."""
+        with self._lock:
+            return [film.path for film in self._films.values()]
+
+    def told(self) -> list[dict[str, Any]]:
+        """The films as the page lists them."""
+        with self._lock:
+            return [
+                {
+                    "name": name,
+                    "size": list(film.video.size),
+                    "duration": film.video.duration,
+                    "rate": film.video.rate,
+                    "synthetic": "synthetic" in film.video.words.lower(),
+                }
+                for name, film in self._films.items()
+            ]
+
+    def picture(self, name: str, time: float) -> bytes:
+        """A frame of a film as JPEG."""
+        cv2 = import_optional("cv2", "measuring a video", "video")
+        frame = self.frame(name, time)
+        return bytes(cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])
+
+    def frame(self, name: str, time: float) -> np.ndarray:
+        """A frame of a film, 8-bit RGB, (h, w, 3)."""
+        if not (math.isfinite(time) and time >= 0.0):
+            raise InputError(f"time = {time:g} s; allowed: 0 s or later")
+        video = self.video(name)
+        with self._decoding, plain_names(self._folder):
+            return video.samples([0.0, min(time, max(0.0, (video.duration or time) - 0.1))])[-1].image

@@ -1,0 +1,214 @@
+"""Robots of a study laid down in their tubes and let go: what an experiment would see, with nothing fitted.
+
+Nobody reports how a robot was laid down. So each robot makes the runs of a design of experiments over what decides:
+gap and pitch at which it is laid down, time until its motor is switched on, height of the asperities, and coefficient
+of dry friction. Every run is one of `spirillum.simulate` with the model `tube`, read as a camera above the channel
+reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag by (15).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples, Values
+from spirillum.dynamics.simulation import simulate
+from spirillum.dynamics.tube_integration import INTERRUPTED
+from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.robot import Robot
+from spirillum.studies.factorial import Levels, half_fraction
+from spirillum.studies.spec import LaidDown
+from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.work import OneRobot, Part
+from spirillum.swimming.band import steepest_pitch
+from spirillum.swimming.steady import swim
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FACTORS = ("gap", "pitch", "wait", "roughness", "friction_coefficient")
+"""What differs between the runs of a robot."""
+WINDOWS = ("three turns", "whole run")
+"""What a run is read over: the last two of the tail's first three turns, or the last two thirds of it all."""
+READ = (*FACTORS, "window")
+"""What differs between the readings of a robot."""
+AT_RUNS = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "motor_current",
+    "azimuth",
+    "contact_share",
+)
+"""Quantities of each run and window."""
+INFERRED = ("effective_friction", "body_drag_factor", "modelled_forward_velocity", "modelled_body_rotation_rate")
+"""What the paper's models make of the rates of a run."""
+INFERRED_BY = ("sbt", "rft")
+"""The paper's models, each with the robot's own calibration."""
+_SAMPLES_PER_TURN = 40
+
+
+class ReleasedRobot(NamedTuple):
+    """How a robot is laid down for one run, SI."""
+
+    gap: float
+    pitch: float
+    wait: float
+    roughness: float
+    friction_coefficient: float
+
+
+def levels() -> Levels:
+    """Levels of `FACTORS` in each run, (runs, factors): -1 low, +1 high."""
+    return half_fraction(len(FACTORS))
+
+
+def levels_of_readings() -> Levels:
+    """Levels of `READ` in each run and window, the window the faster index, (runs * windows, factors)."""
+    runs = levels()
+    windows = np.tile([-1, 1], len(runs))[:, None]
+    return np.concatenate([np.repeat(runs, len(WINDOWS), axis=0), windows], axis=1)
+
+
+def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
+    """How a robot is laid down in each run; its steepest pitch is what gap and tail allow."""
+    batch, found = RobotBatch.of(robot), []
+    for signs in levels():
+        low_or_high = [getattr(ranges, name)[int(sign > 0)] for name, sign in zip(FACTORS, signs, strict=True)]
+        laid = ReleasedRobot(*low_or_high)
+        found.append(laid._replace(pitch=laid.pitch * steepest_pitch(batch, laid.gap)))
+    return found
+
+
+@dataclass(frozen=True)
+class LaidDownTask(OneRobot):
+    """All runs of one robot."""
+
+    ranges: LaidDown
+
+    @property
+    def words(self) -> str:
+        """What is computed, in a few words."""
+        return f"laid down: {self.robot.with_tail}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return {*AT_RUNS, *INFERRED, "laid_pitch"}
+
+    def answer(self) -> Part:
+        """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
+
+        NaN for a run that its robot cannot make, and over a window that it does not reach.
+        """
+        runs = laid_down_runs(self.robot, self.ranges)
+        read = [self._read(laid) for laid in runs]
+        part: Part = {
+            name: np.array([[[window[name] for window in run] for run in read]], dtype=float) for name in AT_RUNS
+        }
+        part |= {name: values[None] for name, values in inferred(self.robot, part).items()}
+        return part | {"laid_pitch": np.array([[laid.pitch for laid in runs]])}
+
+    def _read(self, laid: ReleasedRobot) -> list[dict[str, float]]:
+        nothing = [dict.fromkeys(AT_RUNS, float("nan")) for _ in WINDOWS]
+        try:
+            run = simulate(
+                self.robot,
+                model="tube",
+                timing={"duration": self.ranges.duration, "samples_per_turn": _SAMPLES_PER_TURN},
+                placement={"gap": laid.gap, "pitch": laid.pitch},
+                roughness=laid.roughness,
+                in_tube={"wait": laid.wait, "friction_coefficient": laid.friction_coefficient},
+            )
+        except InputError:
+            return nothing
+        events = [event["what"] for event in json.loads(str(run.attrs["events"]))]
+        if INTERRUPTED in events:
+            raise KeyboardInterrupt
+        return [_seen(run, *_window(run, name, self.ranges.duration)) for name in WINDOWS]
+
+
+def _window(run: xr.Dataset, name: str, duration: float) -> tuple[float, float]:
+    """Beginning and end of what a run is read over, s; NaN if it ended before."""
+    time = run["time"].values
+    turns = np.abs(run["tail_angle"].values) / (2.0 * np.pi)
+    if turns[-1] < 3.0 or (name == "whole run" and time[-1] < duration * (1.0 - 1e-9)):
+        return float("nan"), float("nan")
+    if name == "whole run":
+        return duration / 3.0, duration
+    begin, end = (float(time[int(np.argmax(turns >= count))]) for count in (1.0, 3.0))
+    return begin, end
+
+
+def _seen(run: xr.Dataset, begin: float, end: float) -> dict[str, float]:
+    """What a camera above the channel sees of a run between two times, and the current."""
+    if not np.isfinite(begin):
+        return dict.fromkeys(AT_RUNS, float("nan"))
+    time = run["time"].values
+    inside = (time >= begin) & (time <= end)
+
+    def change(values: Samples) -> float:
+        first, last = np.interp([begin, end], time, values)
+        return float(last - first)
+
+    length = end - begin
+    return {
+        "forward_velocity": change(run["position"].values[:, 0]) / length,
+        "tail_rotation_rate": change(run["tail_angle"].values) / length,
+        "body_rotation_rate": change(run["body_angle"].values) / length,
+        "motor_rotation_rate": change(run["tail_phase"].values) / length,
+        "motor_current": float(run["motor_current"].values[inside].mean()) if "motor_current" in run else float("nan"),
+        "azimuth": change(run["azimuth"].values),
+        "contact_share": float(np.mean(run["contact_force"].values[inside] > 0.0)),
+    }
+
+
+def inferred(robot: Robot, seen: Part) -> Part:
+    """What the paper's models make of observed rates, (..., models).
+
+    B_eff follows from (18) with the hydrodynamic torque of the model at the observed rates of tail and motor, as the
+    paper infers it; speed and body rate are the model's at the observed tail rate. The factor on the drag of the
+    isolated body is that with which the axial balance (15) gives the observed speed at the observed tail rate.
+    """
+    tail, motor = (seen[name].ravel() for name in ("tail_rotation_rate", "motor_rotation_rate"))
+    speed = seen["forward_velocity"].ravel()
+    batch = RobotBatch.of(robot).with_values({"tail.wavelength": np.full(tail.size, robot.tail.wavelength)})
+    columns: dict[str, list[Values]] = {name: [] for name in INFERRED}
+    for name in INFERRED_BY:
+        moved = swim(batch, name, tail_rate=tail, friction="rotor")
+        both = swim(batch, name, tail_rate=tail, motor_rate=motor, friction="rotor")
+        drag = find_swimmer_model(name).axial(batch)
+        columns["effective_friction"].append(both.effective_friction)
+        columns["modelled_forward_velocity"].append(moved.forward_velocity)
+        columns["modelled_body_rotation_rate"].append(moved.body_rotation_rate)
+        thrust = -drag[..., 2, 3] * tail - drag[..., 2, 2] * speed
+        with np.errstate(divide="ignore", invalid="ignore"):
+            columns["body_drag_factor"].append(thrust / (drag[..., 0, 0] * speed))
+    shape = seen["tail_rotation_rate"].shape[1:]
+    return {name: np.stack(values, axis=-1).reshape(*shape, len(INFERRED_BY)) for name, values in columns.items()}
+
+
+def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[LaidDownTask]:
+    """One task for each robot, numbered from `first`; none where none is asked for."""
+    if loaded.study.predicted:
+        for number, (index, robot) in enumerate(robots.items(), start=first):
+            yield LaidDownTask(number, index, robot, loaded.study.laid_down)
+
+
+def without_answer(parts: Iterable[Part]) -> list[str]:
+    """A sentence on the runs of laid-down robots that tell nothing; none where all tell something."""
+    found = [np.isfinite(part["forward_velocity"]).any(axis=-1) for part in parts]
+    known = np.concatenate([part.ravel() for part in found]) if found else np.ones(0, dtype=bool)
+    if known.all():
+        return []
+    return [
+        f"{np.count_nonzero(~known)} of {known.size} runs of laid-down robots have no answer: a robot cannot be laid "
+        "down so, or leaves its table before its tail has made three turns; allowed: other ranges in [laid_down]"
+    ]

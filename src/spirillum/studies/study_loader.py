@@ -1,0 +1,382 @@
+"""A study with its robots: loaded, calibrated and checked together, and what its fingerprint rests on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.files import read_toml
+from spirillum.fitted.calibration_file import (
+    CalibrationFile,
+    FittedFriction,
+    calibrated_robot,
+    placement_in,
+    read_calibration,
+)
+from spirillum.fitted.fit_notes import Fitted, fitted_of
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.replaced import check_kept, set_fields
+from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.problems import problems_in, refused_table
+from spirillum.robot.robot import Robot
+from spirillum.robot.tube_pose import gap_of
+from spirillum.studies.spec import LARGEST_STORED, Study
+from spirillum.swimming.band import left_open
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model, walls_left_out
+
+LARGEST_STUDY = 5_000_000
+"""Most results (robots times models times friction readings times rates) of one study."""
+_LARGEST_WITH_INTERVALS = 10_000
+"""Most robots of a study with a posterior, each of which swims a thousand times."""
+_WHAT = "a study file (TOML, see `spirillum schema study`)"
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A checked study with its robots."""
+
+    study: Study
+    robots: tuple[Robot, ...]
+    """One robot a channel of the grid, or the listed robots."""
+    question: Mapping[str, Any]
+    """All that decides the answer, for the fingerprint and the dataset's attributes."""
+    fitted: Fitted = field(default_factory=Fitted)
+    """B_eff of tails that a calibration knows, and what it rests on."""
+    posterior: PosteriorFile | None = None
+    """Draws over which answers have intervals."""
+    cautions: tuple[str, ...] = ()
+    """What to be careful about in the choice of the models, a sentence each."""
+    placements: tuple[Placement, ...] = ()
+    """Where each of `robots` lies by a calibration; none where the study says it."""
+
+    def placement_of(self, number: int) -> Placement:
+        """Where one of `robots` lies."""
+        return self.placements[number] if self.placements else self.study.placement
+
+    @property
+    def friction(self) -> tuple[FittedFriction, ...]:
+        """B_eff of tails that a calibration knows."""
+        return self.fitted.friction
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the question."""
+        text = json.dumps(self.question, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        grid = self.study.grid
+        return len(self.robots) * (1 if grid is None else len(grid.wavelengths) * len(grid.amplitudes))
+
+    def robot_at(self, index: int) -> Robot:
+        """The robot at an index in the flat order of the study."""
+        grid = self.study.grid
+        if grid is None:
+            return self.robots[index]
+        robot, tail = divmod(index, len(grid.wavelengths) * len(grid.amplitudes))
+        wavelength, amplitude = divmod(tail, len(grid.amplitudes))
+        own = self.robots[robot]
+        changed = {"wavelength": grid.wavelengths[wavelength], "amplitude": grid.amplitudes[amplitude]}
+        return own.model_copy(update={"tail": own.tail.model_copy(update=changed)})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels, or of the robots."""
+        if self.study.grid is not None:
+            return tuple(self.study.grid.channels)
+        return tuple(robot.name for robot in self.robots)
+
+
+def load_study(
+    source: str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    models: Sequence[str] | None = None,
+    band: bool | None = None,
+    predicted: bool | None = None,
+    settled: bool | None = None,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    largest: int = LARGEST_STUDY,
+) -> LoadedStudy:
+    """Load a study and its robots.
+
+    Args:
+        source: study file or the same tables as a mapping;
+        overrides: dotted robot fields, applied to every robot.
+        models: hydrodynamic models instead of the study's; None: the study's.
+        band: whether to compute bands, instead of what the study says; None: what it says.
+        predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
+        settled: whether to follow the robots to their steady motions, instead of what the study says; None: what it
+            says.
+        calibration: calibration file, applied to every robot.
+        posterior: file of a calibration's posterior: its middle is applied to every robot.
+        largest: most results that it may ask for.
+    """
+    instead = {
+        "models": None if models is None else list(models),
+        "band": band,
+        "predicted": predicted,
+        "settled": settled,
+    }
+    study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
+    if study.size > largest:
+        store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
+        raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
+    entries = list(_entries_of(study))
+    robots = tuple(_robot(entry, folder, overrides or {}, varied, name) for entry, varied in entries)
+    if study.grid is None:
+        _check_different(robots, entries, name)
+    robots = _named_apart(robots, [varied for _, varied in entries])
+    _check_drives(study, [entry for entry, _ in entries], robots, name)
+    for option in ("predicted", "settled"):
+        if getattr(study, option) and not (calibration is None and posterior is None):
+            raise InputError(
+                f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
+                "are followed with nothing fitted"
+            )
+    fitted, drawn = _fitted(study, calibration, posterior)
+    given = (*set_fields(overrides or {}), *study.vary)
+    robots = tuple(_fitted_robot(robot, fitted, drawn, given, str(posterior or calibration)) for robot in robots)
+    _check_varied(study, overrides or {}, name)
+    study, cautions = _with_models(study, robots, calibration, drawn)
+    try:
+        check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+    _check_contact(study, robots, name)
+    placements = _fitted_places(study, robots, fitted, str(calibration))
+    known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
+    question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
+    if known.friction:
+        question["friction"] = [item.model_dump() for item in known.friction]
+    if placements:
+        question["placements"] = [place.model_dump() for place in placements]
+    if drawn:
+        question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
+    loaded = LoadedStudy(study, robots, question, known, drawn, cautions, placements)
+    if drawn and loaded.count > _LARGEST_WITH_INTERVALS:
+        raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {_LARGEST_WITH_INTERVALS}")
+    return loaded
+
+
+def _read(source: str | Path | Mapping[str, Any], instead: Mapping[str, Any]) -> tuple[Study, str, Path]:
+    """A checked study, its name in sentences, and the folder from which its robots are looked for."""
+    folder = Path()
+    if isinstance(source, Mapping):
+        table, name = dict(source), "the study"
+    else:
+        table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
+    study = problems_in(Study, {**table, **instead})
+    if isinstance(study, list):
+        raise refused_table(study, name)
+    return study, name, folder
+
+
+def _entries_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Source and varied fields of every robot that is to be loaded."""
+    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
+    for source in sources:
+        for values in product(*study.vary.values()):
+            yield source, dict(zip(study.vary, values, strict=True))
+
+
+def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[str, Any]]], name: str) -> None:
+    """Refuse a robot that stands twice in a list, or one value of a varied field in two spellings."""
+    seen: dict[str, int] = {}
+    for number, robot in enumerate(robots):
+        first = seen.setdefault(robot.model_dump_json(), number)
+        if first != number:
+            one, other = (
+                ", ".join([source, *(f"{path} = {value}" for path, value in varied.items())])
+                for source, varied in (entries[first], entries[number])
+            )
+            raise InputError(f"{name}: robots {one} and {other} are the same; allowed: each once")
+
+
+def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
+    """Refuse asperities on which robots that are let go would be pressed by more than their weight."""
+    if not study.settled or study.contact.roughness is None:
+        return
+    from spirillum.dynamics.tube_start import check_roughness  # loads compiled loops
+
+    for robot in robots:
+        if robot.channel is not None:
+            gap = gap_of(study.placement, robot.body.diameter, 0.5 * robot.channel.diameter)
+            try:
+                check_roughness(study.contact.roughness, gap, robot.body.diameter)
+            except InputError as error:
+                raise InputError(f"{name}: contact.{error}") from error
+
+
+def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]]) -> tuple[Robot, ...]:
+    """The robots with what is varied in their names; the robot's own name only where there are several."""
+    several = len({robot.name for robot in robots}) > 1
+    every = [dict(_flat(fields)) for fields in varied]
+    named = []
+    for robot, fields, given in zip(robots, every, varied, strict=True):
+        told = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
+        short = [path.rpartition(".")[2] for path in told]
+        words = [
+            f"{name if short.count(name) == 1 else path.replace('.', ' ')} {fields[path]}"
+            for name, path in zip(short, told, strict=True)
+        ]
+        name = ", ".join([robot.name, *words] if several or not words else words)
+        named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
+    return tuple(named)
+
+
+def _flat(fields: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Fields by their dotted names, those of whole tables one by one."""
+    for name, value in fields.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
+
+
+def _fitted(
+    study: Study, calibration: str | Path | None, posterior: str | Path | None
+) -> tuple[CalibrationFile | None, PosteriorFile | None]:
+    if calibration is not None and posterior is not None:
+        raise InputError("posterior together with a calibration; allowed: one of them")
+    file = None if calibration is None else read_calibration(calibration)
+    models = () if AUTO in study.models else study.models
+    drawn = None if posterior is None else read_posterior(posterior, *models)
+    if drawn is not None and drawn.places_robots:
+        raise InputError(
+            f"{drawn.source} has a place of its own for the robots of each channel, and a study one for all; allowed: "
+            "`predict` of each robot with it, or the study without"
+        )
+    return file, drawn
+
+
+_VARIED = ("tail.wavelength", "tail.amplitude")
+"""Fields of a robot that a grid sets."""
+
+
+def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None:
+    """Refuse to set what the grid varies."""
+    twice = [path for path in study.vary if path in overrides]
+    if twice:
+        raise InputError(f"{twice[0]} is set and varied by vary of {name}, which would win; allowed: one of them")
+    both = [path for path in _VARIED if path in overrides] if study.grid is not None else []
+    if both:
+        own = f"grid.{both[0].removeprefix('tail.')}s"
+        raise InputError(
+            f"{both[0]} is set and varied by {own} of {name}, which would win; allowed: other fields, or another {own}"
+        )
+
+
+def _fitted_places(
+    study: Study, robots: Sequence[Robot], file: CalibrationFile | None, source: str
+) -> tuple[Placement, ...]:
+    """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks."""
+    if file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
+        return ()
+    if file.contact.friction_coefficient:
+        raise InputError(
+            f"{source} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each robot "
+            "with it"
+        )
+    if study.placement.is_given:
+        return ()
+    found = [placement_in(file, robot) for robot in robots]
+    if not any(found):
+        return ()
+    placements = tuple(place or Placement() for place in found)
+    walled = next(SWIMMER_MODELS[model] for model in study.models if SWIMMER_MODELS[model].placed)
+    if study.band and not all(left_open(place, walled) for place in placements):
+        raise InputError(f"band = true, but {source} says where the robots lie; allowed: the study without a band")
+    return placements
+
+
+def _with_models(
+    study: Study, robots: Sequence[Robot], calibration: str | Path | None, posterior: PosteriorFile | None
+) -> tuple[Study, tuple[str, ...]]:
+    """The study with one model for all robots in place of `auto`, and what to be careful about in it."""
+    if AUTO not in study.models:
+        return study, ()
+    loaded = LoadedStudy(study, tuple(robots), {})
+    choices = (
+        choose_model(
+            AUTO,
+            loaded.robot_at(index),
+            placement=study.placement,
+            calibration=calibration,
+            posterior=posterior,
+            tables_only=True,
+            other_way=f"--model {WALLED} answers without one at one place, in some ten seconds of one core a robot",
+            among=True,
+        )
+        for index in range(loaded.count)
+    )
+    choice = _for_all(choices)
+    afloat = [robot.name for robot in robots if robot.channel is None]
+    if choice.model != WALLED and not (choice.fitted or choice.caution) and len(afloat) < len(robots):
+        why = f"one model answers for all robots, and {afloat[0]} has no channel"
+        choice = replace(choice, caution=walls_left_out(why, among=True))
+    models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
+    cautions = (choice.caution,) if choice.caution else ()
+    return study.model_copy(update={"models": tuple(models)}), cautions
+
+
+def _for_all(choices: Iterable[ModelChoice]) -> ModelChoice:
+    """The model of all robots: with walls if each has a table, but for those that break its requirements."""
+    one = outside = None
+    for choice in choices:
+        if choice.outside:
+            outside = outside or choice
+            continue
+        one = choice
+        if choice.fitted or choice.model != WALLED:
+            break
+    found = one or outside
+    assert found is not None  # noqa: S101 - a study has a robot
+    return found
+
+
+def _fitted_robot(
+    robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None, kept: Sequence[str], source: str
+) -> Robot:
+    """The robot with what a calibration or the middle of a posterior says."""
+    if posterior is not None:
+        found = posterior.central(robot)
+    else:
+        found = robot if file is None else calibrated_robot(robot, file)
+    check_kept(kept, robot, found, source)
+    return found
+
+
+def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:
+    """Every robot needs a drive to swim by, and a joint that turns where motor rates are assumed."""
+    for source, robot in zip(sources, robots, strict=True):
+        if robot.drive is None:
+            raise InputError(f"{name}: robot {source} has no [drive]; allowed: robots with a drive, by which they swim")
+        if study.assumed_motor_rates and robot.drive.joint == "fixed":
+            raise InputError(
+                f"{name}: robot {source} has drive.joint = 'fixed', but the study names assumed_motor_rates; "
+                "allowed: 'revolute', or no assumed_motor_rates"
+            )
+
+
+def _robot(entry: str, folder: Path, overrides: Mapping[str, Any], varied: Mapping[str, Any], name: str) -> Robot:
+    """A robot of the study; a file stands relative to the study's folder."""
+    beside = folder / entry
+    source = beside if Path(entry).suffix and not Path(entry).is_absolute() else entry
+    try:
+        return load(source, **{**overrides, **varied})
+    except InputError as error:
+        if not varied:
+            raise
+        raise InputError(f"{name}, with vary: {error}") from error

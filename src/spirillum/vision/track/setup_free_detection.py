@@ -1,0 +1,379 @@
+"""The first look at a film of which no setup is known: ruler, robot, direction and stripes, at any scale.
+
+A provisional camera stands in for the unknown one: its lens is as far away as a usual one, and its scale is a guess
+that the search for the robot corrects. Finding and learning are those of every film
+(`spirillum.vision.track.identity`).
+
+Appearance of the body's cover on a video: opaque, or glass through which contents and background show.
+Across the cover, an opaque one is of one brightness from rim to rim. Glass has a bright rim beside its contents, or
+contents whose brightness changes along the axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import permutations
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
+from spirillum.vision.camera.optics import DIRECTIONS, BodyPose, Optics, opposite, seen
+from spirillum.vision.camera.ruler import Lines
+from spirillum.vision.camera.scale import first_rotation, given_camera
+from spirillum.vision.setup import Setup, stripes_of
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import APPEARANCE, IDENTITY, SCOUTING
+from spirillum.vision.track.identity import Identified, identified_at
+from spirillum.vision.track.search import searched_at
+from spirillum.vision.track.size import best_other_size, resized
+from spirillum.vision.track.stripes import Stripes
+from spirillum.vision.video.frames import Frame, Video
+from spirillum.vision.video.pictures import reduction
+
+Appearance = Literal["opaque", "glass", "unknown"]
+"""As `robot.appearance` of a setup."""
+
+
+def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> Appearance:
+    """Return whether the cover before the seal looks opaque or like glass, `unknown` where it is not clear.
+
+    Args:
+        robot: the robot.
+        optics: a camera that shows it as large as it looks.
+        samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body on each.
+    """
+    half, radius = 0.5 * robot.body.length, 0.5 * robot.body.diameter
+    rear = -half + (robot.seal.length if robot.seal is not None else 0.0)
+    along = np.linspace(rear + 0.15 * radius, half - 0.15 * radius, APPEARANCE.places)
+    across = radius * np.linspace(-APPEARANCE.reach, APPEARANCE.reach, APPEARANCE.lines)
+    pictures = [_brightness(image, pose, optics, along, across) for image, pose in samples]
+    grey = np.array([picture for picture in pictures if picture is not None])
+    if len(grey) < APPEARANCE.fewest:
+        return "unknown"
+    straight = along < half - radius
+    if not straight.any():
+        return "unknown"
+    share = np.abs(across) / radius
+    across_it = np.median(grey[:, straight], axis=(0, 1))
+    along_it = np.median(grey[:, :, share < APPEARANCE.core], axis=(0, 2))
+    core, outside = np.median(across_it[share < APPEARANCE.core]), np.median(across_it[share > APPEARANCE.beyond])
+    step = float(abs(outside - core))
+    low, high = np.quantile(along_it, [0.1, 0.9])
+    rims = [_rim(across_it, share, side * across > 0.0, float(core), float(outside)) for side in (1.0, -1.0)]
+    uneven = float(high - low)
+    if uneven > max(APPEARANCE.least, APPEARANCE.uneven * step):
+        return "glass"
+    if step < APPEARANCE.least:
+        return "unknown"
+    if min(rims) > APPEARANCE.bright_rim * step:
+        return "glass"
+    even = max(rims) < 0.5 * APPEARANCE.bright_rim * step and uneven < 0.5 * APPEARANCE.uneven * step
+    return "opaque" if even else "unknown"
+
+
+def _rim(profile: Samples, share: Samples, side: np.ndarray, core: float, outside: float) -> float:
+    """By how much the rim on one side is brighter than core and outside, of 255."""
+    near = side & (np.abs(share - 1.0) < APPEARANCE.rim)
+    return float(profile[near].max()) - max(core, outside)
+
+
+def _brightness(image: np.ndarray, pose: BodyPose, optics: Optics, along: Samples, across: Samples) -> Samples | None:
+    """Brightness on a grid in the plane through the body's axis, of 255, (n, k); None where it is not all in view."""
+    grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    pixels = np.nan_to_num(seen(grid, pose, optics), nan=-1.0).round().astype(int)
+    if np.any(pixels < 0) or np.any(pixels >= (image.shape[1], image.shape[0])):
+        return None
+    grey = image[pixels[:, 1], pixels[:, 0]].mean(axis=1)
+    return np.asarray(grey.reshape(along.size, across.size))
+
+
+_WRONG = 4.0
+"""Ratio beyond the usual lengths per pixel at which a stated spacing is wrong."""
+
+
+class Walls(NamedTuple):
+    """Two edges along the channel on either side of the robot."""
+
+    distance: float
+    """Distance between them over the body's diameter."""
+    contrast: float
+    """Step of the brightness at the fainter one over the usual step, from row to row."""
+    ends: Samples
+    """Pixels of both ends of both edges, (2, 2, 2)."""
+
+
+class Scouted(NamedTuple):
+    """What a film tells without a setup."""
+
+    lines: Lines | None
+    """Lines of the ruler; None where none was found."""
+    known: Identified | None
+    """The robot, in front of the provisional camera; None where none was found."""
+    direction: str
+    """Where in the picture its nose points."""
+    stripes: tuple[str, ...]
+    """Colours of its stripes in the order seen; empty where they could not be read."""
+    walls: Walls | None
+    """Walls of its channel; None where none were found."""
+    frames: list[Frame]
+    """Frames that were looked at."""
+    reduction: int
+    """Factor by which they may be reduced where they are looked at as a whole: the ruler is resolved in them."""
+
+    @property
+    def optics(self) -> Optics:
+        """The provisional camera, at the scale at which the robot was found."""
+        assert self.known is not None  # noqa: S101 - asked by those who know
+        return self.known.start.body.optics
+
+    @property
+    def appearance(self) -> Appearance:
+        """Whether the cover of the robot looks opaque or like glass."""
+        assert self.known is not None  # noqa: S101
+        start = self.known.start
+        return appearance_of(start.body.robot, self.optics, start.seen)
+
+    @property
+    def speed(self) -> float:
+        """How fast the robot moves towards its nose, pixels a second."""
+        assert self.known is not None  # noqa: S101
+        path = self.known.start.path
+        if len(path) < 2:
+            return 0.0
+        time, x = np.array([at for at, _ in path]), np.array([pose.x for _, pose in path])
+        return float(np.polyfit(time - time.mean(), x, 1)[0]) / self.optics.length_per_pixel
+
+
+def scouted(
+    video: Video,
+    robot: Robot,
+    spacing: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Scouted:
+    """Look at a film without a setup.
+
+    Args:
+        video: the film.
+        robot: the robot in front of the camera.
+        spacing: of the ruler's lines, m, where it is known.
+        progress: told what is looked for, how many looks are done, and how many there are at most.
+    """
+    tell = progress or (lambda _what, _done, _total: None)
+    anywhere = _setup(robot, video.size, 1e-4, "right")
+    tell("reading frames", 0, 1)
+    frames = samples_of(video, anywhere.start, anywhere.end)
+    stills = _Stills(frames)
+    _check_no_noise(stills.at(1), video)
+    tell("looking for the ruler", 0, 1)
+    (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
+    guesses = _guesses(robot, video.size, lines, spacing)
+    looks = 2 * len(guesses) * len(directions)
+    tell("looking for the robot", 0, looks)
+    for place, guess in enumerate(guesses):
+        found = _found_at(video, robot, (guess, lines, directions), stills)
+        for done, (direction, known) in enumerate(found, 1 + 2 * len(directions) * place):
+            tell("looking for the robot", done, looks)
+            if known is None:
+                continue
+            stripes = _stripes_seen(robot, known)
+            if lines is None and not stripes and len(known.start.path) < SCOUTING.alone:
+                continue
+            walls = _walls(stills.at(factor), known, lines)
+            return Scouted(lines, known, direction, stripes, walls, frames, factor)
+    return Scouted(lines, None, "right", (), None, frames, factor)
+
+
+def _check_no_noise(still: Samples, video: Video) -> None:
+    """Refuse pictures whose neighbouring pixels have nothing in common, before a robot is looked for at all scales."""
+    grey = still.mean(axis=2) - still.mean()
+    total = float(np.mean(grey**2))
+    shared = 0.5 * float(np.mean(grey[1:] * grey[:-1]) + np.mean(grey[:, 1:] * grey[:, :-1]))
+    if shared < SCOUTING.correlation * total:
+        raise InputError(
+            f"{video.name} shows noise alone: neighbouring pixels correlate by {shared / total:.2f}; allowed: a film "
+            "in which all of the robot is in view"
+        )
+
+
+class _Stills:
+    """Frames, and their static background, reduced by any factor."""
+
+    def __init__(self, frames: list[Frame]) -> None:
+        self.frames = frames
+        self._at: dict[int, Samples] = {}
+
+    def at(self, factor: int) -> Samples:
+        """The background reduced by a factor."""
+        if factor not in self._at:
+            self._at[factor] = background(self.frames, factor)
+        return self._at[factor]
+
+
+def _ruler(
+    stills: _Stills, bounds: tuple[int, int, int, int], most: int
+) -> tuple[tuple[Lines | None, int], tuple[str, ...]]:
+    """The ruler and a factor by which pictures may be reduced that show it, and where the nose may point."""
+    still = stills.at(most)
+    found = {side: ruler_of(still, bounds, -DIRECTIONS[side], most) for side in ("right", "down")}
+    count = {side: 0 if lines is None else len(lines.number) for side, (lines, _) in found.items()}
+    # A full picture takes long at all rolls: first the way along which a reduced one shows more lines.
+    for side in sorted(found, key=lambda one: -count[one]):
+        lines, factor = found[side]
+        if most > 1:
+            lines, factor = ruler_of(still, bounds, -DIRECTIONS[side], most, stills.frames)
+        if lines is not None:
+            return (lines, factor), (side, opposite(side))
+    left, top, right, bottom = bounds
+    sides = ("right", "left", "up", "down")
+    return (None, most), sides if right - left >= bottom - top else sides[::-1]
+
+
+def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
+    """A provisional setup whose pixel shows a length at the height of the robot's axis, m."""
+    far = SCOUTING.distance * size[0] * pixel
+    deep = min(0.6 * robot.body.diameter, 0.2 * far)
+    return Setup.model_validate(
+        {
+            "camera": {"height": f"{far + deep:.9g} m"},
+            "markers": {"length_per_pixel": f"{pixel:.9g} m"},
+            "robot": {"file": robot.name, "axis_height": f"{deep:.9g} m", "direction": direction},
+        }
+    )
+
+
+def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: float | None) -> list[float]:
+    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m.
+
+    A spacing by which the robot would be a dot, or far larger than the picture, is wrong and is not tried.
+    """
+    length = robot.body.length + robot.coupling.length + robot.tail.length
+    wide = [length / (share * max(size)) for share in SCOUTING.shares]
+    guesses = []
+    if lines is not None:
+        by_ruler = SCOUTING.nearer * (SCOUTING.spacing if spacing is None else spacing) / lines.distance
+        guesses += [by_ruler] if min(wide) / _WRONG < by_ruler < _WRONG * max(wide) else []
+    return guesses + [guess for guess in wide if all(abs(np.log(guess / other)) > np.log(1.5) for other in guesses)]
+
+
+def _found_at(
+    video: Video,
+    robot: Robot,
+    guess: tuple[float, Lines | None, tuple[str, ...]],
+    stills: _Stills,
+) -> Iterator[tuple[str, Identified | None]]:
+    """Looks for the robot near a guessed scale, in each direction of its nose; then at half to twice of it."""
+    finders = {}
+    pixel, lines, directions = guess
+    for direction in directions:
+        setup = _setup(robot, video.size, pixel, direction)
+        optics = given_camera(setup, video.size).optics
+        if lines is not None:
+            optics = optics.moved({"rotation": first_rotation(optics, lines)})
+        finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
+    most = reduction(video.size)
+    for sized in (False, True):
+        for direction, (setup, finder) in finders.items():
+            factor = searched_at(finder.shape().width, most)
+            images, still = [frame.reduced(factor) for frame in stills.frames], stills.at(factor)
+            size = best_other_size(finder, images, still) if sized else 1.0
+            body = None if size is None else resized(finder, size)
+            yield direction, None if body is None else _looked(video, setup, body, stills, factor)
+
+
+def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
+    """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there."""
+    for _ in range(SCOUTING.rounds):
+        try:
+            known = identified_at(video.name, setup, body, stills.frames, stills.at(factor), 1.0)  # no size is stated
+        except InputError:
+            return None
+        tail = known.wire.readable
+        if not known.start.flags and (tail > IDENTITY.sure_share or known.robot):
+            return known
+        if known.start.flags or tail < IDENTITY.least_share:
+            return None
+        body = resized(known.start.body, 1.0)  # it looks otherwise large: once more from there
+    return None
+
+
+def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
+    """Colours of the stripes in the order seen: the file's own, else another one of the same colours."""
+    reader = known.stripes
+    own = reader.stripes
+    if reader.fits or not own:
+        return own if reader.fits else ()
+    names, fitting = list(dict.fromkeys(own)), []
+    repeats = len(own) // len(names)
+    if own != tuple(names) * repeats or len(names) > SCOUTING.most_colours:
+        return ()
+    optics = known.start.body.optics
+    for order in permutations(names[1:]):
+        setup = _setup(robot, optics.size, 1e-4, "right")
+        some = setup.model_copy(
+            update={"robot": setup.robot.model_copy(update={"stripes": (names[0], *order) * repeats})}
+        )
+        other = Stripes(robot, some, optics)
+        other.learn(known.start.seen)
+        read = [np.isfinite(other.read(image, pose)[0]) for image, pose in known.start.seen]
+        if other.fits and np.mean(read) > IDENTITY.least_share:
+            fitting.append(stripes_of(some, robot))
+    return fitting[0] if len(fitting) == 1 else ()
+
+
+def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | None:
+    """The outermost clear pair of edges along the robot's way, inside the ruler; None without one.
+
+    Brightness is taken at lines along the way, as the median along each, so that robot, ruler and dust drop out.
+    """
+    body = known.start.body
+    optics, diameter = body.optics, body.robot.body.diameter
+    poses = np.array([pose for _, pose in known.start.path])
+    way = np.array([np.cos(heading := float(np.median(poses[:, 2]))), np.sin(heading)])
+    if lines is not None:
+        along = 50.0 * np.array([[-np.cos(lines.roll), -np.sin(lines.roll)], [np.cos(lines.roll), np.sin(lines.roll)]])
+        first, last = optics.points(along + np.array(optics.middle), optics.axis_height)[:, :2]
+        way = (last - first) / np.linalg.norm(last - first)
+    side = np.array([-way[1], way[0]])
+    centre = np.median(poses[:, :2], axis=0)
+    centre = centre + way * ((optics.origin[:2] - centre) @ way)
+    factor = optics.size[0] // still.shape[1]
+    step = factor * optics.length_per_pixel
+    reach = SCOUTING.widest * diameter
+    across = np.arange(-reach, reach, step)
+    along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * optics.length_per_pixel
+    grid = centre + along[:, None, None] * way + across[None, :, None] * side
+    points = np.concatenate([grid, np.full((*grid.shape[:2], 1), optics.axis_height)], axis=2)
+    pixels = np.nan_to_num(optics.pixels(points.reshape(-1, 3)), nan=-9.0).round().astype(int)
+    inside = np.all((pixels >= 0) & (pixels < np.array(optics.size)), axis=1)
+    brightness = np.full(len(pixels), np.nan)
+    rows, columns = np.minimum(pixels[inside, ::-1] // factor, np.array(still.shape[:2]) - 1).T
+    brightness[inside] = still[rows, columns].mean(axis=1)
+    table = brightness.reshape(grid.shape[:2])
+    seen = np.isfinite(table).mean(axis=0) > SCOUTING.seen
+    if not seen.any():
+        return None
+    profile = np.full(across.size, np.nan)
+    profile[seen] = np.nanmedian(table[:, seen], axis=0)
+    steps = np.abs(np.gradient(profile))
+    if lines is not None:
+        there = (optics.points(lines.pixels, optics.axis_height)[:, :2] - centre) @ side
+        for sign in (1.0, -1.0):
+            beyond = sign * there[sign * there > 0.5 * diameter]
+            if beyond.size:
+                steps[sign * across > float(beyond.min()) - SCOUTING.paper * diameter] = np.nan
+    usual = float(np.nanmedian(steps)) + SCOUTING.faintest
+    left, right = (np.flatnonzero((sign * across > SCOUTING.beside * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0))
+    fainter = np.minimum(steps[left][:, None], steps[right]) / usual
+    width, off = across[right] - across[left][:, None], np.abs(across[right] + across[left][:, None])
+    fitting = (fainter > SCOUTING.clear) & (off < SCOUTING.off_axis * diameter)
+    if not fitting.any():
+        return None
+    one, other = np.unravel_index(np.argmax(np.where(fitting, width, 0.0)), width.shape)
+    i, j = left[one], right[other]
+    ends = [[centre + far * way + across[k] * side for far in (along[0], along[-1])] for k in (i, j)]
+    flat = np.concatenate([np.array(ends).reshape(4, 2), np.full((4, 1), optics.axis_height)], axis=1)
+    return Walls(float(width[one, other]) / diameter, float(fainter[one, other]), optics.pixels(flat).reshape(2, 2, 2))

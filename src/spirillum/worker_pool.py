@@ -1,0 +1,229 @@
+"""Who does the work of a large study: this process, several on this machine, or the workers of a Dask cluster.
+
+Answers come back to this process, which alone writes. A worker that is killed loses what it was at, and another one
+does it again; where client or scheduler are killed, what was answered is kept, and the same call goes on from there.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from threading import Lock
+from time import monotonic
+from typing import Any, Generic, TypeVar
+
+from spirillum.errors import InputError
+from spirillum.optional_dependencies import import_optional
+from spirillum.processes import AHEAD, imap_unordered
+from spirillum.version import own_version, versions
+
+ESTIMATE = "estimate: "
+"""How a progress message begins that says what work will take: a command prints it as a line of its own."""
+_ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss|inproc)://\S{1,200}")
+_PATIENCE = 5.0
+"""Time in which a scheduler has to answer, s."""
+_LOOK = 1.0
+"""Time between two looks whether the scheduler is still there, s."""
+_LONGEST_TRANSFER = 120.0
+"""Time in which an answer has to come from the worker that has it, s."""
+_MOST_DEATHS = 100
+"""Tasks that may be given up because several workers ended at them, before the tasks are taken for the cause."""
+_MOST_WORKERS = 64
+_alone = Lock()
+_Task = TypeVar("_Task")
+_Answer = TypeVar("_Answer")
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class WorkerPool:
+    """Workers: processes of this machine, or those of a cluster."""
+
+    workers: int = 1
+    cluster: str | None = None
+    """Address of a Dask scheduler; None: this machine."""
+
+    @property
+    def size(self) -> int:
+        """Number of workers; those of a cluster are asked for."""
+        if self.cluster is None:
+            return self.workers
+        with _client(self.cluster) as client:
+            return len(_workers(client, self.cluster))
+
+    def check(self) -> None:
+        """Check that the workers are there, before anything is written."""
+        if self.cluster is not None:
+            _ = self.size
+
+
+def checked_crew(workers: int, cluster: str | None) -> WorkerPool:
+    """A crew of so many workers, or of those of a cluster.
+
+    Args:
+        workers: number of processes.
+        cluster: address of a scheduler, as `tcp://192.168.1.5:8786`; None: this machine.
+    """
+    if not 1 <= workers <= _MOST_WORKERS:
+        raise InputError(f"workers = {str(workers)[:40]}; allowed: a whole number of 1 to {_MOST_WORKERS}")
+    if cluster is not None and not _ADDRESS.fullmatch(cluster):
+        raise InputError(
+            f"cluster = {str(cluster)[:80]!r}; allowed: the address of a Dask scheduler, as tcp://192.168.1.5:8786"
+        )
+    return WorkerPool(workers, cluster)
+
+
+def map_tasks(
+    work: Callable[[_Task], _Answer],
+    tasks: Iterable[_Task],
+    crew: WorkerPool,
+    *,
+    besides: str = "",
+    tell: Tell | None = None,
+) -> Iterator[tuple[_Task, _Answer]]:
+    """Tasks with their answers, in any order but from this process alone."""
+    if crew.cluster is None:
+        yield from imap_unordered(work, tasks, crew.workers, besides=besides, single=True)
+        return
+    with _client(crew.cluster) as client:
+        _workers(client, crew.cluster)
+        yield from _on_cluster(_Hand(client, work, tasks, tell or (lambda _: None)), crew.cluster, besides)
+
+
+def _client(address: str) -> Any:
+    """A connection to a scheduler."""
+    distributed = import_optional("distributed", "a study on a cluster", "cluster")
+    for name in ("distributed", "distributed.core", "distributed.client", "distributed.comm"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is said in a sentence
+    try:
+        return distributed.Client(address, timeout=_PATIENCE)
+    except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
+        raise InputError(
+            f"cluster = {address!r}: no scheduler answers there within {_PATIENCE:g} s; allowed: the address of a Dask "
+            "scheduler that runs, as tcp://192.168.1.5:8786"
+        ) from error
+
+
+def _about() -> tuple[str, str]:
+    """Versions of a worker."""
+    return own_version(), versions()
+
+
+def _workers(client: Any, address: str) -> list[str]:
+    """Workers of a cluster, all of which can do the work."""
+    known = client.scheduler_info(n_workers=-1)["workers"]
+    if not known:
+        raise InputError(f"cluster = {address!r} has no workers; allowed: one that has, by `dask worker {address}`")
+    many = next((name for name, item in known.items() if item["nthreads"] > 1), None)
+    if many is not None:
+        raise InputError(
+            f"cluster = {address!r}: worker {many} has {known[many]['nthreads']} threads; allowed: workers of one "
+            "thread (`dask worker --nworkers auto --nthreads 1`)"
+        )
+    try:
+        found = client.run(_about, on_error="return")
+    except (OSError, TimeoutError) as error:
+        raise _lost(address, "") from error
+    for name, item in found.items():
+        if item != _about():
+            own = f"has {item[1]}" if isinstance(item, tuple) else "cannot load spirillum"
+            raise InputError(f"cluster = {address!r}: worker {name} {own}; allowed: workers with {versions()}")
+    return list(found)
+
+
+def _lost(address: str, besides: str) -> InputError:
+    return InputError(f"the scheduler at {address} was lost{besides}; allowed: the same again once one is there")
+
+
+def _at_worker(work: Callable[[_Task], _Answer], task: _Task, expected: tuple[str, str]) -> _Answer:
+    """One task, one at a time in this process."""
+    if _about() != expected:
+        raise InputError(f"a worker of the cluster has {versions()}; allowed: workers with {expected[1]}")
+    with _alone:
+        return work(task)
+
+
+class _Hand(Generic[_Task, _Answer]):
+    """Tasks that are with the workers of a cluster: a few for each of them at a time."""
+
+    def __init__(self, client: Any, work: Callable[[_Task], _Answer], tasks: Iterable[_Task], tell: Tell) -> None:
+        self._client, self._work, self._ahead, self._tell = client, work, iter(tasks), tell
+        self._waiting: dict[Any, _Task] = {}
+        self._room, self._looked, self._deaths = 0, -_LOOK, 0
+
+    def fill(self) -> bool:
+        """Look which workers there are and send them their next tasks; whether any task is with them."""
+        if monotonic() - self._looked >= _LOOK:
+            known = self._client.scheduler_info(n_workers=-1)["workers"]
+            machines = len({item["host"] for item in known.values()})
+            self._tell(f"{len(known)} workers on {machines} machine{'' if machines == 1 else 's'}")
+            self._room, self._looked = max(AHEAD * len(known), 1), monotonic()
+        for task in islice(self._ahead, max(self._room - len(self._waiting), 0)):
+            self._send(task)
+        return bool(self._waiting)
+
+    def _send(self, task: _Task) -> None:
+        self._waiting[self._client.submit(_at_worker, self._work, task, _about(), pure=False)] = task
+
+    def done(self) -> list[Any]:
+        """Tasks that are done, or none after a while.
+
+        Raises:
+            OSError: if the scheduler is gone.
+        """
+        from distributed import wait
+
+        try:
+            return list(wait(list(self._waiting), timeout=_LOOK, return_when="FIRST_COMPLETED").done)  # type: ignore[no-untyped-call]
+        except TimeoutError:
+            if self._client.status != "running":
+                raise OSError("no connection") from None
+            return []
+
+    def answer(self, future: Any) -> tuple[_Task, _Answer] | BaseException | None:
+        """A task with its answer, or why there is none; None where it was sent again, for its worker had ended."""
+        from distributed import KilledWorker
+
+        task = self._waiting.pop(future)
+        if future.status != "error":
+            return task, future.result(timeout=_LONGEST_TRANSFER)
+        error: BaseException = future.exception(timeout=_LONGEST_TRANSFER)
+        if isinstance(error, KilledWorker) and self._deaths < _MOST_DEATHS:
+            self._deaths += 1
+            self._send(task)
+            return None
+        return error
+
+
+def _on_cluster(hand: _Hand[_Task, _Answer], address: str, besides: str) -> Iterator[tuple[_Task, _Answer]]:
+    """Tasks with their answers as they come."""
+    from distributed import CancelledError
+
+    try:
+        while hand.fill():
+            done = hand.done()
+            while done:
+                found = hand.answer(done.pop())
+                if isinstance(found, BaseException):
+                    raise _failed(address, found, besides)
+                if found is not None:
+                    yield found
+    except (CancelledError, OSError) as error:
+        raise _lost(address, besides) from error
+
+
+def _failed(address: str, error: BaseException, besides: str) -> BaseException:
+    """What is raised where a worker could not do its task."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return InputError(
+            f"workers of {address} end at their tasks again and again, as for want of memory{besides}; allowed: "
+            "workers with more memory"
+        )
+    if isinstance(error, OSError):
+        return InputError(f"a worker of {address} could not do its task ({error}){besides}; allowed: workers that can")
+    return error
