@@ -3,17 +3,20 @@
 import gc
 import os
 import signal
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import Phase, settings
 
 from browser import LEFT_OUT
-from spirillum.cli import main
+from commands import Outcome, run_command
+from remembered import remembered
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -28,36 +31,44 @@ settings.register_profile("spirillum", deadline=None, derandomize=True, database
 settings.load_profile("spirillum")
 
 
-_FIRST = (
-    "test_documentation.py",
-    "test_follow_from_film_to_track.py",
-    "test_flow_figure_against_its_field.py",
-    "test_tube_pitched_and_wired.py",
-    "test_study_figures_against_their_dataset.py",
-    "test_kills_and_full_disks.py",
-    "test_same_bytes_whoever_computes.py",
-    "test_wrong_scales_show_in_the_bodys_size.py",
-    "test_report_stands_alone.py",
-    "test_any_roll_and_portrait_are_measured.py",
-    "test_setups_are_proposed_from_films.py",
-    "test_robots_on_a_light_table.py",
-    "test_tube_yawed.py",
-    "test_tube_flow_against_stokes_equations.py",
-    "test_seat_against_closed_forms.py",
-    "test_reading_is_bounded.py",
-    "test_picture_against_projection.py",
-    "test_tube_table.py",
-    "test_film_table.py",
-    "test_interaction_reciprocity_and_limits.py",
-    "test_tube_through_public_names.py",
-    "test_tube_solids_against_series_and_closed_forms.py",
-)
+_DURATIONS = Path(__file__).with_name("durations.txt")
+_SLOW_FILE = 4.0
+"""Duration from which a file of tests is listed, s."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """An option that writes the list of slow files anew."""
+    parser.addoption(
+        "--record-durations", action="store_true", help=f"write {_DURATIONS.name}, the order of slow files"
+    )
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest tests first: workers end at about the same time, and do not compile the same loops side by side."""
-    rank = {name: place for place, name in enumerate(_FIRST)}
+    """The slowest files first: workers end at about the same time, and do not compile the same loops side by side."""
+    rank = {line.split()[1]: number for number, line in enumerate(_DURATIONS.read_text().splitlines())}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+class _Durations:
+    """Sums of the durations of each file's tests."""
+
+    def __init__(self) -> None:
+        self.of_file: Counter[str] = Counter()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Add a phase of a test."""
+        self.of_file[Path(report.location[0]).name] += report.duration
+
+    def pytest_sessionfinish(self) -> None:
+        """Write the files that are slow, the slowest first."""
+        slow = [f"{seconds:4.0f} {name}\n" for name, seconds in self.of_file.most_common() if seconds >= _SLOW_FILE]
+        _DURATIONS.write_text("".join(slow))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Record durations where asked to, in the process that sees all reports."""
+    if config.getoption("--record-durations") and "PYTEST_XDIST_WORKER" not in os.environ:
+        config.pluginmanager.register(_Durations())
 
 
 def pytest_collection_finish() -> None:
@@ -93,26 +104,10 @@ def flat_pictures() -> ModuleType:
     return flat_pictures
 
 
-class Outcome(NamedTuple):
-    """What a command printed and how it ended."""
-
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+def run() -> Callable[..., Outcome]:
     """Run a command and return its exit code and output."""
-
-    def command(*arguments: str) -> Outcome:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as stopped:
-            main(list(arguments))
-        printed = capsys.readouterr()
-        return Outcome(int(stopped.value.code or 0), printed.out, printed.err)
-
-    return command
+    return run_command
 
 
 @pytest.fixture(scope="session")
@@ -124,7 +119,7 @@ def batch_of() -> Callable[..., Any]:
     def make(*, preset: str = "biorob2012-wide", **overrides: Any) -> RobotBatch:
         return RobotBatch.of(load(preset, **{name.replace("__", "."): value for name, value in overrides.items()}))
 
-    return make
+    return remembered(make)
 
 
 @pytest.fixture(scope="session")

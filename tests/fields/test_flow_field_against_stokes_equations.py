@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from comparisons import flow_gradients
 from spirillum.errors import InputError
 from spirillum.fields.unbounded import FlowField, flow_field
 from spirillum.fluid.algebra import axis_rotation
@@ -137,23 +138,11 @@ def fluid_points(field: FlowField, count: int, clear: float = 2e-3) -> np.ndarra
     return points[free][:count]
 
 
-def gradients(field: FlowField, points: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Velocity gradient [point, direction, component], its Laplacian, and the pressure's gradient, of fourth order."""
-    offsets = np.array([-2, -1, 0, 1, 2]) * h
-    grid = points[:, None, None] + offsets[None, None, :, None] * np.eye(3)[None, :, None]
-    velocity, pressure = field.fields(grid.reshape(-1, 3))
-    velocity, pressure = velocity.reshape(len(points), 3, 5, 3), pressure.reshape(len(points), 3, 5)
-    slope = np.array([1, -8, 0, 8, -1]) / (12 * h)
-    bend = np.array([-1, 16, -30, 16, -1]) / (12 * h**2)
-    first = np.einsum("ndoc,o->ndc", velocity, slope)
-    return first, np.einsum("ndoc,o->nc", velocity, bend), np.einsum("ndo,o->nd", pressure, slope)
-
-
 def test_stokes_equations(moving: FlowField) -> None:
     """No divergence, and mu times the Laplacian of u is the gradient of p."""
     points = fluid_points(moving, 25)
     assert len(points) == 25
-    slope, laplacian, push = gradients(moving, points, 1e-4)
+    slope, laplacian, push = flow_gradients(moving, points, 1e-4)
     size = np.max(np.abs(slope), axis=(1, 2))
     assert np.max(np.abs(np.trace(slope, axis1=1, axis2=2)) / size) < 1e-5
     balance = np.linalg.norm(MU * laplacian - push, axis=1)
@@ -169,7 +158,7 @@ def test_body_alone_obeys_the_stokes_equations() -> None:
     field = sphere_alone(BODY)
     points = np.random.default_rng(2).normal(size=(20, 3))
     points *= 0.02 / np.linalg.norm(points, axis=1, keepdims=True)
-    slope, laplacian, push = gradients(field, points, 4e-4)
+    slope, laplacian, push = flow_gradients(field, points, 4e-4)
     assert np.max(np.abs(np.trace(slope, axis1=1, axis2=2))) < 1e-6 * np.max(np.abs(slope))
     np.testing.assert_allclose(MU * laplacian, push, atol=1e-5 * np.max(np.abs(push)))
 
@@ -183,7 +172,7 @@ def wrench_on_a_sphere(field: FlowField, radius: float, centre: np.ndarray) -> n
     s = np.sqrt(1 - c**2)
     normal = np.stack([c, s * np.cos(angle), s * np.sin(angle)], axis=1)
     points = centre + radius * normal
-    slope, _, _ = gradients(field, points, 1e-3 * radius)
+    slope, _, _ = flow_gradients(field, points, 1e-3 * radius)
     pressure = field.pressure(points)
     stress = MU * (slope + slope.swapaxes(1, 2)) - pressure[:, None, None] * np.eye(3)
     traction = np.einsum("nij,nj->ni", stress, normal) * area[:, None]

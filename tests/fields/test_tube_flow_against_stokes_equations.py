@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons import flow_gradients
 from spirillum.errors import InputError
 from spirillum.fields.in_tube import TubeFlowField, tube_flow_field
 from spirillum.fields.unbounded import flow_field
@@ -167,18 +168,6 @@ def test_open_ends_have_one_pressure(placed: Callable[..., Any], closed: TubeFlo
     assert through(field, 0.06)[0] == pytest.approx(mean, rel=1e-2)
 
 
-def gradients(field: TubeFlowField, points: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Velocity gradient [point, direction, component], its Laplacian, and the pressure's gradient, of fourth order."""
-    offsets = np.array([-2, -1, 0, 1, 2]) * h
-    grid = points[:, None, None] + offsets[None, None, :, None] * np.eye(3)[None, :, None]
-    velocity, pressure = field.fields(grid.reshape(-1, 3))
-    velocity, pressure = velocity.reshape(len(points), 3, 5, 3), pressure.reshape(len(points), 3, 5)
-    slope = np.array([1, -8, 0, 8, -1]) / (12 * h)
-    bend = np.array([-1, 16, -30, 16, -1]) / (12 * h**2)
-    first = np.einsum("ndoc,o->ndc", velocity, slope)
-    return first, np.einsum("ndoc,o->nc", velocity, bend), np.einsum("ndo,o->nd", pressure, slope)
-
-
 @pytest.mark.parametrize("which", ["closed", SLOW[0]])
 def test_stokes_equations(request: pytest.FixtureRequest, which: str) -> None:
     """To the tolerance at which waves are left out."""
@@ -191,7 +180,7 @@ def test_stokes_equations(request: pytest.FixtureRequest, which: str) -> None:
     for _, outline in field.solids:
         free &= outline.distance(points[:, 0], np.hypot(points[:, 1], points[:, 2])) > 3e-3
     free &= ~field.inside(points)
-    slope, laplacian, push = gradients(field, points[free][:30], 2e-4)
+    slope, laplacian, push = flow_gradients(field, points[free][:30], 2e-4)
     size = np.max(np.abs(slope), axis=(1, 2))
     tolerance = field.held.strengths.solids.fineness.tolerance
     assert np.max(np.abs(np.trace(slope, axis1=1, axis2=2)) / size) < 8 * tolerance

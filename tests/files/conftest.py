@@ -1,44 +1,13 @@
 """Commands run in this process, with what they did to the files around them."""
 
-import contextlib
-import io
 import os
 import threading
-import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
-from spirillum.cli import main
-
-
-class Outcome(NamedTuple):
-    """What a command printed and how it ended."""
-
-    code: int
-    out: str
-    err: str
-
-
-def outcome_of(*arguments: str) -> Outcome:
-    """Run a command."""
-    out, err = io.StringIO(), io.StringIO()
-    code = 0
-    with warnings.catch_warnings(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        warnings.simplefilter("default")
-        try:
-            main(list(arguments))
-        except SystemExit as stopped:
-            code = int(stopped.code or 0)
-    return Outcome(code, out.getvalue(), err.getvalue())
-
-
-@pytest.fixture
-def run() -> Callable[..., Outcome]:
-    """Run a command and return its exit code and output."""
-    return outcome_of
+from commands import Outcome
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from comparisons import assert_matrices_close
 from spirillum.fluid.algebra import about_point, axial_entries, axis_rotation, joint_locked
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.wire.interaction import Discretisation, solve
@@ -63,11 +64,6 @@ def normal(matrix: np.ndarray) -> np.ndarray:
     return matrix / np.outer(scale, scale)
 
 
-def assert_same(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> None:
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, tolerance)
-
-
 def assert_dissipates_more(larger: np.ndarray, smaller: np.ndarray, slack: float = 0.0) -> None:
     """`larger` minus `smaller` is positive semidefinite: for every motion it takes more power."""
     scale = np.sqrt(np.diag(larger))
@@ -107,11 +103,11 @@ def test_more_robot_takes_more_power(any_rear: Any, values: dict[str, float], tu
     free = full[:6, :6] - full[:6, 6:] @ np.linalg.solve(full[6:, 6:], full[6:, :6])
     assert_dissipates_more(free, parts["body"], slack)
     assert_dissipates_more(full[:6, :6], free, slack)
-    assert_same(joint_locked(full), parts["robot"], 1e-12)
+    assert_matrices_close(joint_locked(full), parts["robot"], 1e-12)
     # Both move alike through the water that the other drags along: the whole drags less than its parts.
     assert np.all(np.diag(parts["robot"])[:3] < (np.diag(parts["body"]) + np.diag(parts["rotor"]))[:3])
     if values["coupling.diameter"] == 0:
-        assert_same(parts["rotor"], parts["tail"], 1e-12)
+        assert_matrices_close(parts["rotor"], parts["tail"], 1e-12)
     else:
         coupling = MODEL.part_matrix(batch, "coupling", ZERO)[0]
         assert_dissipates_more(parts["rotor"], coupling, slack)
@@ -125,11 +121,11 @@ def test_phase(any_rear: Any, values: dict[str, float], turns: float, phase: flo
     batch = built(any_rear, values, turns)
     found = MODEL.resistance(batch, np.array([phase]))[0]
     turned = np.kron(np.eye(4), axis_rotation(np.array([phase - other]))[0])
-    assert_same(found, turned @ MODEL.resistance(batch, np.array([other]))[0] @ turned.T, 1e-12)
-    assert_same(axial_entries(found[None])[0], MODEL.axial(batch)[0], 1e-12)
+    assert_matrices_close(found, turned @ MODEL.resistance(batch, np.array([other]))[0] @ turned.T, 1e-12)
+    assert_matrices_close(axial_entries(found[None])[0], MODEL.axial(batch)[0], 1e-12)
     for part in ("tail", "robot"):
         whole = MODEL.part_matrix(batch, part, np.array([phase]))[0]
-        assert_same(
+        assert_matrices_close(
             whole, turned[:6, :6] @ MODEL.part_matrix(batch, part, np.array([other]))[0] @ turned[:6, :6].T, 1e-12
         )
 
@@ -145,7 +141,7 @@ def test_phase_against_a_tail_that_is_built_turned(batch_of: Callable[..., Any])
     solids = RobotGeometry.of(batch).solids("robot")
     anew = solve(solids, wires, Discretisation(order=8, tolerance=1e-4)).matrix
     found = MODEL.resistance(batch, np.array([phase]))[0] / float(batch.viscosity[0])
-    assert_same(anew, found, 1e-10)
+    assert_matrices_close(anew, found, 1e-10)
 
 
 @settings(max_examples=2)  # of each rear
@@ -155,9 +151,9 @@ def test_left_handed_is_the_mirror_image(any_rear: Any, values: dict[str, float]
     left = replace(right, hand=-right.hand)
     mirror = np.kron(np.eye(2), MIRROR)
     found, wanted = MODEL.resistance(left, ZERO)[0], MODEL.resistance(right, ZERO)[0]
-    assert_same(found, mirror @ wanted @ mirror, 1e-10)
+    assert_matrices_close(found, mirror @ wanted @ mirror, 1e-10)
     signs = np.array([[1, -1, 1, -1], [-1, 1, -1, 1], [1, -1, 1, -1], [-1, 1, -1, 1]])
-    assert_same(MODEL.axial(left)[0], signs * MODEL.axial(right)[0], 1e-10)
+    assert_matrices_close(MODEL.axial(left)[0], signs * MODEL.axial(right)[0], 1e-10)
 
 
 @settings(max_examples=2)  # of each rear
@@ -177,7 +173,7 @@ def test_scale_and_viscosity(
     large = replace(large, viscosity=thicker * large.viscosity)
     units = np.kron(np.eye(2), np.diag([1.0, 1, 1, s, s, s]))
     wanted = thicker * s * units @ MODEL.resistance(small, ZERO)[0] @ units
-    assert_same(MODEL.resistance(large, ZERO)[0], wanted, 1e-12)
+    assert_matrices_close(MODEL.resistance(large, ZERO)[0], wanted, 1e-12)
 
 
 def test_far_apart(wide: Any) -> None:

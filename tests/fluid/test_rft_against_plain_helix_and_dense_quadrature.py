@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons import assert_matrices_close
 from spirillum.fluid.algebra import axial_entries
 from spirillum.fluid.closed.rft import Rft, local_coefficients, tail_axial, tail_matrix
 
@@ -57,12 +58,6 @@ def dense_quadrature(batch: Any, phase: float) -> np.ndarray:
         torque = np.cross(position.T, force.T).T + spin * (twist[3:] @ t) * t
         columns.append(np.concatenate([force @ ds, torque @ ds]))
     return np.array(columns).T
-
-
-def assert_close(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> None:
-    """Entries against the geometric mean of their diagonals: small ones are differences of large numbers."""
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, tolerance)
 
 
 @pytest.fixture(params=["right", "left"])
@@ -143,7 +138,7 @@ def test_every_entry_against_a_dense_quadrature(
         model__rft__arc_element=arc_element,
         model__rft__spin=True,
     )
-    assert_close(tail_matrix(batch, np.array([0.7]))[0], dense_quadrature(batch, 0.7), 1e-9)
+    assert_matrices_close(tail_matrix(batch, np.array([0.7]))[0], dense_quadrature(batch, 0.7), 1e-9)
 
 
 def test_spin_adds_the_torque_of_a_turning_cylinder(batch_of: Callable[..., Any], hand: str) -> None:
@@ -239,7 +234,7 @@ def test_robots_of_a_batch_are_as_good_as_one_by_one(batch_of: Callable[..., Any
     together, axial = tail_matrix(many, np.array([0.4])), np.array(tail_axial(many))
     for i, (taper, wavelength) in enumerate(zip(tapers, wavelengths, strict=True)):
         one = wide.with_values({"tail.taper": taper, "tail.wavelength": wavelength})
-        assert_close(together[i], tail_matrix(one, np.array([0.4]))[0], 1e-10)
+        assert_matrices_close(together[i], tail_matrix(one, np.array([0.4]))[0], 1e-10)
         np.testing.assert_allclose(axial[:, i], np.ravel(tail_axial(one)), rtol=1e-10)
 
 

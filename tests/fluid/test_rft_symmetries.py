@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from comparisons import assert_matrices_close
 from spirillum.fluid.algebra import about_point, axis_rotation, rotated
 from spirillum.fluid.closed.rft import Rft, coefficient_domain, tail_axial, tail_matrix
 from spirillum.robot.limits import all_hold, assembly_limits
@@ -33,11 +34,6 @@ def valid(batch: Any, tail: dict[str, float], turns: float) -> Any:
     changed = batch.with_values({**tail, "tail.length": length, "channel.diameter": np.inf, "channel.length": np.inf})
     assume(bool(all_hold(assembly_limits(changed) + coefficient_domain(changed))[0]))
     return changed
-
-
-def assert_same(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> None:
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, tolerance)
 
 
 @pytest.fixture(scope="module", params=SETS)
@@ -74,7 +70,7 @@ def test_constant_in_the_tails_own_frame(
 ) -> None:
     batch = valid(free_set, tail, turns)
     before, after = tail_matrix(batch, phase), tail_matrix(batch, phase + turned)
-    assert_same(after[0], rotated(before, axis_rotation(np.array([turned])))[0], 1e-10)
+    assert_matrices_close(after[0], rotated(before, axis_rotation(np.array([turned])))[0], 1e-10)
 
 
 @settings(max_examples=6)
@@ -86,7 +82,7 @@ def test_left_handed_is_the_mirror_image(any_set: Any, tail: dict[str, float], t
     right = valid(any_set, tail, turns)
     left = replace(right, hand=-right.hand)
     mirror = np.diag([1.0, 1.0, -1.0, -1.0, -1.0, 1.0])
-    assert_same(tail_matrix(left, -phase)[0], mirror @ tail_matrix(right, phase)[0] @ mirror, 1e-11)
+    assert_matrices_close(tail_matrix(left, -phase)[0], mirror @ tail_matrix(right, phase)[0] @ mirror, 1e-11)
     one, other = np.ravel(tail_axial(right)), np.ravel(tail_axial(left))
     np.testing.assert_allclose(other, one * [1, -1, 1], rtol=1e-14)
 
@@ -103,7 +99,7 @@ def test_scale(any_set: Any, tail: dict[str, float], turns: float, phase: np.nda
     values |= {"coupling.length": s * small.coupling_length, "coupling.diameter": s * small.coupling_diameter}
     large = small.with_values(values)
     units = np.diag([1.0, 1.0, 1.0, s, s, s])
-    assert_same(tail_matrix(large, phase)[0], s * units @ tail_matrix(small, phase)[0] @ units, 1e-10)
+    assert_matrices_close(tail_matrix(large, phase)[0], s * units @ tail_matrix(small, phase)[0] @ units, 1e-10)
     axial_units = np.diag([1.0, s, 1.0, s])
     np.testing.assert_allclose(Rft().axial(large)[0], s * axial_units @ Rft().axial(small)[0] @ axial_units, rtol=1e-10)
 
@@ -115,5 +111,5 @@ def test_linear_in_viscosity(
 ) -> None:
     thin = valid(any_set, tail, turns)
     thick = thin.with_values({"fluid.viscosity": factor * thin.viscosity})
-    assert_same(tail_matrix(thick, phase)[0], factor * tail_matrix(thin, phase)[0], 1e-12)
+    assert_matrices_close(tail_matrix(thick, phase)[0], factor * tail_matrix(thin, phase)[0], 1e-12)
     np.testing.assert_allclose(Rft().axial(thick), factor * Rft().axial(thin), rtol=1e-12)

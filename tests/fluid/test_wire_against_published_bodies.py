@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from comparisons import assert_matrices_close
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import about_point
 from spirillum.fluid.wire.interaction import Discretisation, solve
@@ -18,11 +19,6 @@ both = pytest.mark.parametrize("accuracy", ["standard", "high"])
 def matrix_of(*wires: Wire, accuracy: str = "standard") -> np.ndarray:
     """6x6 of wires that move together, viscosity 1."""
     return solve([], [(wire, 1) for wire in wires], Discretisation(accuracy)).matrix[6:, 6:]
-
-
-def assert_same(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> None:
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, tolerance)
 
 
 def straight(length: float) -> np.ndarray:
@@ -176,28 +172,28 @@ def test_turned_mirrored_scaled_and_reversed(accuracy: str, seed: int, power: fl
 
     turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
     both_turned = np.kron(np.eye(2), turn)
-    assert_same(changed(curve @ turn.T), both_turned @ matrix @ both_turned.T, 1e-9)
+    assert_matrices_close(changed(curve @ turn.T), both_turned @ matrix @ both_turned.T, 1e-9)
     mirror = np.diag([1.0, -1, 1, -1, 1, -1])
-    assert_same(changed(curve * [1, -1, 1]), mirror @ matrix @ mirror, 1e-9)
+    assert_matrices_close(changed(curve * [1, -1, 1]), mirror @ matrix @ mirror, 1e-9)
     s = 10.0**power
     units = np.diag([1.0, 1, 1, s, s, s])
-    assert_same(changed(s * curve, s * a), s * units @ matrix @ units, 1e-9)
-    assert_same(changed(curve[::-1]), matrix, 1e-8)
+    assert_matrices_close(changed(s * curve, s * a), s * units @ matrix @ units, 1e-9)
+    assert_matrices_close(changed(curve[::-1]), matrix, 1e-8)
     offset = np.array([x, 1.0, -2.0])
-    assert_same(changed(curve + offset), about_point(matrix[None], -offset[None])[0], 1e-9)
+    assert_matrices_close(changed(curve + offset), about_point(matrix[None], -offset[None])[0], 1e-9)
 
 
 def test_ring_starts_anywhere() -> None:
     wires = [wire_along(ring(start), 0.1, closed=True) for start in (0.0, 1.2345)]
-    assert_same(matrix_of(wires[1]), matrix_of(wires[0]), 1e-5)
+    assert_matrices_close(matrix_of(wires[1]), matrix_of(wires[0]), 1e-5)
     # The sense of a ring has no meaning, and about its axis it turns in itself: no coupling at all.
     matrix = matrix_of(wires[0])
-    assert_same(matrix, np.diag(np.diag(matrix)), 1e-6)
+    assert_matrices_close(matrix, np.diag(np.diag(matrix)), 1e-6)
 
 
 def test_points_along_the_given_curve_do_not_matter() -> None:
     coarse, fine = bent(3)[::5], bent(3)
-    assert_same(matrix_of(wire_along(coarse, 0.1)), matrix_of(wire_along(fine, 0.1)), 1e-4)
+    assert_matrices_close(matrix_of(wire_along(coarse, 0.1)), matrix_of(wire_along(fine, 0.1)), 1e-4)
 
 
 def test_several_wires() -> None:
@@ -212,7 +208,7 @@ def test_several_wires() -> None:
         lost.append(1 - together[0, 0] / (2 * one[0, 0]))
         apart = solve([], [(pair[0], 0), (pair[1], 1)], Discretisation()).matrix
         locked = apart[:6, :6] + apart[:6, 6:] + apart[6:, :6] + apart[6:, 6:]
-        assert_same(locked, together, 1e-10)
+        assert_matrices_close(locked, together, 1e-10)
     np.testing.assert_allclose(np.log2(np.array(lost[:-1]) / lost[1:]), 1.0, atol=0.05)
     # A Stokeslet in the distance d: u = F/(8 pi mu d).
     assert lost[-1] == pytest.approx(one[0, 0] / (8 * np.pi * 200.0), rel=0.01)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -99,3 +100,11 @@ def make_trial(make_track: Callable[..., Track], robot: Any) -> Callable[..., Tr
         return replace(known[key], name=name)
 
     return make
+
+
+@pytest.fixture
+def setup_file(tmp_path: Path, setup_text: str) -> Path:
+    """A setup file."""
+    path = tmp_path / "setup.toml"
+    path.write_text(setup_text)
+    return path

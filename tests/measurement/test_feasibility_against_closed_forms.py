@@ -13,14 +13,6 @@ from spirillum.measurement.setup_template import new_setup_file, setup_answer
 from spirillum.swimming.prediction import predict
 from spirillum.vision.setup import load_setup
 
-
-@pytest.fixture
-def setup_file(tmp_path: Path, setup_text: str) -> Path:
-    path = tmp_path / "setup.toml"
-    path.write_text(setup_text)
-    return path
-
-
 NEARER = (0.15 + (0.06 - 0.0115) / 1.4) / (0.15 + 0.06 / 1.4)
 """Apparent distance of the robot's axis over that of the ruler on the floor: lines look so much closer together."""
 RATES = {"tail_rate": "1.2 Hz", "body_rate": "-0.1 Hz", "speed": "1 mm/s"}

@@ -108,13 +108,6 @@ def followed(monkeypatch: pytest.MonkeyPatch, make_track: Make) -> dict[str, Any
     return tracks
 
 
-@pytest.fixture
-def setup_file(tmp_path: Path, setup_text: str) -> Path:
-    path = tmp_path / "setup.toml"
-    path.write_text(setup_text)
-    return path
-
-
 def test_what_a_video_says_of_itself_stays_with_its_numbers(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:

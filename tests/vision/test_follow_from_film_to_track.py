@@ -13,16 +13,12 @@ pytest.importorskip("cv2")
 
 from bench_scenes import FPS, scene
 from bench_troubles import Film
+from comparisons import slope
 
 
 def track(film, folder, *, name="a.mp4", **changes):
     setup, robot = load_setup(film.write(folder / name, **changes))
     return follow(folder / name, setup, robot)
-
-
-def slope(time, values):
-    seen = np.isfinite(values)
-    return np.polyfit(time[seen], values[seen], 1)[0]
 
 
 @pytest.fixture(scope="module")

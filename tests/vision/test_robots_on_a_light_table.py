@@ -15,6 +15,7 @@ pytest.importorskip("cv2")
 
 from bench_scenes import FPS, Scene, scene
 from bench_troubles import TROUBLES, Film
+from comparisons import slope
 
 FRAMES = np.arange(0, 76, 6)
 HALF_TURN_OF_PATTERN = 180.0
@@ -43,11 +44,6 @@ def tracked(film, scenery, folder):
 def with_trouble(name, film, scenery, seed=1):
     trouble = next(one for one in TROUBLES if one.name == name)
     return trouble.change(film, scenery, np.random.default_rng(seed))
-
-
-def slope(time, values):
-    seen = np.isfinite(values)
-    return np.polyfit(time[seen], values[seen], 1)[0]
 
 
 def test_speed_rates_and_place_are_those_that_were_drawn(drawn, clean):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from comparisons import slope
 from spirillum.vision.camera.camera import bounds_of, scale_of
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.body import BodyFinder
@@ -15,11 +16,6 @@ pytest.importorskip("cv2")
 FRAMES, FPS = 24, 4.0
 SIZE = 2.0 * np.hypot(0.005, 0.2 / 35.0)
 """Two of the stated standard errors of the apparent size: half a body has 35 pixels here."""
-
-
-def slope(time, values):
-    known = np.isfinite(values)
-    return np.polyfit(time[known], values[known], 1)[0]
 
 
 @pytest.fixture(scope="module")
