@@ -22,7 +22,9 @@ def test_answers_of_several_processes_are_those_of_one() -> None:
 @pytest.mark.skipif(not Path("/proc").exists(), reason="processes are looked up in /proc")
 def test_processes_end_with_the_one_that_asked(tmp_path: Path) -> None:
     """A process that is killed cannot end those that it has started: they notice."""
-    script = "import time; from spirillum.processes import as_they_come; list(as_they_come(time.sleep, [60.0] * 4, 2))"
+    script = (
+        "import time; from spirillum.processes import imap_unordered; list(imap_unordered(time.sleep, [60.0] * 4, 2))"
+    )
     asking = subprocess.Popen([sys.executable, "-c", script])
     children = _waited_for(lambda: _workers_of(asking.pid), 2)
     asking.send_signal(signal.SIGKILL)

@@ -464,9 +464,9 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
 
 
 _UNGUARDED = """
-from spirillum.processes import as_they_come
+from spirillum.processes import imap_unordered
 print("once")
-print(min(answer for _, answer in as_they_come(abs, [-1, -2], workers=2)))
+print(min(answer for _, answer in imap_unordered(abs, [-1, -2], workers=2)))
 """
 
 

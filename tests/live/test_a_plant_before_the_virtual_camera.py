@@ -47,7 +47,7 @@ def test_pictures_are_taken_in_order(loop):
     for wrong in (np.nan, None, 10**400):
         with pytest.raises(InputError, match=r"time = .*; allowed: later than the picture before"):
             camera.take(wrong, moment.pose)
-    with pytest.raises(InputError, match="pose = None; allowed: a Pose"):
+    with pytest.raises(InputError, match="pose = None; allowed: a RobotPose"):
         camera.take(moment.time + 1.0, None)
     with pytest.raises(InputError, match="degradation = 'dirty'"):
         sp.VirtualCamera("biorob2012-wide", moment.pose, degradation="dirty")

@@ -145,7 +145,7 @@ _BEYOND = 8
 """Lines beyond what is to be seen, on every side."""
 _WIDTH = 0.014
 """Width of a line, in distances of lines."""
-_ACROSS: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
+_PANELS_ACROSS: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
 """Axis across the grid, by view; along x there is none, for the robot swims through it."""
 
 
@@ -160,9 +160,9 @@ def add_grid(plotter: Any, pyvista: Any, view: View, low: Samples, high: Samples
         high: (3,) largest ones.
         step: distance of its lines.
     """
-    if view not in _ACROSS:
+    if view not in _PANELS_ACROSS:
         return
-    across = _ACROSS[view]
+    across = _PANELS_ACROSS[view]
     level = high[1] + 0.5 * step if across == 1 else low[2] - 0.5 * step
     first = np.floor(low / step - _BEYOND).astype(int)
     last = np.ceil(high / step + _BEYOND).astype(int)
