@@ -19,11 +19,15 @@ def prepare(
         str | None,
         typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
     ] = None,
+    stage: Annotated[
+        str,
+        typer.Option(help="straight (constrained motion), yaw (motion after release too) or fine (for publication)."),
+    ] = "yaw",
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Make the tables of robots in their tubes, once; then `predict` and `simulate` take them.
+    """Make the tables of robots in their tubes; then `predict`, `simulate` and `study` answer with walls at once.
 
     Robots that differ in their tails share most of the work. An interrupted preparation goes on where it was.
 
@@ -42,5 +46,5 @@ def prepare(
         loaded = load_study(study_of(study), overrides_from(settings))
         asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
-        found = prepare_all(asked, workers=workers, progress=progress)
+        found = prepare_all(asked, stage=stage, workers=workers, progress=progress)
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)

@@ -67,7 +67,6 @@ def chosen_run(
         placement=placement,
         calibration=calibration,
         posterior=posterior,
-        tables_only=motion != "held",
     )
     said = [choice.caution] if choice.caution else []
     if not choice.fitted:

@@ -145,7 +145,7 @@ class Plant:
         own = load(robot)
         if own.drive is None:
             raise InputError(f"{own.name} has no [drive]; allowed: a robot with one")
-        chosen = choose_model(model, own, placement=placed, calibration=calibration, tables_only=True)
+        chosen = choose_model(model, own, placement=placed, calibration=calibration)
         walled = chosen.model == "tube"
         if not walled:
             check_full(find_swimmer_model(chosen.model))
@@ -169,7 +169,7 @@ class Plant:
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
-        self._table = table_for(RobotBatch.of(own, placed), workers=1, progress=progress) if walled else None
+        self._table = table_for(RobotBatch.of(own, placed), progress=progress) if walled else None
         self._reach = reach_of(own)
         self._links: TubeRobot | TwoLinks
         if self._table is None:

@@ -275,7 +275,7 @@ def _films(free: FreeMotion, first: float, last: float) -> tuple[LubricationFilm
     """The film at gaps of the way, where the model `tube` resolves it."""
     motion, robot = free.prediction, free.robot
     radius = float(robot.tube[kernel.RADIUS])
-    table = find_table(RobotGeometry.of(motion.batch), radius)
+    table = find_table(RobotGeometry.of(motion.batch), radius, "yaw")
     found: list[LubricationFilm] = []
     if table is None:
         return ()

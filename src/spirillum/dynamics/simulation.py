@@ -207,7 +207,7 @@ def _table(
     if outside:
         raise InputError(f"{robot.name} with model 'tube': {outside[0].sentence()}")
     check_in_tube(robot, placed, asked, roughness)
-    return table_for(batch, workers=1, progress=progress)
+    return table_for(batch, progress=progress)
 
 
 def _free_run(

@@ -307,7 +307,7 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
             column = up + j - 1 if lowered and j > 0 else j
             here = at_rest + (i * (up + down - 1) + column) * block
             _add(of_gap[i] * of_pitch[j], table[here : here + block], flat)
-    if yaw != 0.0 and table[_YAW_GAPS] > 0 and not _add_yaw(table, t, f, yaw / largest_yaw(table, e, pitch), flat):
+    if yaw != 0.0 and not (table[_YAW_GAPS] > 0 and _add_yaw(table, t, f, yaw / largest_yaw(table, e, pitch), flat)):
         left = TOO_FAR_YAWED
     return left, t
 

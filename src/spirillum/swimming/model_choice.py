@@ -15,6 +15,7 @@ from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.fluid.tube.stages import StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -85,7 +86,7 @@ def choose_model(
         calibration: calibration file whose values are used; None without one.
         posterior: posterior whose values are used; None without one.
         tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
-        motion: of a steady state, `held` or `free`; the free one in a tube takes a table, too.
+        motion: `held` or `free`, for which a table needs yawed poses.
         other_way: how else to come to an answer with walls than by `spirillum prepare`, a clause for the caution.
         among: the robot is one of several that are compared.
     """
@@ -100,7 +101,7 @@ def choose_model(
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):
         why = f"model '{WALLED}' has no answer for this robot on the floor of its channel: {outside[0].sentence()}"
-    elif not outside and (tables_only or motion == "free") and not has_table(batch):
+    elif not outside and tables_only and not has_table(batch, "yaw" if motion == "free" else "straight"):
         lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
         lacks = lacks if among else "the robot has no table for its tube"
         why = f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
@@ -129,11 +130,11 @@ def walls_left_out(why: str, *, among: bool) -> str:
     return f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
 
 
-def has_table(batch: RobotBatch) -> bool:
-    """Whether the first robot of a batch, which has a channel, has a table for its tube."""
+def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:
+    """Whether the first robot of a batch, which has a channel, has a table for its tube, of a stage at least."""
     from spirillum.fluid.tube.library import find_table  # loads compiled loops, which few models need
 
-    return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])) is not None
+    return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0]), stage) is not None
 
 
 def fitted_models(calibration: str | Path | None, posterior: PosteriorFile | None) -> list[str]:

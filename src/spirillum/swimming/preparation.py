@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
 from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.responses import RESPONSES
+from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
@@ -50,7 +52,7 @@ class Prepared(DisplayMixin):
         worse = [
             _worse(name, self.table.error[name], allowed)
             for name, allowed in RESPONSES.items()
-            if self.table.error[name] > allowed
+            if self.table.error[name] > STAGES[self.table.stage].accuracy * allowed
         ]
         lost = () if self.kept else (_NOT_KEPT,)
         return (*self.robot.warnings, *worse, *lost)
@@ -69,6 +71,7 @@ class Prepared(DisplayMixin):
             "amplitude": quantity(geometry.amplitude, "m"),
             "channel_diameter": quantity(2.0 * self.table.radius, "m"),
             "model": "tube",
+            "stage": self.table.stage,
             "places": self.table.places,
             "error": {name: quantity(value, "1") for name, value in self.table.error.items()},
             "error_without_yaw": {name: quantity(value, "1") for name, value in self.table.error_without_yaw.items()},
@@ -101,10 +104,11 @@ Source = str | Path | Mapping[str, Any] | Robot
 def prepare(
     robot: Source,
     *,
+    stage: StageName = "yaw",
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prepared:
-    """Make the table of a robot in its tube, or read the one that is there.
+    """Make the table of a robot in its tube, or read the one that is there, of this stage or a finer one.
 
     With it the model `tube` answers in microseconds, for any viscosity, drive, weight, friction and roughness, and
     `simulate` moves the robot in its tube. Places that were solved for are kept as they come: an interrupted
@@ -112,18 +116,21 @@ def prepare(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
+        stage: `straight` (poses without yaw, for constrained motion), `yaw` (for motion after release too), or `fine`
+            (more nodes, and the finest resolution of the flow); each takes about four times as long as the one before.
         workers: number of processes.
         progress: told what is being solved, how many places are done, and of how many.
 
     Raises:
         InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
     """
-    return prepare_all([robot], workers=workers, progress=progress)[0]
+    return prepare_all([robot], stage=stage, workers=workers, progress=progress)[0]
 
 
 def prepare_all(
     robots: Sequence[Source],
     *,
+    stage: StageName = "yaw",
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[Prepared, ...]:
@@ -134,6 +141,7 @@ def prepare_all(
 
     Args:
         robots: see `prepare`.
+        stage: see `prepare`.
         workers: number of processes.
         progress: told what is being solved, how many places are done, and of how many.
 
@@ -143,12 +151,14 @@ def prepare_all(
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
+    if stage not in STAGES:
+        raise InputError(f"stage = {str(stage)[:40]!r}; allowed: {', '.join(STAGES)}")
     loaded = [load(robot) for robot in robots]
     asked = [_checked(robot, several=len(loaded) > 1) for robot in loaded]
-    new = {key_of(*robot) for robot in asked if find_table(*robot) is None}
+    new = {key_of(*robot) for robot in asked if find_table(*robot, stage) is None}
     if new:
         check_cache_folder()
-    tables = prepared_tables(asked, workers=workers, progress=progress)
+    tables = prepared_tables(asked, stage=stage, workers=workers, progress=progress)
     return tuple(
         Prepared(robot, table, kept=tables_are_kept() or table.key not in new)
         for robot, table in zip(loaded, tables, strict=True)
@@ -170,6 +180,8 @@ def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
 
 
 _MOST_WORKERS = 64
+_WORKERS = min(2, os.cpu_count() or 1)
+"""Processes that make a table which another request needs."""
 
 
 def check_usual_resolution(options: ModelOptions) -> None:
@@ -181,11 +193,9 @@ def check_usual_resolution(options: ModelOptions) -> None:
         )
 
 
-def table_for(
-    batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
-) -> TubeTable:
-    """The table of the first robot of a batch in its tube."""
-    return prepared_tables([_asked(batch)], workers=workers, progress=progress)[0]
+def table_for(batch: RobotBatch, *, progress: Callable[[str, int, int], None] | None = None) -> TubeTable:
+    """Return the table, with yawed poses, of the first robot of a batch in its tube; made where there is none."""
+    return prepared_tables([_asked(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
 
 
 def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:

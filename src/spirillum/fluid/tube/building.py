@@ -38,6 +38,7 @@ from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.progress_messages import kept_after, progress_message
 from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -105,37 +106,37 @@ def _about_x(angle: float) -> Samples:
     return found
 
 
-_TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
-"""How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
 _NEAR_GLASS = 0.9
 """Share of the largest pitch from which all harmonics of the tail's phase matter."""
-_FAR, _LITTLE_YAWED = 5, 7
-"""Phases at nodes further from the glass: without yaw, and at the least yaw."""
-HELD_OUT = 6
-"""Places without yaw, and with it, from which a table's errors are stated."""
 _SEED = 20121
+_NO_YAW = kernel.yaw_limit_of(np.zeros(1), np.zeros(1), np.zeros(1), 0.0)
+"""Limit of the yaw of a table without yawed nodes."""
 _WIRE_PHASES, _WIRE_TOLERANCE = 3, 0.05
 """Resolution at which both forms of the wire are compared: their ratio is good to a hundredth of their difference."""
 
 
 def built_tables(
-    robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
+    robots: Sequence[tuple[RobotGeometry, float]],
+    *,
+    stage: Stage = FINE,
+    workers: int = 2,
+    progress: Progress | None = None,
 ) -> list[TubeTable]:
-    """Solve for the flow at every place of every robot and make their tables.
+    """Solve for the flow at every place of a stage, for every robot, and make their tables.
 
     Raises:
         InputError: for a robot without a table, such as one whose tail is wider than its body, or whose flow does not
             fit into memory.
         KeyboardInterrupt: if it was interrupted; says how many places are kept.
     """
-    every = [Places(geometry, radius) for geometry, radius in robots]
+    every = [Places(geometry, radius, stage) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
     wanted = [place for some in nodes for place in some]
     for places, some in zip(every, nodes, strict=True):
         _check_memory(places.geometry, some)
     if progress is not None:
         count, kept = _solved_before(wanted)
-        progress(progress_message(count, workers, kept), 0, count)
+        progress(progress_message(count, workers, kept, stage.seconds), 0, count)
     try:
         return _solved_tables(every, nodes, workers, progress)
     except KeyboardInterrupt as error:
@@ -156,15 +157,18 @@ def _solved_tables(
     wanted = [place for some in nodes for place in some]
     found = iter(solutions(wanted, "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
-    held = [(_held_out(places), _held_out(places, yawed=False)) for places in every]
+    held = [(_held_out(places) if places.stage.yawed else [], _held_out(places, yawed=False)) for places in every]
     asked = [place for both in held for some in both for place in some]
     true = iter(solutions(asked, "checking the table", progress, workers))
-    wires = [_wire_error(places, workers) for places in every]
+    wires = [_wire_error(places, workers) if places.stage.compares_wires else None for places in every]
     tables = []
     for places, some, table, both, wire in zip(every, nodes, packed, held, wires, strict=True):
         with_yaw, without = (_largest_errors(table, checked, [next(true) for _ in checked]) for checked in both)
-        seconds = (time.perf_counter() - start) / len(every)
-        tables.append(TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds, wire))
+        with_yaw = with_yaw if places.stage.yawed else without
+        seconds, name = (time.perf_counter() - start) / len(every), places.stage.name
+        tables.append(
+            TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds, wire, name)
+        )
     return tables
 
 
@@ -184,9 +188,10 @@ def _wire_error(places: Places, workers: int = 1) -> float | None:
 
 
 @lru_cache(maxsize=4)
-def _tabulated_film(body: Outline, radius: float) -> Samples:
+def _tabulated_film(body: Outline, radius: float, yaws: int) -> Samples:
     """Packed film of a body in a tube, for all the places that tables have."""
-    return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(kernel.STEEPEST)).packed
+    yaw, pitch = kernel.YAW_SLACK * LARGEST_YAW, 1.1 * max(kernel.STEEPEST)
+    return FilmTable.of(body, radius, yaw=yaw, pitch=pitch, yaws=yaws).packed
 
 
 def _nodes(places: Places) -> list[NodeSolution]:
@@ -195,9 +200,9 @@ def _nodes(places: Places) -> list[NodeSolution]:
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
         return places.geometry, even_phases(place.phases)
 
-    level = [NodeSolution((tail(place),), place.seat, fineness_at(place.seat)) for place in _level(places)]
+    level = [NodeSolution((tail(place),), place.seat, places.fineness(place.t, place.seat)) for place in _level(places)]
     yawed = [
-        NodeSolution((tail(place), mirrored(*tail(place))), place.seat, fineness_at(place.seat))
+        NodeSolution((tail(place), mirrored(*tail(place))), place.seat, places.fineness(place.t, place.seat))
         for place in _yawed(places)
     ]
     return level + yawed
@@ -216,7 +221,7 @@ def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> Non
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the answers to `_nodes`."""
-    count, film = len(_level(places)), _tabulated_film(places.geometry.body, places.radius)
+    count, film = len(_level(places)), _tabulated_film(places.geometry.body, places.radius, places.stage.film_yaws)
     return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
 
 
@@ -230,16 +235,15 @@ class _Place(NamedTuple):
     """Of the tail, evenly spread: a tail near the glass has more harmonics over a turn."""
 
 
-def fineness_at(seat: Seat) -> Fineness:
-    """Return the solver's resolution and tolerance at a pose."""
-    level = seat.pitch == 0 and seat.yaw == 0
-    return Fineness("standard", _LEVEL_TOLERANCE if level else _TOLERANCE)
+def _phases_of(places: Places, f: float) -> int:
+    """Number of phases of the tail at a node without yaw."""
+    return places.stage.phases if abs(f) > _NEAR_GLASS else places.stage.few_phases
 
 
 def _level(places: Places) -> list[_Place]:
     """Nodes without yaw that are solved for: for each t those nose up, then, off the axis, those nose down."""
     return [
-        _Place(float(t), float(f), places.seat(float(t), float(f)), PHASES if abs(f) > _NEAR_GLASS else _FAR)
+        _Place(float(t), float(f), places.seat(float(t), float(f)), _phases_of(places, f))
         for t in places.gaps
         for f in (*places.up, *(-places.down[1:] if t < 1.0 else ()))
     ]
@@ -247,12 +251,14 @@ def _level(places: Places) -> list[_Place]:
 
 def _yawed(places: Places) -> list[_Place]:
     """Nodes with yaw that are solved for, those off the axis, one after the other for each share of the largest yaw."""
+    if not places.stage.yawed:
+        return []
     return [
         _Place(
             float(t),
             float(f),
             places.seat(float(t), float(f), share * float(most)),
-            PHASES if share > kernel.YAW_SHARES[0] else _LITTLE_YAWED,
+            places.stage.phases if share > kernel.YAW_SHARES[0] else places.stage.little_yawed,
         )
         for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
@@ -276,6 +282,8 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     shape = len(places.gaps), len(places.up) + len(places.down) - 1, *rest[0].shape
     parts = (places.gaps, places.up, places.down, places.most, np.reshape(rest, shape))
     none = np.zeros(0)
+    if not places.stage.yawed:
+        return kernel.packed(places.radius, places.rings, *parts, none, none, _NO_YAW, none, film)
     straight = kernel.packed(places.radius, places.rings, *parts, none, none, places.yaw_limit, none, film)
     sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
@@ -326,13 +334,15 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
     """Random places of a table that are no nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
     chosen: list[NodeSolution] = []
-    while len(chosen) < HELD_OUT:
+    while len(chosen) < places.stage.held_out:
         t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
-        f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
-        seat, phase = places.seat_between(t, f, yaw if yawed else 0.0), float(draw.uniform(0.0, 2.0 * np.pi))
+        f, share = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0))
+        yaw = share * float(places.most_yaw.max()) if yawed else 0.0
+        seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, fineness_at(seat)))
+            finest = FINE.fineness(np.inf, level=seat.pitch == 0 and seat.yaw == 0)
+            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, finest))
     return chosen
 
 
@@ -340,7 +350,7 @@ def _largest_errors(
     table: Samples, places: Sequence[NodeSolution], found: Sequence[Sequence[Samples]]
 ) -> dict[str, float]:
     """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
-    errors = []
+    errors = [np.zeros(len(RESPONSES))]
     for place, answers in zip(places, found, strict=True):
         (_, phases), seat = place.tails[0], place.seat
         own, *turn = np.empty((1 + PHASES, kernel.MOTIONS, kernel.MOTIONS))

@@ -238,6 +238,7 @@ class FilmTable:
         yaw: float = 0.12,
         pitch: float = 0.2,
         intervals: int = _INTERVALS,
+        yaws: int = _YAWS,
         step: Callable[[float], None] | None = None,
     ) -> FilmTable:
         """Tabulate the film of a body, in half a minute of one core.
@@ -248,14 +249,16 @@ class FilmTable:
             yaw: largest yaw, rad; less if the body has not that much room.
             pitch: largest pitch for which clearances are within the splines, rad.
             intervals: intervals of the splines, to show their convergence.
+            yaws: polynomials in yaw; one is for a body without yaw.
             step: called with the share that is done.
         """
         body = FilmBody.of(outline)
         head = _head(body, radius, yaw, pitch, intervals)
+        head[table.YAWS] = yaws
         places = np.concatenate([[0.0, 1 / 3], np.arange(1, intervals), [intervals - 1 / 3, intervals]])
         grids = [low + (high - low) * places / intervals for low, high in (head[7:9], head[10:12])]
-        etas = _yaw_nodes(_YAWS)
-        nodes = np.empty((places.size, places.size, _YAWS, table.ENTRIES))
+        etas = _yaw_nodes(yaws)
+        nodes = np.empty((places.size, places.size, yaws, table.ENTRIES))
         for i, first in enumerate(grids[0]):
             for j, second in enumerate(grids[1]):
                 for k, eta in enumerate(etas):
@@ -306,7 +309,6 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
     head[10:12] = (-_SPHEROID_PITCH, _SPHEROID_PITCH) if body.half else head[7:9]
     room = 1.0 if reach == 0 else min(0.6 * (radius - a) / reach, 1.0)
     head[table.YAW] = min(yaw, float(np.arcsin(room)))
-    head[table.YAWS] = _YAWS
     return head
 
 

@@ -14,6 +14,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
 from spirillum.fluid.tube.outer_resistance import Progress
+from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
@@ -37,42 +38,55 @@ def _found(path: Path | None, key: str) -> TubeTable | None:
     return table if table is not None and table.key == key else None
 
 
-def _kept(key: str) -> Path | None:
-    """File of a table in the user's cache."""
+def _kept(key: str, stage: StageName) -> Path | None:
+    """File of a stage of a table in the user's cache."""
     folder, code = cache_folder(), digest_of(built_tables.__module__)
     if folder is None or code is None:
         return None
-    return folder / f"{key}-{code[:16]}.table"
+    return folder / f"{key}-{stage}-{code[:16]}.table"
 
 
-def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
-    """The table of a robot in a tube, if there is one, of itself or of its mirror image."""
-    own = _of_key(key_of(geometry, radius))
-    if own is not None:
-        return own
-    key = key_of(geometry._replace(hand=-geometry.hand), radius)
-    image = _of_key(key)
-    return None if image is None else _mirrored(key, image)
+def find_table(geometry: RobotGeometry, radius: float, least: StageName = "straight") -> TubeTable | None:
+    """Return the finest table of a robot in a tube, of itself or of its mirror image; None without one.
+
+    Args:
+        geometry: of the robot.
+        radius: of the tube, m.
+        least: coarsest stage that will do.
+    """
+    key, image_key = key_of(geometry, radius), key_of(geometry._replace(hand=-geometry.hand), radius)
+    stages = tuple(STAGES)
+    for stage in reversed(stages[stages.index(least) :]):
+        if (own := _of_key(key, stage)) is not None:
+            return own
+        if (image := _of_key(image_key, stage)) is not None:
+            return _mirrored(image_key, image)
+    return None
 
 
 def prepared_tables(
-    robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
+    robots: Sequence[tuple[RobotGeometry, float]],
+    *,
+    stage: StageName = "fine",
+    workers: int = 2,
+    progress: Progress | None = None,
 ) -> list[TubeTable]:
-    """The tables of robots in their tubes; those that there are not are made, and kept in the user's cache."""
-    missing = [robot for robot in dict.fromkeys(robots) if find_table(*robot) is None]
-    made = built_tables(missing, workers=workers, progress=progress) if missing else []
+    """Return the tables of robots in their tubes, of a stage at least; missing ones are made and kept in the cache."""
+    missing = [robot for robot in dict.fromkeys(robots) if find_table(*robot, stage) is None]
+    made = built_tables(missing, stage=STAGES[stage], workers=workers, progress=progress) if missing else []
     fresh = {(table.geometry, table.radius): _put(table) for table in made}
-    tables = [fresh.get(robot) or find_table(*robot) for robot in robots]
+    tables = [fresh.get(robot) or find_table(*robot, stage) for robot in robots]
     return [table for table in tables if table is not None]
 
 
 def tables_are_kept() -> bool:
     """Whether tables that are made are there again the next time."""
-    return _kept("") is not None
+    return _kept("", "fine") is not None
 
 
-def _of_key(key: str) -> TubeTable | None:
-    return _found(_SHIPPED / f"{key}.table", key) or _found(_kept(key), key)
+def _of_key(key: str, stage: StageName) -> TubeTable | None:
+    shipped = _found(_SHIPPED / f"{key}.table", key) if stage == "fine" else None
+    return shipped or _found(_kept(key, stage), key)
 
 
 _mirrors: dict[str, tuple[TubeTable, TubeTable]] = {}
@@ -88,7 +102,7 @@ def _mirrored(key: str, table: TubeTable) -> TubeTable:
 
 def _put(table: TubeTable) -> TubeTable:
     """Keep a table; as the next call will find it."""
-    path = _kept(table.key)
+    path = _kept(table.key, table.stage)
     if path is not None:
         try:
             table.write(path)

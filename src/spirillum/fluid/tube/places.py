@@ -15,6 +15,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.geometry import amplitude_envelope
@@ -30,12 +32,8 @@ _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
 _GROWTH = 2.0
 """Ratio of one node t to the one before, near the floor."""
-_UPPER = (0.55, 0.78, 1.0)
-"""Nodes t far from the floor."""
 _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
-_UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
-_DOWN = (0.0, 0.28, 0.55, 0.8, 1.0)
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most places the glass holds the tail before."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
@@ -67,6 +65,8 @@ class Places:
     geometry: RobotGeometry
     radius: float
     """R of the tube."""
+    stage: Stage = FINE
+    """Nodes and resolution."""
 
     @cached_property
     def rings(self) -> Samples:
@@ -94,27 +94,27 @@ class Places:
     def gaps(self) -> Samples:
         """Nodes t, increasing."""
         thin = self.thinnest / contact_offset(self.rings, self.radius, 0.0)
-        if thin > _UPPER[0]:
+        if thin > self.stage.upper[0]:
             raise InputError(
                 f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the glass "
                 f"of a tube with channel.diameter = {show(2.0 * self.radius, 'mm')}; allowed: a smaller amplitude, or "
                 "answers for one place at a time, without a table"
             )
         found = []
-        while thin * _SPACED < _UPPER[0]:
+        while thin * _SPACED < self.stage.upper[0]:
             found.append(thin)
             thin *= _GROWTH
-        return np.array([*found, *_UPPER])
+        return np.array([*found, *self.stage.upper])
 
     @property
     def up(self) -> Samples:
         """Nodes f nose up."""
-        return np.array(_UP)
+        return np.array(self.stage.up)
 
     @property
     def down(self) -> Samples:
         """Nodes f nose down."""
-        return np.array(_DOWN)
+        return np.array(self.stage.down)
 
     @cached_property
     def yaw_gaps(self) -> Samples:
@@ -133,6 +133,11 @@ class Places:
         seats = [self.seat(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
         x, pitches = np.array([(seat.offset / self.radius, seat.pitch) for seat in seats]).T
         return yaw_limit_of(x, pitches, np.array([self._widest(seat) for seat in seats]), LARGEST_YAW)
+
+    def fineness(self, t: float, seat: Seat) -> Fineness:
+        """Resolution of the flow at a place."""
+        gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
+        return self.stage.fineness(gap, level=seat.pitch == 0 and seat.yaw == 0)
 
     @cached_property
     def most_yaw(self) -> Samples:

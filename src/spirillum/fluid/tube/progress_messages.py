@@ -4,19 +4,24 @@ from __future__ import annotations
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "12 to 28 minutes of one core"
-"""What it takes to make the table of one robot, measured on a fast and on a slow machine."""
+TABLE_TAKES = "half a minute to two minutes on two cores"
+"""What the table of one robot takes without yaw, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
 """Progress messages that are to be read, too."""
-_SECONDS = (10.0, 17.0)
-"""Time that a place takes one process of a fast and of a slow machine, s; near the glass it is three times as long."""
 
 
-def progress_message(places: int, workers: int, kept: int) -> str:
-    """That tables are made, from how many places, and about how long it takes."""
+def progress_message(places: int, workers: int, kept: int, seconds: tuple[float, float] = (10.0, 17.0)) -> str:
+    """Return the announcement of a table that is made: from how many places, and about how long it takes.
+
+    Args:
+        places: number of places to solve for.
+        workers: number of processes.
+        kept: number of places that are kept from before.
+        seconds: that a place takes one process of a fast and of a slow machine.
+    """
     remaining = places - kept
-    least, most = (max(round(remaining * seconds / max(workers, 1) / 60.0), 1) for seconds in _SECONDS)
+    least, most = (max(round(remaining * each / max(workers, 1) / 60.0), 1) for each in seconds)
     minutes = f"about {least} min" if least == most else f"{least} to {most} min"
     before = f", {kept} of them kept from before, {remaining} still to solve for" if kept else ""
     return (

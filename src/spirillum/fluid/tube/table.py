@@ -28,6 +28,7 @@ from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.places import CHECKED_FROM
 from spirillum.fluid.tube.responses import RESPONSES
+from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.wire_error import SOLIDS_ERROR, at_any_place, wire_error
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
@@ -173,6 +174,8 @@ class TubeTable:
     """Time that it took."""
     wire: float | None = None
     """Relative error of the forward velocity by the form of the wire, compared when it was made; None: not compared."""
+    stage: StageName = "fine"
+    """Nodes and resolution."""
 
     @property
     def key(self) -> str:
@@ -225,6 +228,7 @@ class TubeTable:
             "places": self.places,
             "seconds": self.seconds,
             "wire": self.wire,
+            "stage": self.stage,
         }
         with whole_file(path, replace="any") as temporary:
             temporary.write_bytes(to_bytes(json.dumps(head).encode(), self.packed))
@@ -263,7 +267,11 @@ def _checked(table: TubeTable) -> TubeTable:
     """
     stated = [mapping[name] for mapping in (table.error, table.error_without_yaw) for name in RESPONSES]
     numbers = (0.0 if table.wire is None else table.wire, table.radius, table.seconds, table.places, *stated)
-    if not all(math.isfinite(number) and number >= 0.0 for number in numbers) or table.radius <= 0.0:
+    if (
+        not all(math.isfinite(number) and number >= 0.0 for number in numbers)
+        or table.radius <= 0.0
+        or table.stage not in STAGES
+    ):
         raise ValueError("not the numbers of a table")
     if not kernel.is_whole(table.packed, table.radius):
         raise ValueError("not the nodes of a table")

@@ -13,9 +13,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.building import HELD_OUT
 from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.stages import FINE
 from spirillum.fluid.tube.table import TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
@@ -73,8 +73,8 @@ class TabledTube(Tube):
 
     form = "table"
     error_against = (
-        f"solutions with finer wires: the largest error of {HELD_OUT} places between the nodes of its table, and that "
-        "of the wire and the solids"
+        f"solutions with finer wires: the largest error of {FINE.held_out} places between the nodes of its table, and "
+        "that of the wire and the solids"
     )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:

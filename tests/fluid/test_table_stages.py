@@ -1,0 +1,122 @@
+"""Tables in stages: each is near the finest one between its nodes, and refuses poses for which it has no nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.fluid.tube import building, library
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.outer_resistance import NodeSolution
+from spirillum.fluid.tube.places import Places
+from spirillum.fluid.tube.responses import RESPONSES, response_errors
+from spirillum.fluid.tube.stages import FINE, STAGES, STRAIGHT, YAW
+from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import INSIDE, TOO_FAR_YAWED, parts_of
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
+
+
+@pytest.fixture(scope="module", params=["biorob2012-wide", "biorob2012-narrow"])
+def shipped(request: pytest.FixtureRequest) -> TubeTable:
+    """The table of a preset, which stands for the solved flow."""
+    batch = RobotBatch.of(load(request.param))
+    table = find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0]), "fine")
+    assert table is not None
+    return table
+
+
+@pytest.fixture
+def solved_by(shipped: TubeTable, monkeypatch: pytest.MonkeyPatch) -> TubeTable:
+    """The table of a preset, from which every solution and the film are taken."""
+
+    def solutions(nodes: Sequence[NodeSolution], *_: Any) -> list[list[np.ndarray]]:
+        sides = {geometry.hand: table for table in (shipped, shipped.mirrored()) for geometry in [table.geometry]}
+        return [
+            [
+                np.stack([sides[g.hand].at(n.seat.offset, n.seat.pitch, n.seat.yaw, phase)[0] for phase in phases])
+                for g, phases in n.tails
+            ]
+            for n in nodes
+        ]
+
+    monkeypatch.setattr(building, "solutions", solutions)
+    monkeypatch.setattr(building, "_tabulated_film", lambda *_: parts_of(shipped.packed).film)
+    return shipped
+
+
+def made(table: TubeTable, stage: Any) -> TubeTable:
+    (found,) = building.built_tables([(table.geometry, table.radius)], stage=stage)
+    return found
+
+
+def errors_between_nodes(table: TubeTable, truth: TubeTable, *, yawed: bool) -> dict[str, float]:
+    """Largest errors of `RESPONSES` at random poses of the truth's range."""
+    places, draw = Places(truth.geometry, truth.radius), np.random.default_rng(5)
+    worst = np.zeros(len(RESPONSES))
+    for _ in range(60):
+        t, f = float(np.exp(draw.uniform(np.log(places.gaps[0]), 0.0))), float(draw.uniform(-0.9, 0.95))
+        yaw = float(draw.uniform(-0.9, 0.9)) * places.largest_yaw(t, f) if yawed else 0.0
+        seat = places.seat_between(t, f, yaw)
+        turn = 2.0 * np.pi * np.arange(9) / 9
+        own, true = (
+            np.stack([one.at(seat.offset, seat.pitch, seat.yaw, phase)[0] for phase in turn]) for one in (table, truth)
+        )
+        worst = np.maximum(worst, response_errors(own[4], true[4], true))
+    return dict(zip(RESPONSES, worst.tolist(), strict=True))
+
+
+def test_straight_stage_is_near_the_finest_without_yaw(solved_by: TubeTable) -> None:
+    table = made(solved_by, STRAIGHT)
+    assert table.places == len(building._level(Places(solved_by.geometry, solved_by.radius, STRAIGHT)))
+    found = errors_between_nodes(table, solved_by, yawed=False)
+    assert found["forward_velocity"] < 0.02
+    assert found["normal_resistance"] < 0.02
+    assert found["sideways_force"] < 0.03
+    assert max(found.values()) < 0.06
+    assert table.error == table.error_without_yaw
+
+
+def test_straight_stage_answers_no_yawed_pose(solved_by: TubeTable) -> None:
+    table = made(solved_by, STRAIGHT)
+    offset = 0.6 * (table.radius - 0.5 * table.geometry.body_diameter)
+    assert table.at(offset, 0.0, 0.0)[1] == INSIDE
+    assert table.at(offset, 0.0, 1e-3)[1] == TOO_FAR_YAWED
+
+
+def test_yaw_stage_is_near_the_finest_with_yaw(solved_by: TubeTable) -> None:
+    table = made(solved_by, YAW)
+    found = errors_between_nodes(table, solved_by, yawed=True)
+    assert found["forward_velocity"] < 0.03
+    assert found["sideways_force"] < 0.04
+    assert max(found.values()) < 0.1
+
+
+def test_nodes_of_the_finest_stage_give_back_its_table(solved_by: TubeTable) -> None:
+    table = made(solved_by, FINE)
+    np.testing.assert_allclose(parts_of(table.packed).rest, parts_of(solved_by.packed).rest, rtol=0, atol=2e-4)
+
+
+def test_the_finest_stage_that_there_is_answers(
+    solved_by: TubeTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
+    monkeypatch.setattr(library, "_SHIPPED", tmp_path / "none")
+    robot = solved_by.geometry, solved_by.radius
+    assert find_table(*robot) is None
+    for stage in STAGES.values():
+        library._put(made(solved_by, stage))
+        found = find_table(*robot)
+        assert found is not None
+        assert found.stage == stage.name
+        names = list(STAGES)
+        assert all(find_table(*robot, name) is None for name in names[names.index(stage.name) + 1 :])
+    image = solved_by.geometry._replace(hand=-solved_by.geometry.hand), solved_by.radius
+    mirrored = find_table(*image, "yaw")
+    assert mirrored is not None
+    assert mirrored.stage == "fine"
