@@ -54,7 +54,7 @@ def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
     grid = {**LET["grid"], "amplitudes": ["2.6 mm"]}
     without = sp.study({**LET, "models": ["rft"], "grid": grid})
     assert "forward_velocity_settled" not in without
-    assert "1 of 1 robots have no table of their tube and were not let go in it" in without.attrs["warnings"]
+    assert "1 of 1 robots have no table with yawed poses and were not released" in without.attrs["warnings"]
     assert "have no table" not in let_go.attrs["warnings"]
     assert "holds the robots at their places" not in let_go.attrs["warnings"]
     assert "on asperities of 20 um and with a friction coefficient of 0, both assumed" in let_go.attrs["warnings"]
@@ -109,7 +109,7 @@ def test_robots_that_are_not_let_go_are_told_by_what_they_lack() -> None:
     """A table, or room where they would be laid down; then nothing is said of what settled speeds are."""
     grid = {**LET["grid"], "amplitudes": ["2.4 mm", "9.3 mm"]}
     said = sp.study({**LET, "models": ["rft"], "grid": grid}).attrs["warnings"]
-    assert "1 of 2 robots have no table of their tube and were not let go in it, the first: " in said
+    assert "1 of 2 robots have no table with yawed poses and were not released, the first: " in said
     assert "1 of 2 robots cannot lie where they would be laid down and were not let go, the first: " in said
     assert "a settled speed is that of" not in said
 

@@ -85,7 +85,7 @@ def _tables(
             f"none ({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
             f"{TABLE_TAKES}, or `spirillum prepare` of each with its tail"
         )
-    made = [one.table for one in prepare_all(experiment.robots, progress=tell)] if lacking else found
+    made = [one.table for one in prepare_all(experiment.robots, stage="straight", progress=tell)] if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})
 
 

@@ -240,7 +240,7 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
 def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
     """Robots that have a table of their tube, by their index in the flat order of the study."""
     every = ((index, loaded.robot_at(index)) for index in range(loaded.count))
-    return {index: robot for index, robot in every if robot.channel and has_table(RobotBatch.of(robot))}
+    return {index: robot for index, robot in every if robot.channel and has_table(RobotBatch.of(robot), "yaw")}
 
 
 def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[str]:
@@ -263,7 +263,7 @@ def _why_without_table(robot: Robot, placement: Placement) -> str:
         return "have no channel in which they could be let go, the first: {}"
     if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):
         return "cannot lie where they would be laid down and were not let go, the first: {}"
-    return "have no table of their tube and were not let go in it, the first: {}; `spirillum prepare` makes one"
+    return "have no table with yawed poses and were not released, the first: {}; `spirillum prepare` makes one"
 
 
 _NAMED = 3

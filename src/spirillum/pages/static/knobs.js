@@ -33,7 +33,7 @@ export class Knobs {
     const said = lane.preparing;
     const working = said && !said.failed;
     this.table.replaceChildren(
-      element("p", { text: working ? `Table of this robot in its tube: ${said.what}${said.places ? `, ${said.done_places} of ${said.places}` : ""}` : said?.failed ? said.failed : "This robot has no table for its tube yet, so that it swims without walls. A table takes 12 to 18 minutes of one core; the page goes on meanwhile." }),
+      element("p", { text: working ? `Table of this robot in its tube: ${said.what}${said.places ? `, ${said.done_places} of ${said.places}` : ""}` : said?.failed ? said.failed : "This robot has no table for its tube yet, so that it swims without walls. A table takes 4 to 12 minutes of one core; the page goes on meanwhile." }),
       ...(working && said.places ? [element("progress", { max: said.places, value: said.done_places })] : []),
       element("button", { class: "plain", text: working ? "Leave off" : "Make its table", onclick: () => this.send({ do: working ? "leave-off" : "prepare", lane: this.lane }) }),
     );
