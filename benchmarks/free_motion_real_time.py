@@ -13,9 +13,9 @@ import time
 import numpy as np
 
 import spirillum as sp
+from spirillum.dynamics.free_robot import two_links
 from spirillum.dynamics.integration import TOLERANCE
 from spirillum.dynamics.start import start_state
-from spirillum.dynamics.two_links import two_links
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel

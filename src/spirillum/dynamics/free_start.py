@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.start import start_state
-from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
@@ -38,7 +38,7 @@ def links_without_walls(steady: Prediction, roughness: float | None, *, weight: 
 
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:
-    """The state of a robot at rest in its seat, (17,); a heavy one whose gap is open lies low."""
+    """The state of a robot at rest in its seat, (19,); a heavy one whose gap is open lies low."""
     start = start_state(robot, placement, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     if not links.spots.size:
         return start

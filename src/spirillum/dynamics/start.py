@@ -18,7 +18,7 @@ from spirillum.units import show
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its seat, (17,).
+    """The state of a robot at rest in its seat, (19,).
 
     Args:
         robot: the robot.
