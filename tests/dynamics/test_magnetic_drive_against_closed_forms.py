@@ -9,7 +9,7 @@ import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.magnetic_sweep import _settled
-from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.timing import Switch
 from spirillum.kernels import rigid_links
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)

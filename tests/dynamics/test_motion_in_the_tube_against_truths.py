@@ -149,7 +149,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
     centred[2] = 0.02 * MIDDLE
     links = type(links)(**{**vars(links), "weight": centred})
     time = np.linspace(0.0, 400.0, 21)
-    from spirillum.dynamics.remote import Switch
+    from spirillum.dynamics.timing import Switch
 
     start = laid_down(steady.robot, links, StartPlace(gap=2e-4))
     found = integrate(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))

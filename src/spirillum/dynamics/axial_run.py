@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import STEADY, run_averages, stretches_on
 from spirillum.dynamics.axial_robot import OUTPUTS, AxialRobot, loads_of, outputs
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.record import run_attributes
+from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
 from spirillum.kernels import axial_motor as kernel
 from spirillum.quantities import attributes
@@ -29,35 +28,6 @@ if TYPE_CHECKING:
 _SOURCE = "motor current (17) and the robot's linear response (8), (15)"
 _FINENESS = 16.0
 """Pieces of a step over those of a batch: errors of 1e-9 however far apart the samples are."""
-
-
-_COLUMNS = (
-    "position",
-    "tail_angle",
-    "body_angle",
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_rotation_rate",
-    "motor_current",
-    "motor_resistance",
-    "battery_voltage",
-    "duty",
-    "motor_torque",
-    "tail_torque",
-    "electrical_power",
-    "shaft_power",
-    "friction_power",
-    "dissipated_power",
-    "electrical_energy",
-    "resistive_energy",
-    "magnetic_energy",
-    "conversion_energy",
-    "friction_energy",
-    "dissipated_energy",
-    "battery_charge_used",
-)
-"""Variables of a run, in their order."""
 
 
 class AxialIntegrator(NamedTuple):
@@ -135,7 +105,8 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
     }
     meanings = {"position": "distance swum along x"}
     data = {
-        name: ("time", series[name], attributes(name, meaning=meanings.get(name), source=_SOURCE)) for name in _COLUMNS
+        name: ("time", values, attributes(name, meaning=meanings.get(name), source=_SOURCE))
+        for name, values in series.items()
     }
     return xr.Dataset(
         data,

@@ -17,13 +17,18 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.averages import DutyInterval
 from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
-from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.steady_state_search import LongRun, long_run
-from spirillum.dynamics.table_check import Checked, held_against_check, held_by_friction
+from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
+from spirillum.dynamics.tube_simulation import (
+    Checked,
+    check_in_tube,
+    held_against_check,
+    held_by_friction,
+    links_in_tube,
+)
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact

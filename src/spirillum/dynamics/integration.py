@@ -16,7 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot
-from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links, stiff_steps
 

@@ -20,7 +20,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.integration import Reach, integrate
-from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links

@@ -18,7 +18,6 @@ import numpy as np
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import FreeRobot, TwoLinks
-from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.integration import (
     BATTERY_EMPTY,
     INTERRUPTED,
@@ -30,8 +29,8 @@ from spirillum.dynamics.integration import (
 )
 from spirillum.dynamics.poses import RobotPose
 from spirillum.dynamics.record import series_of
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.start import links_without_walls, reach_of, resting_state
+from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube

@@ -1,4 +1,4 @@
-"""A free run as a labelled dataset: path, attitude, rates, powers, energies, and what happened."""
+"""A run as a labelled dataset: path, attitude, rates, powers, energies, what happened, and its attributes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import Reach, Trajectory
@@ -17,9 +16,11 @@ from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 _MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
@@ -238,3 +239,21 @@ def _averages(dataset: xr.Dataset, on: Sequence[DutyInterval]) -> dict[str, tupl
     if "electrical_energy" in dataset:
         integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
     return run_averages(dataset["time"].values, integrals, on, by_turn=True)
+
+
+def run_attributes(prediction: Prediction) -> dict[str, Any]:
+    """Robot, model, friction, calibration, errors, settings, references and versions of a run."""
+    return {
+        "robot": prediction.robot.name,
+        "model": prediction.model.name,
+        "friction": prediction.friction,
+        "effective_friction": prediction.effective_friction,
+        "calibrated": int(prediction.calibrated),
+        **({"fitted_by": prediction.fitted_by} if prediction.fitted_by else {}),
+        "error_estimate": prediction.error_estimate,
+        "known_error": prediction.known_error,
+        **({} if prediction.model.error_against is None else {"error_against": prediction.model.error_against}),
+        "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
+        "references": " ".join(prediction.references),
+        "versions": versions(),
+    }

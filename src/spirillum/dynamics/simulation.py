@@ -13,10 +13,9 @@ from spirillum.dynamics.averages import stretches_on, vertical_drift
 from spirillum.dynamics.axial_run import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
 from spirillum.dynamics.free_robot import TwoLinks
-from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.start import reach_of, turning_rate
+from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube

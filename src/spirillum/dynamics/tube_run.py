@@ -22,10 +22,9 @@ from spirillum.dynamics.integration import (
     observed_at,
 )
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.start import reach_of
-from spirillum.dynamics.timing import Timetable
+from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
