@@ -210,3 +210,15 @@ def test_robots_of_a_posterior_are_those_of_predict(tmp_path: Path) -> None:
     assert len(np.unique(speeds)) > 100
     assert 0.005 < speeds.std() / speeds.mean() < 0.2
     assert np.all(many.numbers[:, kernel.VOLTAGE] == 3.7)
+
+
+def test_earlier_name_still_works_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match=r"spirillum\.HeldPlants is now spirillum\.AxialBatch"):
+        assert sp.HeldPlants is sp.AxialBatch
+
+
+def test_days_in_one_step_are_the_steady_state() -> None:
+    """Explicit steps alone would be unstable, or be millions."""
+    robots, steady = sp.AxialBatch(WIDE, 2, model="rft"), sp.predict(WIDE, model="rft")
+    robots.step(1e6)
+    assert robots.observe()["position"][0] == pytest.approx(1e6 * steady.forward_velocity, rel=1e-6)

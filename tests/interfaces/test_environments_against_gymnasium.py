@@ -103,7 +103,7 @@ def test_rules_score_as_their_limits_say() -> None:
 
 
 def test_pulse_of_flow_carries_the_robot_in_the_tube() -> None:
-    """A robot that is off moves as far as `HeldPlants` says, exactly as long as the pulse lasts."""
+    """A robot that is off moves as far as `AxialBatch` says, exactly as long as the pulse lasts."""
     pulse = {"velocity": "1 mm/s", "duration": "1 s", "start": "1 s"}
     lab = {"pulse": pulse, "unknown": {"friction_factor": 1.0}}
     one = gymnasium.make(HOME + NAMES[0], model="tube", lab=lab, placement=IN_FLOW)

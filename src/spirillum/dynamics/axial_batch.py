@@ -97,9 +97,8 @@ def drawn_numbers(
             numbers[:, _NAMES.index(name)] = rng.uniform(low, high, count)
     if any(name in ranges for name in FACTORS):
         friction = axial.prediction.effective_friction * factors["friction"]
-        numbers[:, _FIRST_RESPONSE:] = responses(
-            axial.prediction, axial.prediction.batch, friction, factors["viscosity"]
-        )
+        batch = axial.prediction.batch
+        numbers[:, _FIRST_RESPONSE:] = responses(axial.prediction, batch, friction, factors["viscosity"])
     return numbers, factors["viscosity"]
 
 

@@ -28,7 +28,7 @@ from spirillum.quantities import unit_of
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.balance import FrictionTorques, coasting_rates, friction_torques, rates_per_torque
+from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
@@ -188,38 +188,13 @@ def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscos
     s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
     if viscosity is not None:
         s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
-    t = _friction(steady, batch, effective)
+    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
+    t = friction_torques(steady.friction, effective, rotor)
     body, tail = rates_per_torque(s, t)
     coasting_body, coasting_tail = coasting_rates(s, t)
     columns = [s._replace(u_0=np.zeros(1)).speed(body, tail), body, tail]
     columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
     return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
-
-
-class Loads(NamedTuple):
-    """Where the torque of a robot without an imposed flow goes, per joint torque or its square."""
-
-    rotor: float
-    """Hydrodynamic torque on the rotor per joint torque."""
-    dissipated: float
-    """Viscous dissipation per joint torque squared, 1/(N m s)."""
-    friction: float
-    """Friction power per joint torque squared, 1/(N m s)."""
-
-
-def loads_of(steady: Prediction) -> Loads:
-    """The loads of a prediction's robot, linear and quadratic in the joint torque."""
-    s = calibrated_balance(steady.batch, steady.model, calibrated=steady.calibrated)
-    t = _friction(steady, steady.batch, np.array([steady.effective_friction]))
-    body, tail = rates_per_torque(s, t)
-    rotor = s.rotor_load(body, tail)
-    found = rotor, rotor * tail + s.body_load(body, tail) * body, t.power(body, tail)
-    return Loads(*(float(value[0]) for value in found))
-
-
-def _friction(steady: Prediction, batch: RobotBatch, effective: PerRobot) -> FrictionTorques:
-    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
-    return friction_torques(steady.friction, effective, rotor)
 
 
 def _of_motor(motor: Electrics) -> tuple[float, ...]:

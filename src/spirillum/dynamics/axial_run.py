@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import STEADY, run_averages, stretches_on
-from spirillum.dynamics.axial_robot import OUTPUTS, AxialRobot, loads_of, outputs
+from spirillum.dynamics.axial_robot import OUTPUTS, AxialRobot, outputs
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
@@ -89,19 +89,20 @@ def axial_run(prediction: Prediction, timing: Timing, integrator: AxialIntegrato
 def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -> xr.Dataset:
     import xarray as xr
 
-    prediction, p, loads = robot.prediction, robot.numbers, loads_of(robot.prediction)
+    steady, p = robot.prediction, robot.numbers
     series = dict(zip(OUTPUTS, outputs(p, states.T, duty, 0.0), strict=True))
-    series |= {"duty": duty, **_electrics(prediction.batch.electrics, p, duty, states)}
-    torque, slip = series["motor_torque"], p[kernel.TAIL] - p[kernel.BODY]
-    torque2 = p[kernel.TORQUE] ** 2 * states[:, kernel.SQUARE]
+    series |= {"duty": duty, **_electrics(steady.batch.electrics, p, duty, states)}
+    # Without inertia torques are in proportion to the current, and powers to its square.
+    share, square = states[:, kernel.CURRENT] / steady.motor_current, states[:, kernel.SQUARE] / steady.motor_current**2
+    slip = p[kernel.TAIL] - p[kernel.BODY]
     series |= {
-        "tail_torque": np.abs(loads.rotor * torque),
-        "shaft_power": loads.rotor * slip * torque**2,
-        "friction_power": loads.friction * torque**2,
-        "dissipated_power": loads.dissipated * torque**2,
-        "conversion_energy": (p[kernel.EMF] / p[kernel.TORQUE] - 1.0) * slip * torque2,
-        "friction_energy": loads.friction * torque2,
-        "dissipated_energy": loads.dissipated * torque2,
+        "tail_torque": steady.tail_torque * np.abs(share),
+        "shaft_power": steady.shaft_power * share**2,
+        "friction_power": steady.friction_power * share**2,
+        "dissipated_power": steady.dissipated_power * share**2,
+        "conversion_energy": (p[kernel.EMF] - p[kernel.TORQUE]) * slip * p[kernel.TORQUE] * states[:, kernel.SQUARE],
+        "friction_energy": steady.friction_power * square,
+        "dissipated_energy": steady.dissipated_power * square,
     }
     meanings = {"position": "distance swum along x"}
     data = {
@@ -112,10 +113,10 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
         data,
         coords={"time": ("time", time, attributes("time"))},
         attrs={
-            "title": f"Axial swimming of {prediction.robot.name} (two degrees of freedom)",
-            **run_attributes(prediction),
+            "title": f"Axial swimming of {steady.robot.name} (two degrees of freedom)",
+            **run_attributes(steady),
             "motion": "held",
-            "placement": json.dumps(prediction.placement),
+            "placement": json.dumps(steady.placement),
             "steady": STEADY,
         },
     )

@@ -85,9 +85,8 @@ class Trajectory:
     last: Checkpoint
     """From where it can be continued."""
 
-    @property
-    def completed(self) -> Trajectory:
-        """The run; raises KeyboardInterrupt or InputError where it was interrupted or could not be followed."""
+    def require_completion(self) -> Trajectory:
+        """Return the run; raise KeyboardInterrupt or InputError where it was interrupted or could not be followed."""
         what = self.events[-1].what if self.events else ""
         if what == INTERRUPTED:
             raise KeyboardInterrupt
@@ -176,7 +175,7 @@ def integrate(
 
 def observed_at(robot: FreeRobot, state: Samples, time: float = 0.0) -> Samples:
     """What is observed in one state, (13,), or (26,) in a tube."""
-    return robot.observe(np.array([time]), state[None])[0]
+    return np.asarray(robot.observe(np.array([time]), state[None])[0])
 
 
 def _duty(switches: Sequence[Switch], time: float) -> float:

@@ -211,7 +211,7 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
     before = None
     for _ in range(_MOST_STRETCHES):
         try:
-            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN).completed
+            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN).require_completion()
         except InputError as error:
             raise InputError(
                 f"rates: at {show(rate, 'Hz')} {str(error).partition(';')[0]}; allowed: rates nearer to step-out"

@@ -224,7 +224,7 @@ def _free_run(
     start = resting_state(steady.robot, links, placed)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
-    run = integrate(links, start, moments, switches, reach, progress).completed
+    run = integrate(links, start, moments, switches, reach, progress).require_completion()
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"

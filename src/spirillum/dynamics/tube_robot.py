@@ -112,7 +112,7 @@ class TubeRobot(FreeRobot):
     def range_left(self, state: Samples, time: float) -> str:
         """A sentence on the range of the table that was left."""
         seen = self.observe(np.array([time]), state[None])[0]
-        name = _RANGES.get(int(seen[kernel.OUTSIDE]), "place")
+        name = _RANGES.get(int(seen[rigid_links.OUTSIDE]), "place")
         offset, pitch, yaw = seen[[kernel.OFFSET, kernel.WALL_PITCH, kernel.WALL_YAW]]
         return (
             f"the range of the robot's table in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "

@@ -97,7 +97,7 @@ def _jacobian(
         at = _ACTING[column]
         step = sizes[at] * (1e-6 if at == CURRENT else 3e-7 * near)
         first, below = y[at], f
-        if table.size == 0:  # rates that cost little and are smooth: central differences
+        if table.size == 0 and near < 1.0:  # a thin film, whose rates cost little and are smooth: central differences
             step *= _WIDER
             first, below = y[at] - step, back
             trial[at] = first
