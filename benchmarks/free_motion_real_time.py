@@ -13,9 +13,8 @@ import time
 import numpy as np
 
 import spirillum as sp
-from spirillum.dynamics.integration import TOLERANCE
+from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.start import start_state
-from spirillum.dynamics.two_links import two_links
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
@@ -62,9 +61,9 @@ def main() -> None:
         kernel.rates(dy, t, y, data)
         return dy.copy()
 
-    start = start_state(robot, Placement(), lying=True)
+    start, tolerance = start_state(robot, Placement(), lying=True), TwoLinks.tolerance
     scipy_time = best(
-        lambda: solve_ivp(right_hand_side, (0.0, simulated), start, method="RK45", rtol=TOLERANCE, atol=1e-11), 2
+        lambda: solve_ivp(right_hand_side, (0.0, simulated), start, method="RK45", rtol=tolerance, atol=1e-11), 2
     )
     print(
         json.dumps(

@@ -43,8 +43,8 @@ def environment_steps(name: str) -> float:
 def main() -> None:
     rng = np.random.default_rng(1)
     switched = rng.random((STEPS, COUNT)) < 0.5
-    batch = sp.HeldPlants(ROBOT, COUNT, model="rft")
-    alone = [sp.HeldPlants(ROBOT, 1, model="rft") for _ in range(COUNT)]
+    batch = sp.AxialBatch(ROBOT, COUNT, model="rft")
+    alone = [sp.AxialBatch(ROBOT, 1, model="rft") for _ in range(COUNT)]
     free = [sp.Plant(ROBOT, model="rft") for _ in range(5)]
 
     def together() -> None:
@@ -63,7 +63,7 @@ def main() -> None:
     single = seconds(one_by_one, 3)
     six = seconds(with_six_degrees, 3) / len(free) * COUNT
     run = sp.simulate(ROBOT, model="rft", motion="held", timing={"duration": 10.0})
-    last = sp.HeldPlants(ROBOT, 1, model="rft")
+    last = sp.AxialBatch(ROBOT, 1, model="rft")
     for _ in range(300):
         last.step(DT)
     print(

@@ -14,12 +14,11 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.controllers.bank import Bank
-from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import DriveInterval, learnt
 from spirillum.controllers.loop import run_loop
-from spirillum.controllers.registry import Timed
-from spirillum.controllers.sensors import draw
+from spirillum.controllers.sensors import draw, plant_of
+from spirillum.controllers.stop_task import Timed
 
 LAB = {
     "remote": {"lost": 0.0},

@@ -3,7 +3,7 @@
 The baseline does what the paper describes (two to three seconds a simulation): at every evaluation of the
 right-hand side it assembles the tail's 6x6 matrix of eq. (12) over at least 100 intervals per wavelength in
 a plain Python loop, with NumPy for the 3x3 algebra. Its cost is the measured cost of one such evaluation
-times the number of evaluations that the integrator makes.
+times the number of evaluations that the paper's integrator makes.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ import time
 import numpy as np
 
 import spirillum as sp
-from spirillum.dynamics import held as transient
+from spirillum.dynamics.axial_robot import AxialRobot
+from spirillum.dynamics.axial_run import RUNGE_KUTTA
 from spirillum.fluid.closed.rft import local_coefficients
+from spirillum.papers.biorob2012 import transient
 from spirillum.robot.batch import RobotBatch
 from spirillum.swimming.prediction import predict
 
@@ -55,13 +57,13 @@ def main() -> None:
     robot = sp.load("biorob2012-wide")
     batch = RobotBatch.of(robot)
     prediction = predict(robot, model="rft")
-    response = transient.axial_response(batch, prediction)
+    axial = AxialRobot.of(prediction)
     turn = 2 * np.pi / abs(prediction.tail_rotation_rate)
     samples = np.linspace(0.0, 3 * turn, 301)
-    duty = [(0.0, 1.0)]
+    duty = np.ones(301)
 
     calls = 0
-    original = transient._right_hand_side  # noqa: SLF001 - counting calls is the point
+    original = transient._derivative  # noqa: SLF001 - counting calls is the point
 
     def counting(*arguments):
         derivative = original(*arguments)
@@ -73,9 +75,9 @@ def main() -> None:
 
         return counted
 
-    transient._right_hand_side = counting  # noqa: SLF001
-    transient.motor_transient(batch.electrics, response.slip, samples, duty)
-    transient._right_hand_side = original  # noqa: SLF001
+    transient._derivative = counting  # noqa: SLF001
+    transient.adams_states(axial, samples, duty)
+    transient._derivative = original  # noqa: SLF001
 
     def best(function, repeats: int) -> float:
         times = []
@@ -85,7 +87,7 @@ def main() -> None:
             times.append(time.perf_counter() - start)
         return min(times)
 
-    ours = best(lambda: transient.motor_transient(batch.electrics, response.slip, samples, duty), 30)
+    ours = best(lambda: RUNGE_KUTTA.states(axial, samples, duty), 30)
     whole = best(lambda: sp.simulate(robot, model="rft", motion="held"), 10)
     one_matrix = best(lambda: rebuilt_tail_matrix(batch, 0.3), 5)
     exact = sp.resistance(robot, part="tail", phase=0.3).matrix

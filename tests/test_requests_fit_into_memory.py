@@ -32,7 +32,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "placed": (lambda: sp.predict(robot(THIN), placement={"gap": "0.3 mm", "yaw": "1 deg"}), "stations along the tail"),
     "simulate": (lambda: sp.simulate(robot(THIN)), "stations along the tail"),
     "plant": (lambda: sp.Plant(robot(THIN)), "stations along the tail"),
-    "held": (lambda: sp.HeldPlants(robot(THIN)), "stations along the tail"),
+    "held": (lambda: sp.AxialBatch(robot(THIN)), "stations along the tail"),
     "flow": (lambda: sp.flow(robot(THIN)), "stations along the tail"),
     "settle": (lambda: sp.settle(robot(THIN)), "stations along the tail"),
     "prepare": (lambda: sp.prepare(robot(THIN)), "stations along the tail"),

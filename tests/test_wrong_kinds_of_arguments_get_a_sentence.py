@@ -55,7 +55,7 @@ def taken(annotation: str) -> set[str]:
     return words.union(*(ALSO.get(word, ()) for word in words))
 
 
-MADE = ("HeldPlants", "LiveTracker", "Plant", "SerialRemote", "VirtualCamera")
+MADE = ("AxialBatch", "LiveTracker", "Plant", "SerialRemote", "VirtualCamera")
 
 
 @pytest.mark.parametrize("name", [*FUNCTIONS, *MADE])

@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from spirillum.deprecated import RENAMED, current_name
+
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated as Calibrated
     from spirillum.calibration.ranking import Ranking as Ranking
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
     from spirillum.controllers.control import control as control
     from spirillum.designs.design import design as design
     from spirillum.designs.design_result import Design as Design
+    from spirillum.dynamics.axial_batch import AxialBatch as AxialBatch
     from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
-    from spirillum.dynamics.held_plants import HeldPlants as HeldPlants
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
     from spirillum.dynamics.plant import Plant as Plant
     from spirillum.dynamics.prediction import predict as predict
@@ -88,7 +90,7 @@ _HOME = {
     "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.view.scene3d.film",
     "Flow": "spirillum.fields.flow",
-    "HeldPlants": "spirillum.dynamics.held_plants",
+    "AxialBatch": "spirillum.dynamics.axial_batch",
     "InputError": "spirillum.errors",
     "LinearSystem": "spirillum.interfaces.python_control",
     "LiveTracker": "spirillum.live.tracker",
@@ -159,6 +161,8 @@ def __getattr__(name: str) -> Any:
         from spirillum.version import own_version
 
         return own_version()
+    if name in RENAMED:
+        return __getattr__(current_name(name))
     if name not in _HOME:
         raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)

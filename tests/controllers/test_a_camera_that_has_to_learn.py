@@ -9,8 +9,8 @@ import pytest
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
-from spirillum.controllers.registry import StopController
 from spirillum.controllers.sensors import Senses
+from spirillum.controllers.stop_task import StopController
 
 
 class Learning(Senses):

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.plant import Plant
-from spirillum.dynamics.tube_integration import INTERRUPTED
 
 
 @pytest.mark.parametrize(

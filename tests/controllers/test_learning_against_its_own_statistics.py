@@ -10,8 +10,7 @@ import pytest
 
 from spirillum.controllers.bank import Paths, interpolation, points
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.learner import Learner, Learning
-from spirillum.controllers.learning import DriveInterval, learnt
+from spirillum.controllers.learning import DriveInterval, Learner, Learning, learnt
 from spirillum.controllers.loop import run_loop
 from spirillum.controllers.signals import Detection, Message, MeterReading
 

@@ -110,8 +110,17 @@ class StandIn:
 def _modules() -> dict[str, ModuleType]:
     """The compiled equations with the stand-in's resistance, in files of their own so that they are compiled once."""
     kernels = Path(sys.modules["spirillum.kernels"].__path__[0])
-    names = ("compiled", "rigid_links", "contacts", "dry_friction", "rosenbrock", "tube_motion", "tube_steps")
-    texts = {name: (kernels / f"{name}.py").read_text() for name in names if (kernels / f"{name}.py").exists()}
+    names = (
+        "compiled",
+        "rigid_links",
+        "contacts",
+        "dry_friction",
+        "rosenbrock",
+        "tube_motion",
+        "two_links",
+        "stiff_steps",
+    )
+    texts = {name: (kernels / f"{name}.py").read_text() for name in names}
     key = hashlib.sha256((_SOURCE + "".join(texts.values())).encode()).hexdigest()[:16]
     folder = Path(tempfile.gettempdir()) / f"spirillum-stand-in-{key}"
     folder.mkdir(exist_ok=True)
@@ -119,7 +128,7 @@ def _modules() -> dict[str, ModuleType]:
         "spirillum.kernels.tube_table": f"stand_in_{key}_table",
         "spirillum.kernels.tube_motion": f"stand_in_{key}_motion",
     }
-    files = {"table": _SOURCE, "motion": texts["tube_motion"], "steps": texts["tube_steps"]}
+    files = {"table": _SOURCE, "motion": texts["tube_motion"], "steps": texts["stiff_steps"]}
     for name, text in files.items():
         changed = text
         for old, new in changes.items():
@@ -137,11 +146,11 @@ def _modules() -> dict[str, ModuleType]:
 @pytest.fixture(scope="module")
 def stand_in() -> Iterator[StandIn]:
     """Let the engine run on the stand-in."""
-    from spirillum.dynamics import return_map, tube_integration
+    from spirillum.dynamics import integration, return_map, tube_robot
 
     modules = _modules()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tube_integration, "tube_motion", modules["motion"])
-        patch.setattr(tube_integration, "tube_steps", modules["steps"])
-        patch.setattr(return_map, "tube_steps", modules["steps"])
+        patch.setattr(tube_robot, "kernel", modules["motion"])
+        patch.setattr(integration, "stiff_steps", modules["steps"])
+        patch.setattr(return_map, "stiff_steps", modules["steps"])
         yield StandIn(modules["motion"])

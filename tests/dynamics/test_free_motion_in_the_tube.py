@@ -11,10 +11,10 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics import table_check
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
+from spirillum.dynamics.integration import observed_at
 from spirillum.dynamics.return_map import STEPS, ReturnMap
 from spirillum.dynamics.settling import lubrication_resistance
-from spirillum.dynamics.table_check import held_against_check
-from spirillum.dynamics.tube_integration import observed_at
+from spirillum.dynamics.tube_simulation import held_against_check
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.fluid.wire.robot_geometry import RobotGeometry

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.magnetic_sweep import _settled
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.two_links import TwoLinks
+from spirillum.dynamics.timing import Switch
 from spirillum.kernels import rigid_links
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
@@ -30,6 +30,9 @@ def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
         drag=drag,
         wall=np.array([np.inf, 1e-9, np.inf, 1.0]),
         spots=np.zeros((0, 6)),
+        length=1.0,
+        torque=MOMENT * FIELD,
+        turn=np.pi * along,
     )
 
 

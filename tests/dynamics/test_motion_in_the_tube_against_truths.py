@@ -12,9 +12,9 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics import table_check
+from spirillum.dynamics.integration import Reach, integrate, observed_at
 from spirillum.dynamics.run_summary import run_answer
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
@@ -149,11 +149,10 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
     centred[2] = 0.02 * MIDDLE
     links = type(links)(**{**vars(links), "weight": centred})
     time = np.linspace(0.0, 400.0, 21)
-    from spirillum.dynamics.integration import Reach
-    from spirillum.dynamics.remote import Switch
+    from spirillum.dynamics.timing import Switch
 
     start = laid_down(steady.robot, links, StartPlace(gap=2e-4))
-    found = integrate_in_tube(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))
+    found = integrate(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))
     across = 0.009 * 0.02 / 0.011
     c = 3.5 * 3.0 * np.sqrt(2.0) * np.pi * across**1.5 * LENGTH
     law = (2e-4**-0.5 + 0.5 * 0.02 / c * time) ** -2
@@ -314,7 +313,7 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
     _, links, _ = made()
 
     def state_of(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        state = np.zeros(kernel.STATES)
+        state = np.zeros(rigid_links.STATES)
         state[:3] = place + attitude.apply(step[:3])
         turned = attitude * Rotation.from_rotvec(step[3:6])
         state[3:7] = turned.as_quat(scalar_first=True)
@@ -352,7 +351,7 @@ def test_gap_of_a_site_is_that_of_its_points(made: Any) -> None:
     for x, ring, half, ball, turning in sites:
         for angles in ((0.4, 0.1, -0.07), (0.0, 0.02, 0.3), (2.0, -0.2, 0.05)):
             turned = Rotation.from_euler("xyz", angles)
-            state = np.zeros(kernel.STATES)
+            state = np.zeros(rigid_links.STATES)
             state[:3] = (0.0, 4e-3, -6e-3)
             lat = latitude if half else np.zeros(1)
             across = ring * np.cos(lat)[:, None] * np.stack([np.cos(theta), np.sin(theta)])[:, None, :]
@@ -407,7 +406,7 @@ def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
     """A step that is tried too far leaves no number behind with which the next one begins."""
     steady, links, _ = made()
     state, data = laid_down(steady.robot, links, StartPlace(gap=3e-4)), links.data
-    before, after, inside = np.empty((3, kernel.STATES))
+    before, after, inside = np.empty((3, rigid_links.STATES))
     stand_in.motion.rates(before, 0.0, state, data, links.table)
     beyond = state.copy()
     beyond[rigid_links.POSITION + 2] = np.nan

@@ -148,7 +148,7 @@ def test_capsule_drains_as_a_line_does() -> None:
     assert gap[-1] < 0.5 * gap[0]
     links = 1.0 / np.sqrt(gap)
     slope = (links[-1] - links[len(links) // 2]) / float(run["time"][-1] - run["time"][len(links) // 2])
-    from spirillum.dynamics.acting import weight_of
+    from spirillum.dynamics.free_robot import weight_of
 
     length, across = 0.017, 0.009 * 0.02 / 0.011
     expected = weight_of(robot)[:2].sum() / (2 * 3 * np.sqrt(2) * np.pi * 3.5 * across**1.5 * length)

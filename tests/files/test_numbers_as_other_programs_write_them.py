@@ -6,7 +6,7 @@ import pytest
 
 from spirillum import InputError
 from spirillum.calibration.experiment import read_experiment
-from spirillum.dynamics.remote import read_duty
+from spirillum.dynamics.timing import read_duty
 from spirillum.dynamics.tube_options import read_flow
 from spirillum.files import csv_rows
 from spirillum.files.numbers import number_in

@@ -103,13 +103,13 @@ def test_rules_score_as_their_limits_say() -> None:
 
 
 def test_pulse_of_flow_carries_the_robot_in_the_tube() -> None:
-    """A robot that is off moves as far as `HeldPlants` says, exactly as long as the pulse lasts."""
+    """A robot that is off moves as far as `AxialBatch` says, exactly as long as the pulse lasts."""
     pulse = {"velocity": "1 mm/s", "duration": "1 s", "start": "1 s"}
     lab = {"pulse": pulse, "unknown": {"friction_factor": 1.0}}
     one = gymnasium.make(HOME + NAMES[0], model="tube", lab=lab, placement=IN_FLOW)
     one.reset(seed=1)
     places = [one.step(0)[4]["position"] for _ in range(90)]
-    robots = sp.HeldPlants("biorob2012-wide", 1, model="tube", placement=IN_FLOW)
+    robots = sp.AxialBatch("biorob2012-wide", 1, model="tube", placement=IN_FLOW)
     robots.step(1.0, remote=False, flow=1e-3)
     assert abs(places[29]) < 1e-12
     assert places[59] == pytest.approx(float(robots.observe()["position"][0]), rel=1e-6)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.integration import Reach, integrate
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.dynamics.timing import Switch
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
 from spirillum.swimming.freedom import LINKS

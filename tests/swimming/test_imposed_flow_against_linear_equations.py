@@ -287,10 +287,13 @@ def test_batch_against_one_by_one(placed: Callable[..., Any], walled: SwimmerMod
 
 def test_run_in_time_refuses_a_flow(walled: SwimmerModel) -> None:
     import spirillum as sp
-    from spirillum.dynamics.held import axial_response
+    from spirillum.dynamics.axial_robot import AxialRobot
+    from spirillum.dynamics.axial_run import axial_run
+    from spirillum.dynamics.timing import Timing
+    from spirillum.kernels.axial_motor import SPEED
 
     prediction = sp.predict("biorob2012-wide", model="walled", placement={"flow": "1 mm/s"})
     with pytest.raises(InputError, match=r"placement\.flow = 1 mm/s: a run in time starts from rest; allowed: no flow"):
-        axial_response(prediction.batch, prediction)
+        axial_run(prediction, Timing())
     still = sp.predict("biorob2012-wide", model="walled", placement={"gap": "1 mm"})
-    assert axial_response(still.batch, still).speed > 0
+    assert AxialRobot.of(still).numbers[SPEED] > 0

@@ -47,7 +47,7 @@ ANSWERS: dict[str, Callable[[sp.Robot, Path], Any]] = {
     "simulate-tube": lambda robot, _: sp.simulate(robot, model="tube", **SHORT),
     "flow": lambda robot, _: sp.flow(robot, model="slender", resolution={"accuracy": "standard"}),
     "plant": lambda robot, _: sp.Plant(robot),
-    "held-plants": lambda robot, _: sp.HeldPlants(robot, model="sbt"),
+    "held-plants": lambda robot, _: sp.AxialBatch(robot, model="sbt"),
     "linear": lambda robot, _: sp.linear_system(robot, model="sbt"),
     "fmu": lambda robot, folder: sp.export(robot, folder / "robot.fmu", model="sbt"),
     "design": lambda robot, _: sp.design(robot, RANGE, maximise="forward_velocity", model="sbt"),
@@ -115,7 +115,7 @@ def test_a_step_that_leaves_stokes_flow_is_not_taken() -> None:
     with pytest.raises(sp.InputError, match=REFUSED):
         plant.step(0.5, duty=1.0)
     assert plant.state == before
-    plants = sp.HeldPlants(thin, 3, model="sbt", ranges={"viscosity": (0.1, 1.0)})
+    plants = sp.AxialBatch(thin, 3, model="sbt", ranges={"viscosity": (0.1, 1.0)})
     with pytest.raises(sp.InputError, match=REFUSED):
         plants.step(1.0, duty=1.0)
     assert not plants.states.any()

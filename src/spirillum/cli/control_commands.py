@@ -25,7 +25,7 @@ _EYES = ("model", "tracker")
 
 
 def _complete_tasks(incomplete: str) -> list[str]:
-    from spirillum.controllers.registry import TASKS
+    from spirillum.controllers.control import TASKS
 
     return starting(TASKS, incomplete)
 

@@ -196,9 +196,9 @@ def simulate(
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
     from spirillum.cli import renderer
+    from spirillum.dynamics.integration import INTERRUPTED
     from spirillum.dynamics.run_summary import run_answer
     from spirillum.dynamics.simulation import simulate as answer
-    from spirillum.dynamics.tube_integration import INTERRUPTED
     from spirillum.errors import InputError
     from spirillum.files import PICTURES, netcdf_target, output_target, protected, write_dataset
 

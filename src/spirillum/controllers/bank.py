@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.lab import Unknown
-from spirillum.controllers.sensors import SampledErrors
+from spirillum.controllers.sensors import SampledErrors, plant_of
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, Snapshot, uninterrupted
 from spirillum.errors import InputError

@@ -12,22 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.controllers.bank import Bank
-from spirillum.controllers.drawn_plant import plant_of
-from spirillum.controllers.jobs import ControlJob, Outcome, draw_plant, outcome_of, run_job
+from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.learner import Learner
-from spirillum.controllers.learning import RobotEstimate
+from spirillum.controllers.learning import Learner, RobotEstimate
 from spirillum.controllers.loop import LoopRun
-from spirillum.controllers.registry import task_of
-from spirillum.controllers.scores import Scores, scored
-from spirillum.controllers.sensors import SampledErrors, Senses
+from spirillum.controllers.scores import ControlJob, Outcome, Scores, draw_plant, outcome_of, run_job, scored
+from spirillum.controllers.sensors import SampledErrors, Senses, plant_of
+from spirillum.controllers.steering import KeepAxisTask
+from spirillum.controllers.stop_task import StopAtTask
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
 from spirillum.costs import check_memory
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import vertical_drift
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped, did_you_mean
@@ -40,6 +39,25 @@ from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+_TASKS: tuple[type[Task], ...] = (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask, KeepAxisTask)
+TASKS = {task.kind: task for task in _TASKS}
+"""Tasks by their kinds."""
+
+
+def task_of(value: Task | Mapping[str, Any]) -> Task:
+    """A task from what a caller may give."""
+    if isinstance(value, Task):
+        return value
+    if "kind" not in value:
+        raise InputError(
+            f"task = {str(value)[:60]!r}; allowed: kind ({', '.join(TASKS)}) and the task's fields, by name"
+        )
+    kind = str(value["kind"])
+    if kind not in TASKS:
+        raise InputError(f"task = {kind[:60]!r}{did_you_mean(kind, TASKS)}; allowed: {', '.join(TASKS)}")
+    return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}

@@ -17,9 +17,8 @@ from typing import Any
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse, Senses
 from spirillum.controllers.signals import Command, Controller, Detection, Message, MeterReading
-from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.integration import INTERRUPTED, Progress
 from spirillum.dynamics.plant import Plant, Snapshot
-from spirillum.dynamics.tube_integration import INTERRUPTED
 from spirillum.errors import InputError
 
 SILENCE = 1.0

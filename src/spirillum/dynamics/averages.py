@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.timing import Switch
 from spirillum.quantities import attributes
 
 if TYPE_CHECKING:

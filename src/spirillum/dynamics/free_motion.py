@@ -15,16 +15,20 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import DutyInterval
-from spirillum.dynamics.integration import Progress, Reach
+from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
-from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.steady_state_search import LongRun, long_run
-from spirillum.dynamics.table_check import Checked, held_against_check, held_by_friction
-from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
+from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
+from spirillum.dynamics.tube_simulation import (
+    Checked,
+    check_in_tube,
+    held_against_check,
+    held_by_friction,
+    links_in_tube,
+)
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
@@ -144,7 +148,7 @@ def free_motion(
     held, links, start = let_go(ready, laid)
     state = laid_down(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
-    check_in_table(links, state, observed_at(links, state)[kernel.OUTSIDE])
+    check_in_table(links, state, observed_at(links, state)[rigid_links.OUTSIDE])
     gap = float(observed_at(links, state)[rigid_links.FILM])
     _check_until(until, gap)
     load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
@@ -256,7 +260,7 @@ def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, 
     start = state.copy()
     start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
     start[rigid_links.CURRENT + 1 :] = 0.0
-    followed = integrate_in_tube(links, start, moments, [Switch(0.0, duty)], _NOWHERE)
+    followed = integrate(links, start, moments, [Switch(0.0, duty)], _NOWHERE)
     more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
     series = dataset_of(held, links, followed, [DutyInterval(0.0, float(followed.time[-1]))], more, {})
 

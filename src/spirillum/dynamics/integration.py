@@ -1,32 +1,34 @@
 """Integration of a free robot's motion in time, with what happens on the way.
 
-The equations are those of `spirillum.kernels.two_links`; CyRK integrates them by Tsitouras' steps of order 5 (the
-motor's L/R bounds the step, not the path) and finds the events.
+The gap, dry friction and the motor's current are stiff: `spirillum.kernels.stiff_steps` takes linearly implicit steps.
+Samples and events lie inside them on the method's continuous output, so that a step is as long as the motion allows.
+A run keeps the beginning of its last step: continued from there, it is the longer run to rounding.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.acting import state_sizes
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.two_links import TwoLinks
+from spirillum.dynamics.free_robot import FreeRobot
+from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
-from spirillum.kernels import rigid_links
-from spirillum.kernels import two_links as kernel
+from spirillum.kernels import rigid_links, stiff_steps
 
-TOLERANCE = 1e-8
-"""Relative tolerance of a step."""
+_LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
+_STEPS = 64  # between two signs of life
+_FIRST = 1e-4  # first step over the time of a turn
+_END = "end of the channel"
+_STUCK = "no step is small enough"
+INTERRUPTED = "interrupted"
+"""The event of a run that was interrupted, which keeps what was done."""
 BATTERY_EMPTY = "battery empty"
 """Event after which the battery drives no longer."""
-INTEGRATOR = f"CyRK Tsit5, relative tolerance {TOLERANCE:g}"
-_STEPS_PER_SAMPLE, _STEPS_AT_LEAST = 400, 100_000
-_BREATH = 512  # steps between two signs of life
 
 Progress = Callable[[str, int, int], None]
 
@@ -55,6 +57,17 @@ class Reach(NamedTuple):
     """Charge of the battery, A s; infinite without a rating."""
 
 
+class Checkpoint(NamedTuple):
+    """Where a run can be continued exactly."""
+
+    time: float
+    """Beginning of its last step, s."""
+    step: float
+    """Length of that step, s."""
+    state: tuple[float, ...]
+    """The state there, (19,)."""
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A run at its samples; SI."""
@@ -64,29 +77,47 @@ class Trajectory:
     duty: Samples
     """Duty of the drive up to each sample, (n,)."""
     states: Samples
-    """States, see `spirillum.kernels.two_links` (n, 17)."""
+    """States, see `spirillum.kernels.rigid_links` (n, 19)."""
     observed: Samples
-    """What `spirillum.kernels.two_links` observes (n, 13)."""
+    """What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 26) observes."""
     events: tuple[Event, ...]
     """What happened, in the order of time."""
+    last: Checkpoint
+    """From where it can be continued."""
+
+    def require_completion(self) -> Trajectory:
+        """Return the run; raise KeyboardInterrupt or InputError where it was interrupted or could not be followed."""
+        what = self.events[-1].what if self.events else ""
+        if what == INTERRUPTED:
+            raise KeyboardInterrupt
+        if what.startswith(_STUCK):
+            raise InputError(
+                f"{what}: weight, field or motor move it far faster than the tail turns; allowed: body.mass, "
+                "magnetic.moment, magnetic.field, motor.inductance and fluid.viscosity nearer to each other"
+            )
+        return self
 
 
-class _Watch:
-    """An event for the integrator: a function of the state that crosses zero."""
+@dataclass
+class _Run:
+    """A run while it is computed."""
 
-    direction = 0
+    robot: FreeRobot
+    reach: Reach
+    state: Samples
+    memory: Samples
+    gaps: Samples
+    before: Samples
+    increments: Samples = field(default_factory=lambda: np.zeros((8, rigid_links.STATES)))
 
-    def __init__(self, what: str, value: Callable[[Samples], Any], *, last: bool) -> None:
-        self.what, self.value = what, value
-        self.terminal = 1 if last else 0
-
-    def __call__(self, _time: float, y: Samples, _data: Samples) -> float:
-        return float(self.value(y))
+    @property
+    def time(self) -> float:
+        return float(self.memory[stiff_steps.TIME])
 
 
 def integrate(
-    links: TwoLinks,
-    start: Samples,
+    robot: FreeRobot,
+    start: Samples | Checkpoint,
     time: Samples,
     switches: Sequence[Switch],
     reach: Reach,
@@ -94,192 +125,190 @@ def integrate(
 ) -> Trajectory:
     """Integrate a robot's motion.
 
-    The run ends early where nose or tail reach the end of the channel; a spent battery drives no longer.
+    The run ends early where nose or tail reach the end of the tube, where a range of the robot's table is left, or when
+    it is interrupted; a spent battery drives no longer.
 
     Args:
-        links: the robot.
-        start: state at the first sample, (17,).
+        robot: the robot.
+        start: state at the first sample, (19,), or the checkpoint of a run that ended there.
         time: increasing sample times, s.
-        switches: every switching, the first at the first sample.
+        switches: every switching, the first not after the first sample.
         reach: what ends the run, or its drive.
-        progress: told what is being computed, how many stretches are done, and of how many.
+        progress: told what is being computed, how much is done, and of how much.
     """
-    blocks = [_observed(links.at_duty(switches[0].duty), time[:1], start[None])]
-    times, states, duties = [time[:1]], [start[None]], [np.full(1, switches[0].duty)]
+    end = float(time[-1])
+    going_on = isinstance(start, Checkpoint)
+    state = np.array(start.state if isinstance(start, Checkpoint) else start, dtype=float)
+    memory = np.zeros(stiff_steps.MEMORY)
+    memory[stiff_steps.TIME] = start.time if isinstance(start, Checkpoint) else time[0]
+    memory[stiff_steps.STEP] = start.step if isinstance(start, Checkpoint) else _FIRST * robot.turn
+    memory[stiff_steps.LAST_TIME], memory[stiff_steps.LAST_STEP] = memory[stiff_steps.TIME], memory[stiff_steps.STEP]
+    run = _Run(robot, reach, state, memory, np.ones(robot.gap_count + stiff_steps.WATCHED), state.copy())
+    pieces: list[tuple[Samples, Samples, float]] = []
     events: list[Event] = []
-    state, pending, end = start, list(switches), float(time[-1])
-    spent = False
-    now = float(time[0])
+    first = run.time
 
     def tell(moment: float) -> None:
         if progress is not None:
-            progress("motion", int(1000 * moment / end), 1000)
+            progress("motion", int(1000 * (min(moment, end) - first) / (end - first)), 1000)
 
-    while now < end:
-        if len(pending) > 1 and pending[1].time <= now:
-            pending.pop(0)
-            continue
-        duty = 0.0 if spent else pending[0].duty
-        stop = min(pending[1].time, end) if len(pending) > 1 else end
-        here = links.at_duty(duty)
-        inside = time[(time > now) & (time <= stop)]
-        stretch = _stretch(here, state, now, stop, inside, _limits(here, reach, spent=spent), tell)
+    spent = False
+    if not going_on:
+        pieces.append((time[:1], state[None].copy(), _duty(switches, float(time[0]))))
+    after = time[1:] if not going_on else time[time > time[0]]
+    stops = sorted({s.time for s in switches} | set(robot.bends.tolist()))
+    while run.time < end:
+        duty = 0.0 if spent else _duty(switches, run.time)
+        later = bisect_right(stops, run.time)
+        stop = stops[later] if later < len(stops) else np.inf
+        inside = after[(after > run.time) & (after <= stop)] if not going_on else after[after <= stop]
+        going_on = False
+        stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=tell)
         events += stretch.events
-        kept = inside[: len(stretch.states)]
-        times.append(kept)
-        states.append(stretch.states)
-        duties.append(np.full(kept.size, duty))
-        blocks.append(_observed(here, kept, stretch.states))
-        now, state = stretch.end, stretch.last
-        tell(now)
-        if stretch.ended:
-            events.append(Event(now, stretch.ended))
-        if stretch.ended == BATTERY_EMPTY:
+        pieces.append((stretch.times, stretch.states, duty))
+        if stretch.what == BATTERY_EMPTY:
             spent = True
-        elif stretch.ended:
-            times.append(np.array([now]))
-            states.append(state[None])
-            duties.append(np.full(1, duty))
-            blocks.append(_observed(here, np.array([now]), state[None]))
+        elif stretch.what:
             break
-    joined = np.concatenate(times)
-    first = np.concatenate([[True], np.diff(joined) > 0])
-    switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if s.time <= joined[-1]]
-    happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
-    return Trajectory(
-        joined[first],
-        np.concatenate(duties)[first],
-        np.concatenate(states)[first],
-        np.concatenate(blocks)[first],
-        happened,
-    )
+    return _joined(robot, pieces, events, switches, run)
 
 
-_END = "end of the channel"
-_FILM = "film as thin as the roughness"
+def observed_at(robot: FreeRobot, state: Samples, time: float = 0.0) -> Samples:
+    """What is observed in one state, (13,), or (26,) in a tube."""
+    return np.asarray(robot.observe(np.array([time]), state[None])[0])
+
+
+def _duty(switches: Sequence[Switch], time: float) -> float:
+    return switches[bisect_right(switches, time, key=lambda switch: switch.time) - 1].duty
 
 
 class _Stretch(NamedTuple):
     """A run between two switchings."""
 
+    times: Samples
     states: Samples
-    """At the samples up to where it ended."""
-    end: float
-    last: Samples
-    """The end, and the state there."""
-    ended: str
-    """What ended it early, or nothing."""
     events: list[Event]
-
-
-def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
-    """What ends a stretch: positive before, negative beyond."""
-    found = []
-    if np.isfinite(reach.channel):
-
-        def room(y: Samples) -> Samples:
-            w, i, j, k = y[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
-            along = 1.0 - 2.0 * (j * j + k * k) / (w * w + i * i + j * j + k * k)
-            x = y[rigid_links.POSITION] - reach.middle
-            return np.asarray(reach.channel - np.maximum(x + reach.nose * along, -x - reach.tip * along))
-
-        found.append(_Watch(_END, room, last=True))
-    if np.isfinite(reach.charge) and links.drive[rigid_links.KIND] == rigid_links.MOTOR and not spent:
-        found.append(_Watch(BATTERY_EMPTY, lambda y: reach.charge - y[rigid_links.CHARGE], last=True))
-    return found
-
-
-class _Film(_Watch):
-    """Where the robot comes as near to the wall as its roughness, or leaves it.
-
-    Without a wall it never happens, but the integrator comes by at every step: a sign of life for who waits, and a
-    chance for Python to see that somebody interrupts.
-    """
-
-    def __init__(self, links: TwoLinks, tell: Callable[[float], None]) -> None:
-        super().__init__(_FILM, float, last=False)
-        self._wall, self._spots, self._rough = links.wall, links.spots, float(links.wall[kernel.ROUGHNESS])
-        self._tell, self._calls, self._walled = tell, 0, links.spots.size > 0
-
-    def __call__(self, time: float, y: Samples, _data: Samples) -> float:
-        self._calls += 1
-        if self._calls % _BREATH == 0:
-            self._tell(time)
-        return kernel.thinnest_film(y, self._wall, self._spots) - self._rough if self._walled else 1.0
+    what: str
+    """What ended it early, or nothing."""
 
 
 def _stretch(
-    links: TwoLinks,
-    state: Samples,
-    start: float,
-    stop: float,
-    samples: Samples,
-    limits: Sequence[_Watch],
-    tell: Callable[[float], None],
+    run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Callable[[float], None]
 ) -> _Stretch:
-    """Integrate between two switchings; limits are watched only where they are passed, for watching costs time."""
-    at = samples if samples.size and samples[-1] == stop else np.append(samples, stop)
-    watches: list[_Watch] = [_Film(links, tell)]
-    solved = _solved(links, state, at, start, watches)
-    y = _states(solved)
-    passed = [limit for limit in limits if np.any(limit.value(y.T) < 0)]
-    if passed:
-        watches += passed
-        solved = _solved(links, state, at, start, watches)
-        y = _states(solved)
-    found = [
-        (float(t), watch, np.array(row))
-        for watch, times, rows in zip(watches, solved.t_events or (), solved.y_events or (), strict=True)
-        for t, row in zip(times, np.asarray(rows).reshape(-1, rigid_links.STATES), strict=True)
-    ]
-    end, what, last = min(
-        ((t, watch.what, row) for t, watch, row in found if watch.terminal),
-        key=lambda event: event[0],
-        default=(stop, "", state if y.shape[0] == 0 else y[-1]),
-    )
-    events = [Event(t, watch.what) for t, watch, _ in found if not watch.terminal and t <= end]
-    return _Stretch(y[: np.count_nonzero(samples <= end)], end, last, what, events)
+    robot = run.robot.at_duty(duty).between(run.time, stop)
+    data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
+    stiff_steps.watched(run.state, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
+    states = np.empty((inside.size, rigid_links.STATES))
+    sizes, done = robot.step_sizes(), 0
+    sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
+    events: list[Event] = []
+    clip = stop <= end
+    target, what = min(stop, end), ""
+    try:
+        while True:
+            watched = run.gaps.copy()
+            status, answered = stiff_steps.advance(
+                target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments, run.gaps,
+                inside[done:], states[done:], sizes, limits, robot.roughness, data, robot.table,
+            )  # fmt: skip
+            done += answered
+            tell(run.time)
+            if status == stiff_steps.CROSSED:
+                what = _crossed(run, robot, data, limits, watched, min(end, target), events)
+                if what:
+                    done = int(np.count_nonzero(inside[:done] <= run.time))
+                    break
+            elif status == stiff_steps.STUCK:
+                what = f"{_STUCK}: the motion cannot be followed beyond t = {run.time:.6g} s"
+                events.append(Event(run.time, what))
+                break
+            elif status == stiff_steps.DONE:
+                break
+    except KeyboardInterrupt:
+        what = INTERRUPTED
+        events.append(Event(run.time, what))
+    times, states = inside[:done], states[:done]
+    if what and what != BATTERY_EMPTY and not (times.size and times[-1] == run.time):
+        times, states = np.append(times, run.time), np.concatenate([states, run.state[None]])
+    return _Stretch(times, states, events, what)
 
 
-def _states(solved: Any) -> Samples:
-    return np.ascontiguousarray(np.asarray(solved.y).T)
+def _crossed(
+    run: _Run, robot: FreeRobot, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
+) -> str:
+    """Note what happened in the last step; what ends the stretch, with the state where it does, or nothing."""
+    begin = float(run.memory[stiff_steps.LAST_TIME])
+    length = run.time - begin
+    new, inner, gaps = run.state.copy(), np.empty(rigid_links.STATES), np.empty_like(run.gaps)
+    dy = np.empty(rigid_links.STATES)
+
+    def at(share: float, place: int) -> float:
+        stiff_steps.interpolate(share, run.before, new, run.increments, inner)
+        outside = 0.0
+        if place == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
+            stiff_steps.rates(dy, begin + share * length, inner, data, robot.table)
+            outside = float(data[rigid_links.OUTSIDE])
+        stiff_steps.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
+        return float(gaps[place])
+
+    found: list[tuple[float, int]] = []
+    for place in np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist():
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if (at(middle, place) > 0) == (watched[place] > 0) else (low, middle)
+        found.append((high, place))
+    sites = robot.gap_count
+    for share, place in sorted(found):
+        moment = begin + share * length
+        if moment > end:
+            break
+        if place < sites:
+            events.append(Event(moment, robot.contact_event(place, touches=watched[place] > 0)))
+            continue
+        at(share, place)
+        if place == sites + stiff_steps.CHARGE_LEFT:
+            what = BATTERY_EMPTY
+        elif place == sites + stiff_steps.ROOM:
+            what = _END
+        else:
+            what = robot.range_left(inner, moment)
+        run.state[:] = inner
+        run.memory[stiff_steps.TIME] = moment
+        run.memory[stiff_steps.STEP] = run.memory[stiff_steps.LAST_STEP]
+        events.append(Event(moment, what))
+        return what
+    return ""
 
 
-def _solved(links: TwoLinks, state: Samples, at: Samples, start: float, watches: Sequence[_Watch]) -> Any:
-    from CyRK import pysolve_ivp
-
-    solved: Any = pysolve_ivp(
-        kernel.rates,
-        (start, float(at[-1])),
-        np.ascontiguousarray(state),
-        method="Tsit5",
-        t_eval=at,
-        events=tuple(watches),
-        args=(links.data,),
-        rtol=_tolerances(links),
-        atol=1e-3 * TOLERANCE * state_sizes(links.drive, links.length, links.torque, rigid_links.STATES),
-        max_num_steps=_STEPS_AT_LEAST + _STEPS_PER_SAMPLE * at.size,
-        pass_dy_as_arg=True,
-    )
-    if not solved.success:
-        reached = float(solved.t[-1]) if solved.t.size else start
-        raise InputError(
-            f"the motion cannot be followed beyond t = {reached:.4g} s in {_STEPS_AT_LEAST} steps and "
-            f"{_STEPS_PER_SAMPLE} a sample: weight, field or motor move it far faster than the tail turns; allowed: "
-            "body.mass, magnetic.moment, magnetic.field, motor.inductance and fluid.viscosity nearer to each other"
-        )
-    return solved
-
-
-def _tolerances(links: TwoLinks) -> Samples:
-    """Relative tolerances of the state's components, (17,): finer for place and attitude where a film hangs on them."""
-    found = np.full(rigid_links.STATES, TOLERANCE)
-    if links.spots.size:
-        found[: rigid_links.PHASE] *= 1e-3
+def watched_limits(robot: FreeRobot, reach: Reach, *, spent: bool = False) -> Samples:
+    """Where tube and battery end, as `spirillum.kernels.stiff_steps` reads it; a spent battery ends no more."""
+    found = np.empty(stiff_steps.LIMITS)
+    found[stiff_steps.CHANNEL], found[stiff_steps.MIDDLE] = reach.channel, reach.middle
+    found[stiff_steps.NOSE], found[stiff_steps.TIP] = reach.nose, reach.tip
+    motor = robot.drive[rigid_links.KIND] == rigid_links.MOTOR
+    found[stiff_steps.MOST_CHARGE] = reach.charge if motor and not spent else np.inf
     return found
 
 
-def _observed(links: TwoLinks, time: Samples, states: Samples) -> Samples:
-    out = np.empty((time.size, rigid_links.OBSERVED))
-    kernel.observe(time, np.ascontiguousarray(states), links.data, out)
-    return out
+def _joined(
+    robot: FreeRobot,
+    pieces: Sequence[tuple[Samples, Samples, float]],
+    events: list[Event],
+    switches: Sequence[Switch],
+    run: _Run,
+) -> Trajectory:
+    times = np.concatenate([piece[0] for piece in pieces])
+    states = np.concatenate([piece[1] for piece in pieces])
+    duties = np.concatenate([np.full(piece[0].size, piece[2]) for piece in pieces])
+    observed = []
+    for time, inside, duty in pieces:
+        if time.size:
+            here = robot.at_duty(duty).between(float(time[0]), float(time[-1]))
+            observed.append(here.observe(time, inside))
+    switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]
+    happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
+    last = Checkpoint(
+        float(run.memory[stiff_steps.LAST_TIME]), float(run.memory[stiff_steps.LAST_STEP]), tuple(run.before.tolist())
+    )
+    return Trajectory(times, duties, states, np.concatenate(observed), happened, last)

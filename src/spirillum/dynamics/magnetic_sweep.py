@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import INTEGRATOR, Reach, integrate
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.dynamics.free_robot import TwoLinks, two_links
+from spirillum.dynamics.integration import Reach, integrate
+from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
@@ -211,7 +211,7 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
     before = None
     for _ in range(_MOST_STRETCHES):
         try:
-            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
+            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN).require_completion()
         except InputError as error:
             raise InputError(
                 f"rates: at {show(rate, 'Hz')} {str(error).partition(';')[0]}; allowed: rates nearer to step-out"
@@ -321,7 +321,7 @@ def _dataset(
             "turns": float(turns),
             "settings": json.dumps(held.robot.model_dump(), sort_keys=True),
             "known_error": held.known_error,
-            "integrator": INTEGRATOR,
+            "integrator": TwoLinks.integrator(),
             "references": " ".join(held.references),
             "warnings": "\n".join([*warnings, *_unsettled(rates, settled, turns)]),
             "versions": versions(),

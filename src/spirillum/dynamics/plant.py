@@ -17,26 +17,31 @@ import numpy as np
 
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
-from spirillum.dynamics.free_start import links_without_walls, resting_state
-from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, Trajectory, integrate
+from spirillum.dynamics.free_robot import FreeRobot, TwoLinks
+from spirillum.dynamics.integration import (
+    BATTERY_EMPTY,
+    INTERRUPTED,
+    Checkpoint,
+    Progress,
+    Trajectory,
+    integrate,
+    observed_at,
+)
 from spirillum.dynamics.poses import RobotPose
 from spirillum.dynamics.record import series_of
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.start import reach_of
-from spirillum.dynamics.tube_integration import INTERRUPTED, Checkpoint, TubeTrajectory, integrate_in_tube, observed_at
+from spirillum.dynamics.start import links_without_walls, reach_of, resting_state
+from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.dynamics.turning_field import Field, TurningField
-from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError, clipped
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as tube
-from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -90,7 +95,9 @@ class PlantState:
     azimuth: float
     """Azimuth counted over whole turns, rad."""
     checkpoint: Checkpoint | None
-    """Beginning of the integrator's last step, in a tube."""
+    """Beginning of the integrator's last step."""
+    model: str
+    """Name of the hydrodynamic model."""
 
 
 def uninterrupted(moment: Snapshot) -> Snapshot:
@@ -171,15 +178,15 @@ class Plant:
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
         self._table = table_for(RobotBatch.of(own, placed), progress=progress) if walled else None
         self._reach = reach_of(own)
-        self._links: TubeRobot | TwoLinks
+        self._links: FreeRobot
         if self._table is None:
-            self._links = links_without_walls(self.steady, height, weight=weight)
-            first = resting_state(own, self._links, placed)
+            self._links = without_walls = links_without_walls(self.steady, height, weight=weight)
+            first = resting_state(own, without_walls, placed)
         else:
             links, start = self._in(self._table, placed)
             first = laid_down(own, links, start)
             check_roughness(links.roughness, float(links.gaps(first).min()), self.robot.body.diameter)
-            check_in_table(links, first, observed_at(links, first)[tube.OUTSIDE])
+            check_in_table(links, first, observed_at(links, first)[rigid_links.OUTSIDE])
             self._links = links
         on = own.drive.duty
         self._first = PlantState(
@@ -193,6 +200,7 @@ class Plant:
             ended="",
             azimuth=0.0,
             checkpoint=None,
+            model=self.model,
         )
         self._now = self._first
 
@@ -214,10 +222,8 @@ class Plant:
     @property
     def roughness(self) -> float | None:
         """Height of the wall's asperities, m; None without a wall."""
-        if isinstance(self._links, TubeRobot):
-            return float(self._links.roughness)
-        found = float(self._links.wall[kernel.ROUGHNESS])
-        return found if np.isfinite(self._links.wall[kernel.RADIUS]) else None
+        links = self._links
+        return None if isinstance(links, TwoLinks) and not links.is_walled else links.roughness
 
     def reset(self, state: PlantState | None = None) -> Snapshot:
         """Go back to rest at the start, or to a state that was noted.
@@ -230,7 +236,7 @@ class Plant:
         """
         state = self._first if state is None else state
         check_kind("state", state, "PlantState")
-        if len(state.state) != len(self._first.state):
+        if state.model != self.model:
             raise InputError("state is none of this plant; allowed: its own, or that of the same robot and model")
         if state.flow != self._now.flow:
             self._impose(state.flow)
@@ -284,7 +290,7 @@ class Plant:
         if asked_field is not None:
             self.impose_field(asked_field)
         asked = 0.0 if self._now.spent else command
-        run, checkpoint = self._moved(float(dt), asked)
+        run = self._moved(float(dt), asked)
         try:
             self._check_stokes(run)
         except InputError:
@@ -304,21 +310,17 @@ class Plant:
             spent,
             ended,
             self._azimuth(run),
-            checkpoint,
+            run.last,
+            self.model,
         )
         return self._moment(run)
 
     def observe(self) -> Snapshot:
         """The robot where it is: pose and true values of its quantities."""
         now, state = self._now, np.array([self._now.state])
-        if isinstance(self._links, TubeRobot):
-            time = np.array([now.time])
-            observed = np.empty((1, tube.OBSERVED))
-            tube.observe(time, state, self._links.at_duty(now.duty).data, self._links.table, observed)
-            last = Checkpoint(0.0, 0.0, ())
-            return self._moment(TubeTrajectory(time, np.full(1, now.duty), state, observed, (), last))
-        switches = [Switch(now.time, now.duty)]
-        return self._moment(integrate(self._links, state[0], np.array([now.time]), switches, self._reach))
+        time = np.array([now.time])
+        observed = self._links.at_duty(now.duty).observe(time, state)
+        return self._moment(Trajectory(time, np.full(1, now.duty), state, observed, (), Checkpoint(0.0, 0.0, ())))
 
     @validate_arguments
     def impose_flow(self, velocity: float | None) -> None:
@@ -394,32 +396,28 @@ class Plant:
             return float(duty)
         return self._now.command
 
-    def _moved(self, dt: float, duty: float) -> tuple[Trajectory, Checkpoint | None]:
+    def _moved(self, dt: float, duty: float) -> Trajectory:
         now = self._now
         times = np.array([now.time, now.time + dt])
-        if not isinstance(self._links, TubeRobot):
-            state = np.array(now.state)
-            return integrate(self._links, state, times, [Switch(now.time, duty)], self._reach), None
         switches = [Switch(now.time, duty)]
         if now.checkpoint is not None:  # its last step is taken again, as far as it goes beyond what was asked for
             old = [] if now.checkpoint.time == now.time else [Switch(now.checkpoint.time, now.duty)]
             switches = [*old, *(switches if duty != now.duty or not old else [])]
         start = now.checkpoint or np.array(now.state)
-        run = integrate_in_tube(self._links, start, times, switches, self._reach)
-        return run, run.last
+        return integrate(self._links, start, times, switches, self._reach)
 
     def _azimuth(self, run: Trajectory) -> float:
-        if not isinstance(run, TubeTrajectory):
+        if not isinstance(self._links, TubeRobot):
             return 0.0
         found = float(run.observed[-1, tube.AZIMUTH])
         return found + _TURN * round((self._now.azimuth - found) / _TURN)
 
     def _moment(self, run: Trajectory) -> Snapshot:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
-        if isinstance(run, TubeTrajectory):
+        if isinstance(self._links, TubeRobot):
             series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
-        elif isinstance(self._links, TwoLinks) and np.isfinite(self._links.wall[kernel.RADIUS]):
-            series["wall_gap"] = run.observed[:, rigid_links.FILM] + self._links.wall[kernel.ROUGHNESS]
+        elif self.roughness is not None:
+            series["wall_gap"] = run.observed[:, rigid_links.FILM] + self.roughness
         state = run.states[-1]
         attitude = state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
         pose = RobotPose(

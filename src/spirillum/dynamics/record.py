@@ -1,4 +1,4 @@
-"""A free run as a labelled dataset: path, attitude, rates, powers, energies, and what happened."""
+"""A run as a labelled dataset: path, attitude, rates, powers, energies, what happened, and its attributes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.acting import Acting
-from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
+from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import Reach, Trajectory
 from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 _MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
@@ -33,7 +34,7 @@ _MEANINGS = {"wobble_angle": "angle between the motor axis and the axis about wh
 
 def dataset_of(
     prediction: Prediction,
-    links: Acting,
+    links: FreeRobot,
     run: Trajectory,
     on: Sequence[DutyInterval],
     more: Mapping[str, Samples],
@@ -84,7 +85,7 @@ def dataset_of(
     return dataset.assign(_averages(dataset, on))
 
 
-def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[str, Samples]:
+def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict[str, Samples]:
     """Angles, rates, torques, powers and energies of a free robot's run by name, each (n,); SI."""
     rotation = _rotations(run.states)
     found = {**_motion(run, rotation), **_powers(links, run, rotation)}
@@ -96,7 +97,7 @@ def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[st
 
 
 def free_attributes(
-    prediction: Prediction, run: Trajectory, reach: Reach, title: str, integrator: str, warnings: Sequence[str]
+    prediction: Prediction, links: FreeRobot, run: Trajectory, reach: Reach, title: str, warnings: Sequence[str]
 ) -> dict[str, Any]:
     """Attributes of a free robot's run."""
     return {
@@ -106,7 +107,7 @@ def free_attributes(
         "steady": STEADY,
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
-        "integrator": integrator,
+        "integrator": links.integrator(),
         "warnings": "\n".join(warnings),
     }
 
@@ -138,7 +139,7 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     }
 
 
-def _powers(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
+def _powers(links: FreeRobot, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     drive, motor_rate = rates[:, rigid_links.DRIVE_TORQUE], rates[:, rigid_links.JOINT]
     if links.drive[rigid_links.FIXED]:  # one piece, driven from outside
@@ -160,7 +161,7 @@ def _powers(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samp
     }
 
 
-def _field_torque(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
+def _field_torque(links: FreeRobot, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
     moment, angle = _in_field(links, rotation @ links.drive[_MOMENT]), _field_angle(links, run)
     if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
@@ -169,12 +170,12 @@ def _field_torque(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
-def _field_angle(links: Acting, run: Trajectory) -> Samples:
+def _field_angle(links: FreeRobot, run: Trajectory) -> Samples:
     """Angle by which the field has turned since it pointed up, rad."""
     return np.asarray(links.drive[rigid_links.FIELD_RATE] * run.time + links.drive[rigid_links.FIELD_PHASE])
 
 
-def _in_field(links: Acting, vectors: Samples) -> Samples:
+def _in_field(links: FreeRobot, vectors: Samples) -> Samples:
     """Vectors of the lab along the axis about which the field turns, and across it as y and z are to x, (n, 3)."""
     side, up = links.drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE]
     axis = np.array([np.sqrt(1.0 - side**2 - up**2), side, up])
@@ -203,7 +204,7 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
     }
 
 
-def _magnetics(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
+def _magnetics(links: FreeRobot, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     """Where the moment and the robot's axis point against the field."""
     moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[rigid_links.FIELD_RATE]
     field = 0.5 * np.pi + _field_angle(links, run)
@@ -216,7 +217,7 @@ def _magnetics(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, S
     }
 
 
-def _potential(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
+def _potential(links: FreeRobot, run: Trajectory, rotation: Samples) -> Samples:
     """Energy of weight less buoyancy above the state at y = z = 0 and level, J."""
     weight, phase = links.weight, run.states[:, rigid_links.PHASE]
     cos, sin = np.cos(phase), np.sin(phase)
@@ -238,3 +239,21 @@ def _averages(dataset: xr.Dataset, on: Sequence[DutyInterval]) -> dict[str, tupl
     if "electrical_energy" in dataset:
         integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
     return run_averages(dataset["time"].values, integrals, on, by_turn=True)
+
+
+def run_attributes(prediction: Prediction) -> dict[str, Any]:
+    """Robot, model, friction, calibration, errors, settings, references and versions of a run."""
+    return {
+        "robot": prediction.robot.name,
+        "model": prediction.model.name,
+        "friction": prediction.friction,
+        "effective_friction": prediction.effective_friction,
+        "calibrated": int(prediction.calibrated),
+        **({"fitted_by": prediction.fitted_by} if prediction.fitted_by else {}),
+        "error_estimate": prediction.error_estimate,
+        "known_error": prediction.known_error,
+        **({} if prediction.model.error_against is None else {"error_against": prediction.model.error_against}),
+        "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
+        "references": " ".join(prediction.references),
+        "versions": versions(),
+    }

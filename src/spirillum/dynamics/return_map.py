@@ -14,23 +14,22 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Reach
-from spirillum.dynamics.tube_integration import TOLERANCE, observed_at, range_left, step_sizes, watched_limits
+from spirillum.dynamics.integration import Reach, observed_at, watched_limits
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_start import StartPlace, state_at
 from spirillum.errors import InputError
-from spirillum.kernels import rigid_links, tube_steps
+from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
-_SEARCHING = 10.0 * TOLERANCE
+_SEARCHING = 10.0 * TubeRobot.tolerance
 """Error of a step in time while a fixed place is looked for; it is settled at that of a run, as are its multipliers:
 one close to 1 says how slowly the place is approached."""
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
-_COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, kernel.STATES)]
+_COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, rigid_links.STATES)]
 """What counts from the start of a turn."""
 
 STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force", "offset")
@@ -64,39 +63,39 @@ class ReturnMap:
     """The robot, at its duty."""
     sign: float
     """Sense in which the tail turns in the lab."""
-    tolerance: float = TOLERANCE
+    tolerance: float = TubeRobot.tolerance
     """Error of a step over the sizes of the state's components."""
 
     def after(self, state: Samples) -> Turn:
         """The next turn of the tail from a state, (19,)."""
         robot, data = self.robot, self.robot.data
-        limits, sizes = watched_limits(robot, _NOWHERE), step_sizes(robot)
+        limits, sizes = watched_limits(robot, _NOWHERE), robot.step_sizes()
         y = state.copy()
         y[_COUNTED] = 0.0
-        memory = np.zeros(tube_steps.MEMORY)
-        memory[tube_steps.STEP] = _FIRST * robot.turn
-        gaps = np.ones(len(robot.names) + tube_steps.WATCHED)
-        increments, before = np.zeros((8, kernel.STATES)), y.copy()
-        tube_steps.watched(y, 0.0, data, limits, robot.roughness, gaps)
-        nothing, none = np.empty(0), np.empty((0, kernel.STATES))
+        memory = np.zeros(stiff_steps.MEMORY)
+        memory[stiff_steps.STEP] = _FIRST * robot.turn
+        gaps = np.ones(robot.gap_count + stiff_steps.WATCHED)
+        increments, before = np.zeros((8, rigid_links.STATES)), y.copy()
+        stiff_steps.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
+        nothing, none = np.empty(0), np.empty((0, rigid_links.STATES))
         begun = observed_at(robot, y)[kernel.TURN], y[rigid_links.PHASE]
         noted: list[tuple[float, ...]] = []
         while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
-            status, _ = tube_steps.advance(
+            status, _ = stiff_steps.advance(
                 np.inf, _ON, 1, self.tolerance, memory, y, before, increments, gaps, nothing, none, sizes,
                 limits, robot.roughness, data, robot.table,
             )  # fmt: skip
-            time = float(memory[tube_steps.TIME])
-            if status == tube_steps.STUCK:
+            time = float(memory[stiff_steps.TIME])
+            if status == stiff_steps.STUCK:
                 raise InputError("no step is small enough to follow the motion; allowed: a larger roughness")
-            if gaps[-tube_steps.WATCHED + tube_steps.INSIDE] < 0:
-                raise InputError(f"{range_left(robot, y, time, data)}; allowed: another start, or motion 'held'")
+            if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:
+                raise InputError(f"{robot.range_left(y, time)}; allowed: another start, or motion 'held'")
             if time > _STALLED * robot.turn:
                 raise InputError("the tail hardly turns there; allowed: a stronger drive, or motion 'held'")
             noted.append(_noted(time, y, data))
         end, share = self._at_the_angle(before, y, increments, begun)
-        last = float(memory[tube_steps.LAST_TIME])
-        time = last + share * (float(memory[tube_steps.TIME]) - last)
+        last = float(memory[stiff_steps.LAST_TIME])
+        time = last + share * (float(memory[stiff_steps.TIME]) - last)
         steps = np.array(noted)
         return Turn(end, time, steps[steps[:, 0] <= time])
 
@@ -112,10 +111,10 @@ class ReturnMap:
         """State and share of the last step at which the turn is complete."""
         from scipy.optimize import brentq
 
-        inner = np.empty(kernel.STATES)
+        inner = np.empty(rigid_links.STATES)
 
         def left(share: float) -> float:
-            tube_steps.interpolate(share, before, new, increments, inner)
+            stiff_steps.interpolate(share, before, new, increments, inner)
             return self._turned(inner, observed_at(self.robot, inner)[kernel.TURN], begun) - 2.0 * np.pi
 
         share = float(brentq(left, 0.0, 1.0, xtol=1e-13))

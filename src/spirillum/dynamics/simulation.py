@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.dynamics.averages import stretches_on, vertical_drift
+from spirillum.dynamics.axial_run import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
-from spirillum.dynamics.free_start import links_without_walls, resting_state
-from spirillum.dynamics.held import held_run
-from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
+from spirillum.dynamics.free_robot import TwoLinks
+from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.start import reach_of, turning_rate
+from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_field
-from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
 from spirillum.fitted.fit_notes import FITTED_HELD, fitted_of
@@ -28,7 +27,6 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.kernels import rigid_links
-from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
@@ -158,7 +156,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         steady = replace(steady, fitted_by=posterior_name or steady.fitted_by)
         if table is not None:
             return run_in_tube(steady, table, timing, there, touching, rough, about, weight, tell)
-        return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)
+        return axial_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)
 
     dataset = run(central, times, progress)
     if known is not None:
@@ -226,15 +224,15 @@ def _free_run(
     start = resting_state(steady.robot, links, placed)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
-    run = integrate(links, start, moments, switches, reach, progress)
+    run = integrate(links, start, moments, switches, reach, progress).require_completion()
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
     said = [*steady.warnings, *_left_out(steady, links, weight=weight), *unused]
     more = {}
-    if np.isfinite(links.wall[kernel.RADIUS]):
-        more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
-    attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
+    if links.is_walled:
+        more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.roughness
+    attrs = free_attributes(steady, links, run, reach, title, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     way = [*vertical_drift(dataset), *check_stokes_flow(steady.batch, limits).values()]

@@ -7,15 +7,16 @@ a hemisphere or fillet; a spheroid has one. The wire can touch at any of its cre
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.acting import Acting, drive_of, friction_of, torque_scale, weight_of
 from spirillum.dynamics.films import ROUGHNESS_SHARE
+from spirillum.dynamics.free_robot import FreeRobot, drive_of, friction_of, torque_scale, weight_of
 from spirillum.errors import InputError
-from spirillum.kernels import contacts, rigid_links
+from spirillum.kernels import contacts, rigid_links, tube_table
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
@@ -44,12 +45,14 @@ class Surroundings:
     """Coefficient of dry friction, 1."""
 
 
-@dataclass(frozen=True)
-class TubeRobot(Acting):
-    """What `spirillum.kernels.tube_motion` needs, SI, about the origin in body axes."""
+@dataclass(frozen=True, kw_only=True)
+class TubeRobot(FreeRobot):
+    """A robot in its tube: see `spirillum.kernels.tube_motion`."""
 
-    table: Samples
-    """The robot's table, see `spirillum.kernels.tube_table`."""
+    tolerance: ClassVar[float] = 1e-7
+    """Path and place of a minute in contact are then good to some parts in 1e7, energies to 1e-6; a tenth of it takes
+    two and a half times as long."""
+
     tube: Samples
     """The tube (8,), see `kernels.tube_motion`."""
     wire: Samples
@@ -62,12 +65,6 @@ class TubeRobot(Acting):
     """Imposed mean flow (k, 2)."""
     names: tuple[str, ...]
     """Names of the sites, and of the tail."""
-    length: float
-    """A length of the robot's order, m."""
-    torque: float
-    """A torque of the order of those that act, N m."""
-    turn: float
-    """Time of a turn of the tail at its steady rate, s."""
 
     @property
     def data(self) -> Samples:
@@ -75,6 +72,16 @@ class TubeRobot(Acting):
         return kernel.packed(
             self.friction, self.weight, self.drive, self.tube, self.wire, self.sites, self.stations, self.flow
         )
+
+    @property
+    def gap_count(self) -> int:
+        """Sites of body and coupling, and the wire."""
+        return len(self.names)
+
+    @property
+    def bends(self) -> Samples:
+        """Times of the imposed flow's rows, s."""
+        return np.asarray(self.flow[:, 0])
 
     @property
     def roughness(self) -> float:
@@ -86,6 +93,35 @@ class TubeRobot(Acting):
         found = np.empty(len(self.names))
         kernel.gaps_of(state, self.data, found)
         return found
+
+    def between(self, start: float, stop: float) -> Self:
+        """The robot with what of the imposed flow matters from one time to another: few rows are copied."""
+        first = max(int(np.searchsorted(self.bends, start, "right")) - 1, 0)
+        return replace(self, flow=self.flow[first : int(np.searchsorted(self.bends, stop, "left")) + 1])
+
+    def observe(self, time: Samples, states: Samples) -> Samples:
+        """What `spirillum.kernels.tube_motion` observes, (n, 26)."""
+        out = np.empty((time.size, kernel.OBSERVED))
+        kernel.observe(time, np.ascontiguousarray(states), self.data, self.table, out)
+        return out
+
+    def contact_event(self, place: int, *, touches: bool) -> str:
+        """Which part of the robot touches the wall, or leaves it."""
+        return f"{self.names[place]} {'touches' if touches else 'leaves'} the wall"
+
+    def range_left(self, state: Samples, time: float) -> str:
+        """A sentence on the range of the table that was left."""
+        seen = self.observe(np.array([time]), state[None])[0]
+        name = _RANGES.get(int(seen[rigid_links.OUTSIDE]), "place")
+        offset, pitch, yaw = seen[[kernel.OFFSET, kernel.WALL_PITCH, kernel.WALL_YAW]]
+        return (
+            f"the range of the robot's table in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
+            f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
+        )
+
+
+_RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
+"""What `resistance_at` says was left."""
 
 
 def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn: float, weight: bool) -> TubeRobot:

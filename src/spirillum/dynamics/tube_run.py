@@ -10,20 +10,21 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
-from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach
-from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.remote import Switch
-from spirillum.dynamics.run_file import numbers_of
-from spirillum.dynamics.start import reach_of
-from spirillum.dynamics.timing import Timetable
-from spirillum.dynamics.tube_integration import (
-    INTEGRATOR,
+from spirillum.dynamics.integration import (
+    BATTERY_EMPTY,
     INTERRUPTED,
     Checkpoint,
-    TubeTrajectory,
-    integrate_in_tube,
+    Event,
+    Progress,
+    Reach,
+    Trajectory,
+    integrate,
     observed_at,
 )
+from spirillum.dynamics.record import dataset_of, free_attributes
+from spirillum.dynamics.run_file import numbers_of
+from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
@@ -83,7 +84,7 @@ def tube_run(
     if isinstance(start, StartPlace):
         laid = laid_down(steady.robot, robot, start)
         check_roughness(robot.roughness, float(robot.gaps(laid).min()), steady.robot.body.diameter)
-        check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
+        check_in_table(robot, laid, observed_at(robot, laid)[rigid_links.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)
     else:
         first = _checkpoint(start)
@@ -93,7 +94,7 @@ def tube_run(
                 f"the run already ends at t = {moments[0]:.6g} s, and less than {_FEWEST} samples lie between it and "
                 f"{moments[-1]:.8g} s; allowed: a longer duration, to continue it"
             )
-    run = integrate_in_tube(robot, first, moments, times.switches, reach, progress)
+    run = integrate(robot, first, moments, times.switches, reach, progress)
     if run.time.size < _FEWEST:
         what = run.events[-1].what if run.events else "the equations have no next step"
         if isinstance(start, StartPlace):
@@ -107,7 +108,7 @@ def tube_run(
         said.append(f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}")
     said += times.said
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
-    attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
+    attrs = free_attributes(steady, robot, run, reach, title, said)
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
@@ -124,7 +125,7 @@ def _waited(
     """The state after waiting with the drive off, and what happened meanwhile, at negative times."""
     if wait <= 0.0:
         return state, ()
-    run = integrate_in_tube(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
+    run = integrate(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
     if run.time[-1] < 0.0:
         if run.events[-1].what == INTERRUPTED:
             raise KeyboardInterrupt
@@ -133,7 +134,7 @@ def _waited(
         )
     found = run.states[-1].copy()
     found[rigid_links.POSITION], found[rigid_links.ROLL] = state[rigid_links.POSITION], 0.0
-    found[rigid_links.CURRENT : kernel.STATES] = 0.0
+    found[rigid_links.CURRENT : rigid_links.STATES] = 0.0
     return found, tuple(event for event in run.events if not event.what.startswith("duty"))
 
 
@@ -145,8 +146,8 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
         time, step, state = float(found.time), float(found.step), np.array([float(value) for value in found.state])
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"the run has no checkpoint; {allowed}") from error
-    if len(state) != kernel.STATES:
-        raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {kernel.STATES}")
+    if len(state) != rigid_links.STATES:
+        raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {rigid_links.STATES}")
     quaternion = state[rigid_links.ATTITUDE : rigid_links.PHASE]
     sound = np.isfinite([time, step, *state]).all() and abs(float(np.linalg.norm(quaternion)) - 1.0) < _UNIT
     within = 0.0 <= time <= float(dataset["time"][-1]) and step > 0.0 and np.abs(state).max() <= _MOST
@@ -175,10 +176,10 @@ def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Ma
     }
 
 
-def series_in_tube(run: TubeTrajectory) -> dict[str, Samples]:
+def series_in_tube(run: Trajectory) -> dict[str, Samples]:
     """What a run in a tube has beside that of any free run, by name, each (n,); SI."""
     seen, states = run.observed, run.states
-    tail = seen[:, kernel.TAIL_GAP]
+    tail = seen[:, rigid_links.TAIL_GAP]
     return {
         "offset": seen[:, kernel.OFFSET],
         "azimuth": np.unwrap(seen[:, kernel.AZIMUTH]),
@@ -189,13 +190,13 @@ def series_in_tube(run: TubeTrajectory) -> dict[str, Samples]:
         "contact_force": seen[:, kernel.CONTACT_FORCE],
         "contact_friction": seen[:, kernel.CONTACT_FRICTION],
         "contact_power": seen[:, kernel.CONTACT_POWER],
-        "contact_energy": states[:, kernel.CONTACT],
+        "contact_energy": states[:, rigid_links.CONTACT],
         "mean_flow": seen[:, kernel.MEAN_FLOW],
-        "flow_energy": states[:, kernel.FLOW],
+        "flow_energy": states[:, rigid_links.FLOW],
     }
 
 
-def _in_the_tube(run: TubeTrajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
+def _in_the_tube(run: Trajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
     """These, the azimuth counted on from the run that is continued."""
     found = series_in_tube(run)
     if not isinstance(start, StartPlace):

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.start import start_phase, turning_rate
-from spirillum.dynamics.table_check import held_against_check, held_by_friction
-from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
-from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.table import TubeTable, least_checked_gap
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels.tube_table import largest_yaw
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
@@ -306,3 +305,77 @@ def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | N
         roughness=roughness,
         coefficient=FRICTION_COEFFICIENT if asked.friction_coefficient is None else asked.friction_coefficient,
     )
+
+
+class Checked(NamedTuple):
+    """What the stated error of a table says of a motion."""
+
+    known: bool
+    """Whether the motion keeps to yaws at which the table was checked."""
+    near: bool
+    """Whether it comes nearer to the glass than where the table was checked."""
+    said: list[str]
+    """What there is to say of both, a sentence each."""
+
+
+def held_against_check(
+    table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
+) -> Checked:
+    """Hold the places of a motion against those at which its table was checked.
+
+    Args:
+        table: the packed table.
+        gap: smallest distance of body and wall, (n,), m.
+        offset: of the body's mid-length from the tube's axis, (n,), m.
+        pitch: nose up, (n,), rad.
+        yaw: nose to the side, (n,), rad.
+        time: of the places, (n,), s, where one differs from another; None: a motion that repeats itself.
+    """
+    said = []
+    checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
+    beyond = np.flatnonzero(np.abs(yaw) > checked)
+    if beyond.size:
+        most = beyond[np.argmax(np.abs(yaw[beyond]))]
+        said.append(
+            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg against the wall, and "
+            f"its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
+        )
+    least = least_checked_gap(table)
+    near = np.flatnonzero(gap < least)
+    if near.size and not beyond.size:
+        said.append(
+            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked at gaps from "
+            f"{_length(least)} on: the error estimate is that of such places"
+        )
+    return Checked(not beyond.size, bool(near.size), said)
+
+
+def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[str]:
+    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
+
+    Args:
+        robot: what its rates in the tube follow from.
+        forward: mean forward velocity, m/s.
+        turning: mean speed of the body's surface by its rotation, m/s.
+        contact_force: mean force of the asperities, N.
+    """
+    smoothed = float(robot.tube[kernel.SLIDING])
+    if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
+        return []
+    return [
+        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
+        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
+        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
+    ]
+
+
+def _falls(time: Samples | None, first: int) -> str:
+    return "its least gap within a turn is" if time is None else f"{_from(time, first)}its gap falls to"
+
+
+def _from(time: Samples | None, first: int) -> str:
+    return "" if time is None else f"from {float(time[first]):.3g} s on "
+
+
+def _length(value: float) -> str:
+    return show(float(f"{value:.2g}"), "mm" if value >= 1e-4 else "um")

@@ -87,7 +87,7 @@ def state_at(start: StartPlace, offset: float) -> Samples:
     """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, in place of the start's gap."""
     from scipy.spatial.transform import Rotation
 
-    state = np.zeros(kernel.STATES)
+    state = np.zeros(rigid_links.STATES)
     turned = Rotation.from_euler("XZY", [start.azimuth, start.yaw, -start.pitch])
     state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = turned.as_quat(scalar_first=True)
     state[rigid_links.PHASE] = start.phase

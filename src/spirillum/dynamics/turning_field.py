@@ -8,13 +8,13 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.acting import Acting
+from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.robot.arguments import Options
 from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 
-_A = TypeVar("_A", bound=Acting)
+_A = TypeVar("_A", bound=FreeRobot)
 
 
 class Field(Options):
@@ -49,7 +49,7 @@ class TurningField:
     """Angle at time 0 at this rate, from up, rad."""
 
     @classmethod
-    def of(cls, links: Acting) -> TurningField | None:
+    def of(cls, links: FreeRobot) -> TurningField | None:
         """The field of a robot's file; None for another drive."""
         if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
             return None

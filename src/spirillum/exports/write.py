@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.held_model import PARAMETERS, HeldModel, check_steady, held_model
+from spirillum.dynamics.axial_robot import PARAMETERS, AxialRobot, axial_robot
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports.mjcf import FLUID_WARNING, check_inertia, mjcf_text
@@ -229,7 +229,7 @@ class Export(DisplayMixin):
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
-    held: HeldModel | None = None
+    held: AxialRobot | None = None
     """Of an FMU: the equations in it."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -308,8 +308,8 @@ def export(
     if target.suffix == ".fmu":
         if angle or fineness != 1.0 or unit is not None or sidecar is not None:
             raise InputError("phase, fineness, unit or sidecar with .fmu; allowed: only for the robot's shape")
-        held = held_model(robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
-        return _unit_of(held, target)
+        axial = axial_robot(robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
+        return _unit_of(axial, target)
     if any(given is not None for given in of_held):
         raise InputError(
             f"friction, calibration or a placement (gap, pitch, flow) with {target.suffix}; allowed: only with .fmu"
@@ -358,25 +358,25 @@ def _shape_of(
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
 
 
-def _unit_of(held: HeldModel, target: Path) -> Export:
+def _unit_of(axial: AxialRobot, target: Path) -> Export:
     """An FMU, written."""
-    from spirillum.exports.fmu.build import fmu_bytes
+    from spirillum.interfaces.fmu import fmu_bytes
 
-    robot = held.robot
-    inertia = check_steady(held, 1.0, held.flow or 0.0)  # the duty is an input of the unit
-    _commit(target, {target.name: fmu_bytes(held)})
-    warnings = tuple(dict.fromkeys((*held.prediction.warnings, *inertia)))
+    robot = axial.robot
+    inertia = axial.check_steady(1.0, axial.flow or 0.0)  # the duty is an input of the unit
+    _commit(target, {target.name: fmu_bytes(axial)})
+    warnings = tuple(dict.fromkeys((*axial.prediction.warnings, *inertia)))
     files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
-    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, held)
+    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, axial)
 
 
-def _equations(held: HeldModel) -> dict[str, Any]:
+def _equations(axial: AxialRobot) -> dict[str, Any]:
     """Where the numbers of an FMU are from, and which they are."""
-    numbers = zip(PARAMETERS, held.values, strict=True)
+    numbers = zip(PARAMETERS, axial.values, strict=True)
     return {
-        **held.prediction.answered_by,
-        "friction": held.prediction.friction,
-        "inputs": ["remote", "duty", *(["mean_flow"] if held.flow is not None else [])],
+        **axial.prediction.answered_by,
+        "friction": axial.prediction.friction,
+        "inputs": ["remote", "duty", *(["mean_flow"] if axial.flow is not None else [])],
         "parameters": {item.name: quantity(value, item.unit, meaning=item.meaning) for item, value in numbers},
     }
 

@@ -31,7 +31,7 @@ def _lead(seen: np.ndarray, _task: TaskEnvironment) -> np.ndarray:
 
 
 def _own(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:
-    return np.full((len(seen), 1), task.plants.held.duty)
+    return np.full((len(seen), 1), task.plants.axial.duty)
 
 
 def _integral(seen: np.ndarray, task: TaskEnvironment) -> np.ndarray:

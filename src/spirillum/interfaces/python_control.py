@@ -1,4 +1,4 @@
-"""The held robot as a system of the library python-control, with named signals, and linearised at a stated point."""
+"""The robot in axial motion as a system of python-control with named signals, and linearised at a stated point."""
 
 from __future__ import annotations
 
@@ -12,8 +12,18 @@ import numpy as np
 from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
-from spirillum.dynamics.held_model import STATES, HeldModel, check_steady, held_model
+from spirillum.dynamics.axial_robot import (
+    INPUTS,
+    OUTPUTS,
+    PARAMETERS,
+    STATES,
+    AxialRobot,
+    axial_robot,
+    outputs,
+    rates,
+    slopes,
+    steady_current,
+)
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
 from spirillum.optional_dependencies import import_optional
@@ -62,11 +72,11 @@ def control_system(
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> control.NonlinearIOSystem:
-    """A robot held to its channel's axis as a system of python-control (extra `control`).
+    """A robot in axial motion as a system of python-control (extra `control`).
 
     Inputs are `duty`, 0 (off) to 1, and with an imposed flow `mean_flow`, m/s; states and outputs are quantities of the
     registry by name, SI, rates signed about +x. A duty beyond its range is taken at its end, as the drive does. The
-    system's `params` are the robot's numbers, see `held_model.PARAMETERS`, and can be changed in a response.
+    system's `params` are the robot's numbers, see `axial_robot.PARAMETERS`, and can be changed in a response.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
@@ -81,18 +91,18 @@ def control_system(
             python-control is not installed; in a response, for an input that is no number.
     """
     library = import_optional("control", "a system of python-control", "control")
-    held = held_model(
+    axial = axial_robot(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
-    check_steady(held, 1.0, held.flow or 0.0)
+    axial.check_steady(1.0, axial.flow or 0.0)
     return library.nlsys(
-        lambda _t, x, u, params: rates(params, float(x[0]), *_inputs_of(u)),
-        lambda _t, x, u, params: outputs(params, x, *_inputs_of(u)),
-        name=held.robot.name,
-        inputs=_inputs(held),
+        lambda _t, x, u, params: rates(_numbers(params), float(x[0]), *_inputs_of(u)),
+        lambda _t, x, u, params: outputs(_numbers(params), x, *_inputs_of(u)),
+        name=axial.robot.name,
+        inputs=_inputs(axial),
         states=list(STATES),
         outputs=list(OUTPUTS),
-        params=held.parameters,
+        params=axial.parameters,
     )
 
 
@@ -107,7 +117,7 @@ def linear_system(
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> LinearSystem:
-    """A robot held to its channel's axis, linearised in closed form where a duty and a flow have become steady.
+    """A robot in axial motion, linearised in closed form where a duty and a flow have become steady.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
@@ -124,27 +134,27 @@ def linear_system(
             installed.
     """
     library = import_optional("control", "a system of python-control", "control")
-    held = held_model(
+    axial = axial_robot(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
-    at_duty = held.duty if duty is None else as_number(duty)
+    at_duty = axial.duty if duty is None else as_number(duty)
     if not 0.0 <= at_duty <= 1.0:
         raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
-    if flow is not None and held.flow is None:
+    if flow is not None and axial.flow is None:
         raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
-    at_flow = (held.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
-    inertia = check_steady(held, at_duty, at_flow)
-    numbers = held.parameters
-    current = steady_state(numbers, at_duty, at_flow)
+    at_flow = (axial.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
+    inertia = axial.check_steady(at_duty, at_flow)
+    numbers = axial.numbers
+    current = steady_current(numbers, at_duty, at_flow)
     a, b, c, d = slopes(numbers, current, at_duty)
-    inputs = _inputs(held)
+    inputs = _inputs(axial)
     count = len(inputs)
     system = library.ss(
         a,
         b[:, :count],
         c,
         d[:, :count],
-        name=held.robot.name,
+        name=axial.robot.name,
         inputs=inputs,
         states=list(STATES),
         outputs=list(OUTPUTS),
@@ -155,12 +165,12 @@ def linear_system(
         inputs=dict(zip(inputs, (at_duty, at_flow), strict=False)),
         outputs=dict(zip(OUTPUTS, steady.tolist(), strict=True)),
         time_constant=-1.0 / float(a[0, 0]),
-        warnings=tuple(dict.fromkeys((*held.prediction.warnings, *inertia))),
+        warnings=tuple(dict.fromkeys((*axial.prediction.warnings, *inertia))),
     )
 
 
-def _inputs(held: HeldModel) -> list[str]:
-    return [INPUTS[0]] if held.flow is None else list(INPUTS)
+def _inputs(axial: AxialRobot) -> list[str]:
+    return [INPUTS[0]] if axial.flow is None else list(INPUTS)
 
 
 def _inputs_of(u: Samples) -> tuple[float, float]:
@@ -169,3 +179,8 @@ def _inputs_of(u: Samples) -> tuple[float, float]:
         name = INPUTS[int(np.flatnonzero(~np.isfinite(u))[0])]
         raise InputError(f"{name} = {float(u[~np.isfinite(u)][0])}; allowed: a number")
     return min(max(float(u[0]), 0.0), 1.0), float(u[1]) if len(u) > 1 else 0.0
+
+
+def _numbers(params: Mapping[str, float]) -> Samples:
+    """A system's parameters in the order of `PARAMETERS`."""
+    return np.array([params[item.name] for item in PARAMETERS])

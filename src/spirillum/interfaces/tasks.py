@@ -1,4 +1,4 @@
-"""Tasks to learn: many held robots in the laboratory of `sp.control`, one time step at a time, as plain arrays.
+"""Tasks to learn: robots in axial motion in the laboratory of `sp.control`, one time step at a time, as plain arrays.
 
 A step is one frame of the camera. What an agent sees is the frame that the camera's latency lets through, with its
 errors; what it commands reaches the drive after the remote's delay, or not at all. Nothing here knows Gymnasium.
@@ -16,9 +16,9 @@ import numpy as np
 from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
-from spirillum.dynamics.held_plants import HeldPlants
+from spirillum.dynamics.axial_batch import AxialBatch
 from spirillum.errors import InputError
-from spirillum.kernels import held_motor as kernel
+from spirillum.kernels import axial_motor as kernel
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -97,7 +97,7 @@ class TaskEnvironment(ABC):
             friction: reading of the friction; None: the robot's own.
             placement: where the robots are held, for `tube`.
             lab: camera, meter, remote, pulse, and how unknown the friction is, as for `sp.control`.
-            ranges: what robots are drawn from besides, see `HeldPlants`; a range of `friction` instead of the lab's.
+            ranges: what robots are drawn from besides, see `AxialBatch`; a range of `friction` instead of the lab's.
             posterior: file of a calibration's posterior, from whose draws they are taken.
             goal: least and largest goal, between which goals are drawn evenly; None: those of the task.
             duration: of an episode, with its unit or a float in s.
@@ -114,7 +114,7 @@ class TaskEnvironment(ABC):
         factor = self.lab.unknown.friction_factor
         known = posterior is not None or factor == 1.0
         drawn = {**({} if known else {"friction": (1.0 / factor, factor)}), **(ranges or {})}
-        self.plants = HeldPlants(
+        self.plants = AxialBatch(
             loaded, count, model=chosen, friction=friction, placement=placed, ranges=drawn, posterior=posterior
         )
         self.steps = np.zeros(count, dtype=np.int64)
@@ -209,13 +209,13 @@ class TaskEnvironment(ABC):
         if len(values) != self.count or not allowed.all():
             words = "0 (off) or 1 (on)" if self.on_off else "a duty from 0 to 1"
             raise InputError(f"action = {str(actions)[:40]}; allowed: {words} for each of {self.count} robots")
-        return values * self.plants.held.duty if self.on_off else values
+        return values * self.plants.axial.duty if self.on_off else values
 
     def _flow(self) -> Samples | None:
-        if self.plants.held.flow is None:
+        if self.plants.axial.flow is None:
             return None
         since = self.plants.time + 0.5 * self.dt - self._pulse_start
-        return self.plants.held.flow + np.where((since >= 0.0) & (since < self.lab.pulse.duration), self._pulse, 0.0)
+        return self.plants.axial.flow + np.where((since >= 0.0) & (since < self.lab.pulse.duration), self._pulse, 0.0)
 
     def _film(self, rng: np.random.Generator) -> None:
         """A new frame: the last row of the frames; one that is lost shows what the one before did."""
@@ -277,7 +277,7 @@ class HoldSpeed(TaskEnvironment):
         return np.abs(self.speed / self.goal - 1.0)
 
     def _goal_scale(self) -> float:
-        return self.plants.held.prediction.forward_velocity
+        return self.plants.axial.prediction.forward_velocity
 
     def _observation(self, rng: np.random.Generator) -> list[Samples]:
         noise = self.lab.meter.current_noise * rng.standard_normal(self.count)

@@ -19,7 +19,8 @@ PHASE, ROLL = 7, 8  # tail angle phi against the body; integral of Omega_x, rad
 CURRENT = 9  # I in the motor's own sense, A
 ELECTRICAL, RESISTIVE, CONVERSION, CHARGE = 10, 11, 12, 13  # integrals of powers, J, and of the battery's current, A s
 DRIVEN, FRICTION, DISSIPATED = 14, 15, 16  # work of the drive's torque on both links, and where it goes, J
-STATES = 17
+CONTACT, FLOW = 17, 18  # work of dry friction, and of an imposed flow, J; zero outside a tube
+STATES = 19
 
 # What is observed: the seven rates first.
 VELOCITY, ROTATION, JOINT = 0, 3, 6  # U, m/s; Omega_b, rad/s, body axes; omega_m, rad/s
@@ -27,6 +28,8 @@ DRIVE_TORQUE, FILM = 7, 8  # N m; thinnest film, m
 FRICTION_POWER, DISSIPATED_POWER, DRIVE_POWER = 9, 10, 11  # W; the last of field and drive
 PRESSED = 12  # energy of pressed roughness, J
 OBSERVED = 13
+TAIL_GAP, OUTSIDE = 18, 24  # what the integrator reads besides, see `tube_motion`
+SEEN = 26  # places of all that is observed, wherever the robot swims
 
 # The drive.
 KIND, FIXED, DUTY = 0, 1, 2  # one of the kinds below; whether the joint is fixed; duty of the remote
@@ -191,7 +194,10 @@ def solved(a: Samples, b: Samples) -> None:
 
 @compiled
 def derivative(dy: Samples, y: Samples, drive: Samples, rotation: Samples, out: Samples) -> None:
-    """Write the time derivative of the state into `dy`, from the rates and powers in `out`; axes in `rotation`."""
+    """Write the time derivative of the state into `dy`, from the rates and powers in `out`; axes in `rotation`.
+
+    The works of a tube, behind the others, are left alone.
+    """
     for i in range(3):
         dy[i] = rotation[i, 0] * out[0] + rotation[i, 1] * out[1] + rotation[i, 2] * out[2]
     w, i, j, k = y[ATTITUDE], y[ATTITUDE + 1], y[ATTITUDE + 2], y[ATTITUDE + 3]

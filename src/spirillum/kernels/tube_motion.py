@@ -39,20 +39,25 @@ from spirillum.kernels.contacts import (
 )
 from spirillum.kernels.dry_friction import balanced, sliding_force
 from spirillum.kernels.rigid_links import (
+    CONTACT,
     DRIVE,
     DRIVE_TORQUE,
     DUTY,
     FILM,
     FIXED,
+    FLOW,
     GIVEN,
     JOINT,
     KIND,
     MAGNETIC,
+    OUTSIDE,
     PHASE,
     POSITION,
     PRESSED,
     RATE,
     ROTATION,
+    SEEN,
+    TAIL_GAP,
     WEIGHT,
     assembled,
     axes,
@@ -63,21 +68,15 @@ from spirillum.kernels.rigid_links import (
     turned,
     weight_loads,
 )
-from spirillum.kernels.rigid_links import OBSERVED as OF_LINKS
-from spirillum.kernels.rigid_links import STATES as STATES_OF_LINKS
 from spirillum.kernels.tube_table import resistance_at
-
-# The state of `rigid_links`, and behind it:
-CONTACT, FLOW = 17, 18  # work of dry friction, and of the imposed flow, J
-STATES = STATES_OF_LINKS + 2
 
 # What is observed, behind that of `rigid_links`; FILM is the smallest gap of the body.
 CONTACT_FORCE, CONTACT_FRICTION = 13, 14  # normal and tangential, sums over contacts, N
 CONTACT_POWER, FLOW_POWER = 15, 16  # lost to dry friction, and from the imposed flow, W
-MEAN_FLOW, TAIL_GAP = 17, 18  # m/s; smallest gap of the wire, m, where it is near the wall
+MEAN_FLOW = 17  # m/s; behind it TAIL_GAP, the smallest gap of the wire, m, where it is near the wall
 OFFSET, AZIMUTH, WALL_PITCH, WALL_YAW, TURN = 19, 20, 21, 22, 23  # e, A, p, psi; roll of the body against F
-OUTSIDE, BALANCE = 24, 25  # 0 inside the table, else which range was left; what the solution leaves of the forces, 1
-OBSERVED = OF_LINKS + 13
+BALANCE = 25  # what the solution leaves of the forces, 1; before it OUTSIDE, 0 inside the table, else the range left
+OBSERVED = SEEN
 
 # The tube.
 RADIUS, ROUGHNESS, LOAD = 0, 1, 2  # R, m; s, m; load at half of it, N

@@ -18,19 +18,25 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.rigid_links import (
+    CONTACT,
     DRIVE,
     DRIVE_TORQUE,
     DUTY,
     FILM,
     FIXED,
+    FLOW,
     JOINT,
     KIND,
     MAGNETIC,
+    OBSERVED,
+    OUTSIDE,
     PHASE,
     POSITION,
     PRESSED,
     ROTATION,
+    SEEN,
     STATES,
+    TAIL_GAP,
     WEIGHT,
     assembled,
     axes,
@@ -55,7 +61,9 @@ FILM_RESISTANCE, FILM_POWER, FILM_REACH = 3, 4, 5  # c, N s/m; p; H, m
 RING = 6
 
 # The work space, and what `packed` puts behind it.
-_OUT, _ROTATION, _WORK = 139, 152, 161
+_OUT, _ROTATION = 0, SEEN
+_BALANCE = _ROTATION + 9
+_WORK = _BALANCE + 132
 _DRAG = _WORK
 _FRICTION = _DRAG + 49
 _WEIGHT = _FRICTION + 49
@@ -163,7 +171,7 @@ def _motion(
     out: Samples,
     work: Samples,
 ) -> None:
-    """Write what is in `OBSERVED` for a state."""
+    """Write what is observed in a state."""
     a, fluid = work[0:49].reshape(7, 7), work[49:98].reshape(7, 7)
     b, force, field = work[98:112].reshape(7, 2), work[112:119], work[119:126]
     fixed = drive[FIXED] != 0.0
@@ -185,7 +193,7 @@ def _motion(
     torque = drive_torque(y, drive, b[3, 0] + b[6, 0], b[3, 1] + b[6, 1])  # the joint's rate is 0 where it is fixed
     for i in range(7):
         out[i] = b[i, 0] + torque * b[i, 1]
-    out[DRIVE_TORQUE] = torque
+    out[DRIVE_TORQUE], out[TAIL_GAP], out[OUTSIDE] = torque, math.inf, 0.0
     powers(fluid, friction, field, torque * out[along], out)
 
 
@@ -199,23 +207,23 @@ def rates(dy: Samples, time: float, y: Samples, data: Samples) -> None:
         y: the state, see the constants of this module.
         data: from `packed`; it holds the work space too, and serves one caller at a time.
     """
-    work = data[:_WORK]
+    out, rotation, work = data[_OUT:_ROTATION], data[_ROTATION:_BALANCE].reshape(3, 3), data[_BALANCE:_WORK]
     drag, friction = data[_DRAG:_FRICTION].reshape(7, 7), data[_FRICTION:_WEIGHT].reshape(7, 7)
     weight, wall = data[_WEIGHT:_WALL], data[_WALL:_DRIVE]
     drive, spots = data[_DRIVE:_RINGS], data[_RINGS:].reshape(-1, RING)
-    out, rotation = work[_OUT:_ROTATION], work[_ROTATION:_WORK].reshape(3, 3)
     _motion(time, y, drag, friction, weight, wall, spots, drive, rotation, out, work)
     derivative(dy, y, drive, rotation, out)
+    dy[CONTACT] = dy[FLOW] = 0.0
 
 
 @compiled
 def observe(time: Samples, states: Samples, data: Samples, out: Samples) -> None:
     """Write what is in `OBSERVED` for samples of one stretch between switchings into the rows of `out`."""
-    work, dy = data[:_WORK], np.empty(STATES)
+    dy = np.empty(STATES)
     for row in range(time.size):
         rates(dy, time[row], states[row], data)
-        for column in range(_ROTATION - _OUT):
-            out[row, column] = work[_OUT + column]
+        for column in range(OBSERVED):
+            out[row, column] = data[_OUT + column]
 
 
 @compiled
@@ -227,3 +235,9 @@ def thinnest_film(y: Samples, wall: Samples, spots: Samples) -> float:
     for c in range(spots.shape[0]):
         thinnest = min(thinnest, film_of(y, rotation, wall, spots[c], j))
     return thinnest
+
+
+@compiled
+def gaps_of(y: Samples, data: Samples, gaps: Samples) -> None:
+    """Thinnest film between the wall and the robot, from the tips of the roughness, m; infinite without a wall."""
+    gaps[0] = thinnest_film(y, data[_WALL:_DRIVE], data[_RINGS:].reshape(-1, RING))

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples, Values
+from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.simulation import simulate
-from spirillum.dynamics.tube_integration import INTERRUPTED
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch

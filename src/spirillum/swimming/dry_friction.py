@@ -55,7 +55,7 @@ def with_dry_friction(r: AxialWhole, force: Values, radius: Values, tail_rate: V
         radius: a, m, (...).
         tail_rate: omega, rad/s, (...).
     """
-    from spirillum.kernels.held_contact import contact_drag  # compiled: loaded where there is dry friction
+    from spirillum.kernels.axial_contact import contact_drag  # compiled: loaded where there is dry friction
 
     shape = np.broadcast_shapes(r.shape[:-2], *(np.shape(item) for item in (force, radius, tail_rate)))
     # Copies: for arrays that cannot be written to the loop would be compiled again.

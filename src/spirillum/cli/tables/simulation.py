@@ -19,7 +19,7 @@ from spirillum.cli.tables.parts import (
     show_placement,
     show_reason,
 )
-from spirillum.dynamics.events import told
+from spirillum.dynamics.run_summary import told
 from spirillum.envelope import quantity
 from spirillum.units import display_unit, in_unit
 

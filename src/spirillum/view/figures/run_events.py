@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.events import told
+from spirillum.dynamics.run_summary import told
 from spirillum.view.figures.style import plain
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from spirillum.display import fitted_words
-from spirillum.dynamics.held_equations import OUTPUTS
-from spirillum.dynamics.held_model import PARAMETERS, HeldModel
+from spirillum.dynamics.axial_robot import OUTPUTS, PARAMETERS, AxialRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
 from spirillum.quantities import QUANTITIES
@@ -56,7 +55,7 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: power for base, power in found.items() if power}
 
 
-SOURCE = "held_robot.c"
+SOURCE = "axial_robot.c"
 """Name of the C source."""
 _REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
 """Value references, which the C source knows too."""
@@ -75,26 +74,26 @@ class _Variable(NamedTuple):
     start: str = ""
 
 
-def identifier_of(held: HeldModel) -> str:
+def identifier_of(axial: AxialRobot) -> str:
     """The robot's name as C takes it."""
-    return re.sub(r"\W", "_", f"robot_{held.robot.name}", flags=re.ASCII)[:100]
+    return re.sub(r"\W", "_", f"robot_{axial.robot.name}", flags=re.ASCII)[:100]
 
 
-def token_of(held: HeldModel, source: bytes) -> str:
+def token_of(axial: AxialRobot, source: bytes) -> str:
     """What an importer has to know to instantiate the FMU: a checksum of its numbers and its source."""
-    said = repr((held.robot.name, held.values, held.flow, held.duty)).encode()
+    said = repr((axial.robot.name, axial.values, axial.flow, axial.duty)).encode()
     return "{" + hashlib.sha256(said + source).hexdigest()[:32] + "}"
 
 
-def header_text(held: HeldModel, token: str) -> str:
+def header_text(axial: AxialRobot, token: str) -> str:
     """The robot for the C source: `robot.h`."""
     values = ",\n".join(
-        f"    {value!r} /* {item.name}, {item.unit} */" for item, value in zip(PARAMETERS, held.values, strict=True)
+        f"    {value!r} /* {item.name}, {item.unit} */" for item, value in zip(PARAMETERS, axial.values, strict=True)
     )
     lines = "{ \\\n" + values.replace("\n", " \\\n") + " \\\n}"
     return (
-        f'#define TOKEN "{token}"\n#define FLOW_INPUT {int(held.flow is not None)}\n'
-        f"#define START_DUTY {held.duty!r}\n#define START_FLOW {held.flow or 0.0!r}\n#define VALUES {lines}\n"
+        f'#define TOKEN "{token}"\n#define FLOW_INPUT {int(axial.flow is not None)}\n'
+        f"#define START_DUTY {axial.duty!r}\n#define START_FLOW {axial.flow or 0.0!r}\n#define VALUES {lines}\n"
     )
 
 
@@ -107,16 +106,16 @@ def build_text(identifier: str) -> str:
     return _text(root)
 
 
-def description_text(held: HeldModel, token: str) -> str:
+def description_text(axial: AxialRobot, token: str) -> str:
     """`modelDescription.xml` of FMI 3.0."""
-    prediction, variables = held.prediction, _variables(held)
+    prediction, variables = axial.prediction, _variables(axial)
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="3.0",
-        modelName=held.robot.name,
+        modelName=axial.robot.name,
         instantiationToken=token,
         description=(
-            f"{held.robot.name}, held to the axis of its channel: model {prediction.model.name}, friction "
+            f"{axial.robot.name}, held to the axis of its channel: model {prediction.model.name}, friction "
             f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
         generationTool=f"spirillum {own_version()}",
@@ -125,7 +124,7 @@ def description_text(held: HeldModel, token: str) -> str:
     ET.SubElement(
         root,
         "CoSimulation",
-        modelIdentifier=identifier_of(held),
+        modelIdentifier=identifier_of(axial),
         canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
@@ -154,24 +153,24 @@ def description_text(held: HeldModel, token: str) -> str:
     return _text(root)
 
 
-def _variables(held: HeldModel) -> list[_Variable]:
+def _variables(axial: AxialRobot) -> list[_Variable]:
     duty = QUANTITIES["duty"]
     found = [
         _Variable("Float64", "time", 0, "independent", "continuous", "time", "s"),
         _Variable("Boolean", "remote", _REMOTE, "input", "discrete", "remote: the drive is on", start="true"),
         _Variable(
-            "Float64", "duty", _DUTY, "input", "continuous", f"{duty.meaning}, 0 to 1", "1", start=repr(held.duty)
+            "Float64", "duty", _DUTY, "input", "continuous", f"{duty.meaning}, 0 to 1", "1", start=repr(axial.duty)
         ),
     ]
-    if held.flow is not None:
+    if axial.flow is not None:
         flow = QUANTITIES["mean_flow"]
         found.append(
-            _Variable("Float64", flow.name, _FLOW, "input", "continuous", flow.meaning, flow.unit, repr(held.flow))
+            _Variable("Float64", flow.name, _FLOW, "input", "continuous", flow.meaning, flow.unit, repr(axial.flow))
         )
     for place, name in enumerate(OUTPUTS):
         item = QUANTITIES[name]
         found.append(_Variable("Float64", name, _FIRST_OUTPUT + place, "output", "continuous", item.meaning, item.unit))
-    for place, (parameter, value) in enumerate(zip(PARAMETERS, held.values, strict=True)):
+    for place, (parameter, value) in enumerate(zip(PARAMETERS, axial.values, strict=True)):
         reference = _FIRST_PARAMETER + place
         found.append(
             _Variable(
@@ -214,15 +213,15 @@ def compiler() -> str:
     )
 
 
-def fmu_bytes(held: HeldModel) -> bytes:
+def fmu_bytes(axial: AxialRobot) -> bytes:
     """The FMU of a robot: a zip archive with description, source and library."""
     source = files(__package__).joinpath(SOURCE).read_bytes()
-    token, name = token_of(held, source), identifier_of(held)
-    header = header_text(held, token).encode()
+    token, name = token_of(axial, source), identifier_of(axial)
+    header = header_text(axial, token).encode()
     system, ending = _LIBRARIES.get(sys.platform, ("linux", ".so"))
     machine = platform.machine().lower()
     contents = {
-        "modelDescription.xml": description_text(held, token).encode(),
+        "modelDescription.xml": description_text(axial, token).encode(),
         "sources/buildDescription.xml": build_text(name).encode(),
         f"sources/{SOURCE}": source,
         "sources/robot.h": header,

@@ -1,5 +1,5 @@
 /*
- * A robot that is held to its channel's axis, as a co-simulation FMU (FMI 3.0).
+ * A robot in axial motion, as a co-simulation FMU (FMI 3.0): the equations of `spirillum.dynamics.axial_robot`.
  *
  * With duty d, imposed mean flow U, polarity p and joint torque tau = K_m I:
  *

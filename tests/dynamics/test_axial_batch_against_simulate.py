@@ -1,4 +1,4 @@
-"""Batches of held robots: runs of `simulate`, convergence of order 4, and draws that are robots of their own."""
+"""Batches in axial motion: runs of `simulate`, convergence of order 4, and draws that are robots of their own."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import posteriors
 import spirillum as sp
-from spirillum.kernels import held_motor as kernel
+from spirillum.kernels import axial_motor as kernel
 
 WIDE = "biorob2012-wide"
 IN_FLOW: dict[str, Any] = {"gap": "0.5 mm", "pitch": 0.0, "flow": 0.0}
@@ -25,7 +25,7 @@ LINEAR_CIRCUIT = {
 def test_steps_are_a_run_of_simulate(hand: str, dt: float) -> None:
     robot = sp.load(WIDE, **{"tail.handedness": hand, "friction.effective": "2e-6 N m s/rad"})
     run = sp.simulate(robot, model="rft", motion="held", timing={"duration": 0.6, "on": [(0.1, 0.3), (0.4, 0.6)]})
-    robots = sp.HeldPlants(robot, 3, model="rft")
+    robots = sp.AxialBatch(robot, 3, model="rft")
     for n in range(round(0.6 / dt)):
         time = (n + 0.5) * dt
         robots.step(dt, remote=0.1 < time < 0.3 or 0.4 < time < 0.6)
@@ -48,7 +48,8 @@ def integrated(p: np.ndarray, cycles: list[tuple[float, float]]) -> np.ndarray:
         voltage = supply * (p[kernel.VOLTAGE] - p[kernel.INTERNAL] * i)
         emf = p[kernel.EMF] * (p[kernel.TAIL] - p[kernel.BODY]) * torque
         of_current = (voltage - winding(i) * y[0] - emf) / p[kernel.INDUCTANCE]
-        return [of_current, *(p[name] * torque for name in (kernel.SPEED, kernel.TAIL, kernel.BODY)), supply * y[0]]
+        path = [p[name] * torque for name in (kernel.SPEED, kernel.TAIL, kernel.BODY)]
+        return [of_current, *path, supply * y[0], y[0] ** 2, winding(i) * y[0] ** 2]
 
     state = np.zeros(kernel.STATES)
     for time, duty in cycles:
@@ -73,7 +74,7 @@ CYCLES = {
 @pytest.mark.parametrize("robot", [WIDE, "biorob2012-narrow"])
 def test_switched_drives_agree_with_an_accurate_integration(robot: str, cycles: list[tuple[float, float]]) -> None:
     """All that is documented as good to 1e-6: the current relative to that at full duty, the others to themselves."""
-    robots = sp.HeldPlants(
+    robots = sp.AxialBatch(
         robot, 3, model="rft", ranges={"friction": (1 / 3, 3), "battery.voltage": (3.2, 4.2)}, seed=2
     )
     for time, duty in cycles:
@@ -87,7 +88,7 @@ def test_switched_drives_agree_with_an_accurate_integration(robot: str, cycles: 
 @pytest.mark.parametrize("dt", [0.001, 0.02, 0.1, 1.0])
 def test_linear_circuit_rises_exponentially(dt: float) -> None:
     robot = sp.load(WIDE, **LINEAR_CIRCUIT)
-    robots, steady = sp.HeldPlants(robot, 1, model="rft"), sp.predict(robot, model="rft")
+    robots, steady = sp.AxialBatch(robot, 1, model="rft"), sp.predict(robot, model="rft")
     resistance = 10.0 + 0.8 + 0.004 * steady.motor_rotation_rate / steady.motor_current
     robots.step(dt)
     rest, constant = 3.7 / resistance, 0.082 / resistance
@@ -97,7 +98,7 @@ def test_linear_circuit_rises_exponentially(dt: float) -> None:
 
 
 def test_error_falls_with_the_fourth_power_of_the_pieces() -> None:
-    robots = sp.HeldPlants(WIDE, 1, model="rft")
+    robots = sp.AxialBatch(WIDE, 1, model="rft")
     charges = []
     for fineness in (0.5, 1.0, 2.0, 16.0):
         state = np.zeros((1, kernel.STATES))
@@ -111,14 +112,14 @@ def test_error_falls_with_the_fourth_power_of_the_pieces() -> None:
 def test_drawn_robots_are_robots_of_their_own() -> None:
     """Twice the friction and 1.1 times the viscosity, by a factor and in the robot file; in a flow, too."""
     options: dict[str, Any] = {"model": "tube", "placement": IN_FLOW}
-    drawn = sp.HeldPlants(WIDE, 1, ranges={"friction": (2, 2), "viscosity": (1.1, 1.1)}, **options)
+    drawn = sp.AxialBatch(WIDE, 1, ranges={"friction": (2, 2), "viscosity": (1.1, 1.1)}, **options)
     own = sp.load(WIDE)
     fields = {"friction.effective": "1.4e-6 N m s/rad", "fluid.viscosity": f"{1.1 * own.fluid.viscosity!r} Pa s"}
-    np.testing.assert_allclose(drawn.numbers, sp.HeldPlants(sp.load(WIDE, **fields), 1, **options).numbers, rtol=1e-12)
+    np.testing.assert_allclose(drawn.numbers, sp.AxialBatch(sp.load(WIDE, **fields), 1, **options).numbers, rtol=1e-12)
 
 
 def test_flow_carries_robots_as_predict_says() -> None:
-    robots = sp.HeldPlants(WIDE, 2, model="tube", placement={**IN_FLOW, "flow": 1e-3})
+    robots = sp.AxialBatch(WIDE, 2, model="tube", placement={**IN_FLOW, "flow": 1e-3})
     robots.step(1.0)
     steady = sp.predict(WIDE, model="tube", placement={**IN_FLOW, "flow": 1e-3})
     assert robots.observe()["forward_velocity"][0] == pytest.approx(steady.forward_velocity, rel=1e-6)
@@ -132,7 +133,7 @@ def test_flow_carries_robots_as_predict_says() -> None:
 
 def test_ranges_are_kept_and_seeds_repeat() -> None:
     ranges = {"battery.voltage": (3.3, 3.7), "friction": (0.5, 2.0)}
-    first, again, other = (sp.HeldPlants(WIDE, 200, model="rft", ranges=ranges, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (sp.AxialBatch(WIDE, 200, model="rft", ranges=ranges, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.numbers, again.numbers)
     assert not np.array_equal(first.numbers, other.numbers)
     voltage = first.numbers[:, kernel.VOLTAGE]
@@ -160,7 +161,7 @@ def test_ranges_are_kept_and_seeds_repeat() -> None:
     ],
 )
 def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) -> None:
-    robots = sp.HeldPlants(WIDE, 2, model="rft")
+    robots = sp.AxialBatch(WIDE, 2, model="rft")
     with pytest.raises(sp.InputError, match=sentence):
         robots.step(**arguments)
     with pytest.raises(sp.InputError, match="which = "):
@@ -186,9 +187,9 @@ def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) 
 )
 def test_wrong_ranges_are_a_sentence(ranges: dict[str, Any], sentence: str) -> None:
     with pytest.raises(sp.InputError, match=sentence):
-        sp.HeldPlants(WIDE, 2, model="rft", ranges=ranges)
+        sp.AxialBatch(WIDE, 2, model="rft", ranges=ranges)
     with pytest.raises(sp.InputError, match="seed = -1; allowed: a whole number from 0"):
-        sp.HeldPlants(WIDE, 2, model="rft", seed=-1)
+        sp.AxialBatch(WIDE, 2, model="rft", seed=-1)
 
 
 def test_robots_of_a_posterior_are_those_of_predict(tmp_path: Path) -> None:
@@ -197,15 +198,27 @@ def test_robots_of_a_posterior_are_those_of_predict(tmp_path: Path) -> None:
     (friction,) = json.loads(about["friction"])
     sure = {**about, "friction": json.dumps([{**friction, "low": friction["value"], "high": friction["value"]}])}
     posteriors.write(tmp_path / "sure.nc", sure, np.full((4, 100), 2.0))
-    robots = sp.HeldPlants(WIDE, 5, model="sbt", posterior=tmp_path / "sure.nc")
+    robots = sp.AxialBatch(WIDE, 5, model="sbt", posterior=tmp_path / "sure.nc")
     robots.step(1.0)
     steady = sp.predict(WIDE, model="sbt", posterior=tmp_path / "sure.nc")
     np.testing.assert_allclose(robots.observe()["forward_velocity"], steady.forward_velocity, rtol=1e-6)
     posteriors.write(tmp_path / "wide.nc")
     ranges = {"battery.voltage": (3.7, 3.7)}
-    many = sp.HeldPlants(WIDE, 300, model="sbt", posterior=tmp_path / "wide.nc", ranges=ranges, seed=1)
+    many = sp.AxialBatch(WIDE, 300, model="sbt", posterior=tmp_path / "wide.nc", ranges=ranges, seed=1)
     many.step(1.0)
     speeds = many.observe()["forward_velocity"]
     assert len(np.unique(speeds)) > 100
     assert 0.005 < speeds.std() / speeds.mean() < 0.2
     assert np.all(many.numbers[:, kernel.VOLTAGE] == 3.7)
+
+
+def test_earlier_name_still_works_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match=r"spirillum\.HeldPlants is now spirillum\.AxialBatch"):
+        assert sp.HeldPlants is sp.AxialBatch
+
+
+def test_days_in_one_step_are_the_steady_state() -> None:
+    """Explicit steps alone would be unstable, or be millions."""
+    robots, steady = sp.AxialBatch(WIDE, 2, model="rft"), sp.predict(WIDE, model="rft")
+    robots.step(1e6)
+    assert robots.observe()["position"][0] == pytest.approx(1e6 * steady.forward_velocity, rel=1e-6)

@@ -1,8 +1,9 @@
-"""Steps in time of a robot in its tube by the linearly implicit method of `rosenbrock`, compiled.
+"""Steps in time of a free robot by the linearly implicit method of `rosenbrock`, compiled.
 
 Only place across the tube, attitude, tail phase and current act back on the rates: their columns of the Jacobian, by
 finite differences, are all it has; flow and field change with time besides. A step needs no iteration and no memory but
-its length, so that a run is continued exactly from the beginning of its last step.
+its length, so that a run is continued exactly from the beginning of its last step. The rates are those of `tube_motion`
+by the table of the robot in its tube, and with an empty table those of `two_links`.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.rigid_links import ATTITUDE, CHARGE, CURRENT, FILM, PHASE, POSITION
+from spirillum.kernels.rigid_links import ATTITUDE, CHARGE, CURRENT, FILM, OUTSIDE, PHASE, POSITION, STATES, TAIL_GAP
 from spirillum.kernels.rosenbrock import COEFFICIENTS, DENSE, GAMMA, NODES, STAGES, TIMES, WEIGHTS
-from spirillum.kernels.tube_motion import OUTSIDE, STATES, TAIL_GAP, gaps_of, rates
+from spirillum.kernels.tube_motion import gaps_of as gaps_in_tube
+from spirillum.kernels.tube_motion import rates as rates_in_tube
+from spirillum.kernels.two_links import gaps_of as films_of
+from spirillum.kernels.two_links import rates as rates_without_walls
 
 DONE, PAUSED, CROSSED, STUCK = 0, 1, 2, 3
 """The time was reached; the steps are used up; something watched has changed its sign in the last step; no step is
@@ -37,14 +41,29 @@ _ACTING = np.array(
     [POSITION + 1, POSITION + 2, ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, ATTITUDE + 3, PHASE, CURRENT], dtype=np.int64
 )
 _N = 8
+_WIDER = 30.0  # steps of central differences over those of differences to one side
 _SMALLEST = 1e-12  # step over the time that it would be without
 
 
 @compiled
-def watched(y: Samples, outside: float, data: Samples, limits: Samples, rough: float, gaps: Samples) -> float:
+def rates(dy: Samples, time: float, y: Samples, data: Samples, table: Samples) -> None:
+    """Write the time derivative of the state into `dy`, (19,)."""
+    if table.size > 0:
+        rates_in_tube(dy, time, y, data, table)
+    else:
+        rates_without_walls(dy, time, y, data)
+
+
+@compiled
+def watched(
+    y: Samples, outside: float, data: Samples, table: Samples, limits: Samples, rough: float, gaps: Samples
+) -> float:
     """Write what a run is watched for into `gaps`; the smallest gap."""
     sites = gaps.size - WATCHED
-    gaps_of(y, data, gaps)
+    if table.size > 0:
+        gaps_in_tube(y, data, gaps)
+    else:
+        films_of(y, data, gaps)
     smallest = math.inf
     for c in range(sites):
         smallest = min(smallest, gaps[c])
@@ -71,18 +90,23 @@ def _jacobian(
 ) -> None:
     """Columns of the derivative of the rates, (19, 8), and that in time, (19,), as the last."""
     near = _nearness(data, sizes)
-    trial = moved[0]
-    other = moved[1]
+    trial, other, back = moved[0], moved[1], np.empty(STATES)
     for i in range(STATES):
         trial[i] = y[i]
     for column in range(_N):
         at = _ACTING[column]
         step = sizes[at] * (1e-6 if at == CURRENT else 3e-7 * near)
+        first, below = y[at], f
+        if table.size == 0 and near < 1.0:  # a thin film, whose rates cost little and are smooth: central differences
+            step *= _WIDER
+            first, below = y[at] - step, back
+            trial[at] = first
+            rates(below, time, trial, data, table)
         trial[at] = y[at] + step
-        step = trial[at] - y[at]
+        step = trial[at] - first
         rates(other, time, trial, data, table)
         for i in range(STATES):
-            jacobian[i, column] = (other[i] - f[i]) / step
+            jacobian[i, column] = (other[i] - below[i]) / step
         trial[at] = y[at]
     later = sizes[STATES]
     if later > 0.0:
@@ -285,8 +309,8 @@ def advance(
             nothing depends on it); a time of the order of the run's, s.
         limits: where tube and battery end.
         rough: height of the asperities, m.
-        data: from `tube_motion.packed`.
-        table: the robot's table.
+        data: from `packed` of `tube_motion` or `two_links`.
+        table: the robot's table, (0,) for one without walls.
 
     Returns:
         One of `DONE`, `PAUSED`, `CROSSED`, `STUCK`, and the number of samples answered.
@@ -310,7 +334,7 @@ def advance(
             end = stop if clipped else time + taken
             if error <= 1.0:
                 rates(moved[0], end, new, data, table)
-                if not watched(new, data[OUTSIDE], data, limits, rough, watch) > 0.0:
+                if not watched(new, data[OUTSIDE], data, table, limits, rough, watch) > 0.0:
                     error = math.inf  # through the wall
             if not error <= 1.0:
                 trial = taken * (max(0.2, 0.9 * error**-0.2) if math.isfinite(error) else 0.25)

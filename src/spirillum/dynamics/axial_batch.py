@@ -1,4 +1,4 @@
-"""Thousands of held robots that step together: the same equations as a run of `simulate` with motion `held`."""
+"""Batches of robots in axial motion that step together, and how they are sampled around one robot."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
 from spirillum.arrays import Samples
-from spirillum.dynamics.held_model import PARAMETERS, STATES, HeldModel, held_model, responses
+from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial_robot, motion, responses
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
-from spirillum.kernels import held_motor as kernel
+from spirillum.kernels import axial_motor as kernel
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of
 from spirillum.robot.placement import Placement
@@ -85,10 +85,10 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
 
 
 def drawn_numbers(
-    held: HeldModel, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
+    axial: AxialRobot, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[Samples, Samples]:
     """Numbers of robots drawn from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,)."""
-    numbers = np.tile(np.array(held.values), (count, 1))
+    numbers = np.tile(np.array(axial.values), (count, 1))
     factors = {name: np.ones(count) for name in FACTORS}
     for name, (low, high) in ranges.items():
         if name in FACTORS:
@@ -96,28 +96,29 @@ def drawn_numbers(
         else:
             numbers[:, _NAMES.index(name)] = rng.uniform(low, high, count)
     if any(name in ranges for name in FACTORS):
-        friction = held.prediction.effective_friction * factors["friction"]
-        numbers[:, _FIRST_RESPONSE:] = responses(held.prediction, held.prediction.batch, friction, factors["viscosity"])
+        friction = axial.prediction.effective_friction * factors["friction"]
+        batch = axial.prediction.batch
+        numbers[:, _FIRST_RESPONSE:] = responses(axial.prediction, batch, friction, factors["viscosity"])
     return numbers, factors["viscosity"]
 
 
-def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Samples:
+def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> Samples:
     """Numbers of robots with the values of a posterior's draws, (count, len(PARAMETERS)), evenly among the draws.
 
     Args:
-        held: the robot, computed by the model that was fitted.
+        axial: the robot, computed by the model that was fitted.
         posterior: file of a calibration's posterior.
         count: how many, at most as many as the posterior has draws.
     """
-    steady = held.prediction
+    steady = axial.prediction
     known = read_posterior(posterior, steady.model.name)
     if known.places_robots:
         raise InputError(
             f"{posterior} was fitted to places in the tube, each of which is a flow of its own; allowed: one of drag "
             "factors and friction, or ranges"
         )
-    drawn = known.drawn(held.robot, count, np.random.default_rng(1))
-    numbers = np.tile(np.array(held.values), (len(drawn), 1))
+    drawn = known.drawn(axial.robot, count, np.random.default_rng(1))
+    numbers = np.tile(np.array(axial.values), (len(drawn), 1))
     for rows, batch in batches(drawn):
         own = np.full(batch.size, steady.effective_friction)
         effective = np.where(np.isnan(batch.effective_friction), own, batch.effective_friction)
@@ -132,8 +133,8 @@ _POOL = 500
 """Draws of a posterior that robots are taken from."""
 
 
-class HeldPlants:
-    """Robots that are held to their channel's axis, all of them one step at a time; for one thread.
+class AxialBatch:
+    """Robots in axial motion, all of them one step at a time; for one thread.
 
     All are the same robot, or are drawn around it. Arrays have one value for each robot, SI, signed about +x.
     """
@@ -162,7 +163,7 @@ class HeldPlants:
             calibration: calibration file whose factors replace the robot's.
             placement: where they are held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
             ranges: what they are drawn from: `friction` and `viscosity`, low and high factor of the robot's own,
-                evenly in the logarithm; other numbers of `held_model.PARAMETERS`, such as `battery.voltage`, in SI.
+                evenly in the logarithm; other numbers of `axial_robot.PARAMETERS`, such as `battery.voltage`, in SI.
             posterior: file of a calibration's posterior, from whose draws they are taken, before the ranges.
             seed: of the draws.
 
@@ -171,26 +172,31 @@ class HeldPlants:
         """
         _check_whole("count", count, 1, _MOST)
         _check_whole("seed", seed, 0, _LAST_SEED)
-        self.held: HeldModel = held_model(
+        self.axial: AxialRobot = axial_robot(
             robot, model=model, friction=friction, calibration=calibration, placement=placement
         )
         """The robot that they are drawn around."""
-        self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.held.robot, ranges)
-        self._pool: Samples | None = None if posterior is None else posterior_numbers(self.held, posterior, _POOL)
+        self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.axial.robot, ranges)
+        self._pool: Samples | None = None if posterior is None else posterior_numbers(self.axial, posterior, _POOL)
         self._rng = np.random.default_rng(seed)
         self.time: Samples = np.zeros(count)
         """Time since each was reset, s."""
         self.states: Samples = np.zeros((count, kernel.STATES))
-        """States in the order of `held_model.STATES`."""
-        self.numbers: Samples = np.tile(np.array(self.held.values), (count, 1))
-        """Numbers of each robot in the order of `held_model.PARAMETERS`."""
-        self.warnings: tuple[str, ...] = self.held.prediction.warnings
+        """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7)."""
+        self.numbers: Samples = np.tile(np.array(self.axial.values), (count, 1))
+        """Numbers of each robot in the order of `axial_robot.PARAMETERS`."""
+        self.warnings: tuple[str, ...] = self.axial.prediction.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._viscosity: Samples = np.ones(count)
-        self._duty: Samples = np.full(count, self.held.duty)
-        self._flow: Samples = np.full(count, self.held.flow or 0.0)
+        self._duty: Samples = np.full(count, self.axial.duty)
+        self._flow: Samples = np.full(count, self.axial.flow or 0.0)
         self.redraw()
+
+    @property
+    def held(self) -> AxialRobot:
+        """The robot that they are drawn around, by its earlier name."""
+        return self.axial
 
     @property
     def count(self) -> int:
@@ -212,7 +218,7 @@ class HeldPlants:
         chosen = np.arange(self.count) if which is None else np.flatnonzero(self._chosen("which", which))
         if not len(chosen) or not (self._ranges or self._pool is not None):
             return
-        numbers, viscosity = drawn_numbers(self.held, len(chosen), rng, self._ranges)
+        numbers, viscosity = drawn_numbers(self.axial, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
             own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
@@ -232,8 +238,8 @@ class HeldPlants:
         rows = slice(None) if which is None else self._chosen("which", which)
         self.time[rows] = 0.0
         self.states[rows] = 0.0
-        self._duty[rows] = self.held.duty
-        self._flow[rows] = self.held.flow or 0.0
+        self._duty[rows] = self.axial.duty
+        self._flow[rows] = self.axial.flow or 0.0
 
     def step(
         self,
@@ -258,8 +264,8 @@ class HeldPlants:
         if remote is not None:
             if duty is not None:
                 raise InputError("remote and duty are given together; allowed: one of them")
-            duty = np.where(self._chosen("remote", remote), self.held.duty, 0.0)
-        if flow is not None and self.held.flow is None:
+            duty = np.where(self._chosen("remote", remote), self.axial.duty, 0.0)
+        if flow is not None and self.axial.flow is None:
             raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
         asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
@@ -280,19 +286,12 @@ class HeldPlants:
 
     def _rates(self, states: Samples, flow: Samples) -> dict[str, Samples]:
         """Speed and rates in some states, by name."""
-        torque = self.numbers[:, kernel.TORQUE] * states[:, kernel.CURRENT]
-        return {
-            name: self.numbers[:, per_torque] * torque + self.numbers[:, per_flow] * flow
-            for name, per_torque, per_flow in (
-                ("forward_velocity", kernel.SPEED, kernel.SPEED_FLOW),
-                ("body_rotation_rate", kernel.BODY, kernel.BODY_FLOW),
-                ("tail_rotation_rate", kernel.TAIL, kernel.TAIL_FLOW),
-            )
-        }
+        names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
+        return dict(zip(names, motion(self.numbers, states[:, kernel.CURRENT], flow), strict=True))
 
     def _check_stokes(self, rates: Mapping[str, Samples], flow: Samples) -> None:
         """Add what the robots break of Stokes flow to the warnings, once for each limit."""
-        batch, thinner = self.held.prediction.batch, 1.0 / self._viscosity
+        batch, thinner = self.axial.prediction.batch, 1.0 / self._viscosity
         limits = reynolds_limits(
             batch,
             body_reynolds(batch, rates["forward_velocity"] * thinner),

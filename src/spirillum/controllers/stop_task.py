@@ -1,7 +1,5 @@
-"""Tasks by their names.
+"""The task `stop-at`: go to a place and stop there, with a remote that knows on and off.
 
-The task `stop-at`: go to a place and stop there.
-Go to a place and stop, with a remote that knows on and off.
 With the place x that the follower expects where a command will act, the goal g, the way d = 1 or -1 of the robot, the
 tolerance e and the hysteresis h = e/10:
 
@@ -15,28 +13,22 @@ between two decisions (Tsypkin 1984).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
-from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.loop import LoopRun, run_loop
+from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.position_filter import PositionFilter
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller, Message
-from spirillum.controllers.steering import MOST_TILT, Law, Replay, Steer, Steering, pushed_for
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.dynamics.start import reach_of
-from spirillum.dynamics.turning_field import Field
-from spirillum.errors import InputError, did_you_mean
-from spirillum.robot.arguments import one_of
-from spirillum.robot.fields import Length, Rate, SignedLength
+from spirillum.errors import InputError
+from spirillum.robot.fields import Length, SignedLength
 from spirillum.units import show
 
 _SHORT = 0.5
@@ -237,125 +229,3 @@ class StopAtTask(Task):
                     f"{show(place, 'mm')} after {moment.time:.4g} s; allowed: a nearer place, or another robot"
                 )
         return float(other.state.time - _STEP * (place - self.goal) / (place - before))
-
-
-_DURATION = 60.0
-"""Of a run, s."""
-_SHARE = 0.9
-"""Largest rate of the field over the step-out rate."""
-_SETTLED = 2
-"""Turns of the field before orbit and gain are looked for."""
-
-
-@dataclass(frozen=True)
-class SteeringBrief(Brief):
-    """What is known of a magnetic robot beforehand."""
-
-    steering: Steering
-    tilts: tuple[tuple[float, complex], ...]
-    """Of the open loop: times, s, and tilts, rad."""
-
-
-class KeepAxisTask(Task):
-    """Swim along the tube's axis, steered by the axis of the field."""
-
-    kind: ClassVar[str] = "keep-axis"
-    error_name: ClassVar[str] = "mean distance from the axis over the second half"
-    error_unit: ClassVar[str] = "m"
-    across: ClassVar[bool] = True
-
-    law: Annotated[Law, BeforeValidator(one_of("position", "aim"))] = "position"
-    """`position`: feedback of the place, with the orbit as predicted; `aim`: at a point of the axis ahead."""
-    rate: Rate | None = None
-    """Of the field, at most 0.9 of the step-out rate; None: the robot's own."""
-    tolerance: Length = 5e-4
-    """How far from the axis is good."""
-
-    def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> SteeringBrief:
-        """Check the rate of the field, find orbit and gain, and the tilts for the robot as its file says."""
-        field, step_out = plant.state.field, float(plant.steady.step_out_rate)
-        if field is None:
-            raise InputError(f"task 'keep-axis' with {plant.robot.name}; allowed: a robot with drive.kind 'magnetic'")
-        rate = field.rotation_rate if self.rate is None else self.rate
-        if not 0.0 < abs(rate) <= _SHARE * step_out:
-            raise InputError(
-                f"task.rate = {show(rate, 'Hz')}; allowed: up to {show(_SHARE * step_out, 'Hz')}, {_SHARE:g} of its "
-                "step-out rate"
-            )
-        steering = _identified(plant, rate)
-        duration = _DURATION if self.duration is None else self.duration
-        exact = Lab.exact()
-        ahead = run_loop(plant.copy(), Steer(exact, steering, self.law), exact, duration, progress=progress)
-        if ahead.interrupted:
-            raise KeyboardInterrupt
-        return SteeringBrief(
-            lab=lab,
-            duration=duration,
-            speed=float(plant.steady.forward_velocity),
-            duty=1.0,
-            schedule=(duration, 1.0),
-            carried=0.0,
-            steering=steering,
-            tilts=tuple(
-                (one.time, complex(one.estimate["field_yaw"], one.estimate["field_pitch"])) for one in ahead.decisions
-            ),
-        )
-
-    def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:  # noqa: ARG002 - one interface
-        """A new controller; doing nothing leaves the field's axis along the tube."""
-        assert isinstance(brief, SteeringBrief)  # noqa: S101 - this task's own
-        if name in (FEEDBACK, "knowing"):
-            return Steer(brief.lab, brief.steering, self.law, knowing=name == "knowing")
-        return Replay(brief.steering.rate, brief.tilts if name == "open-loop" else ())
-
-    def target(self, time: Samples, way: float) -> tuple[Samples, float]:  # noqa: ARG002 - one interface
-        """The axis, throughout."""
-        return np.zeros_like(time), self.tolerance
-
-    def _error(self, run: LoopRun, brief: Brief) -> float:
-        time = np.array([moment.time for moment in run.moments])
-        distance = np.array([np.hypot(*moment.pose.position[1:]) for moment in run.moments])
-        even = np.linspace(0.5 * brief.duration, brief.duration, 400)
-        return float(np.mean(np.interp(even, time, distance)))
-
-    def _is_good(self, error: float) -> bool:
-        return error <= self.tolerance
-
-
-def _identified(plant: Plant, rate: float) -> Steering:
-    """Orbit and gain of a robot where it starts, from a look ahead with a tilt and without one."""
-    turn = 2.0 * np.pi / abs(rate)
-
-    def place(of: Plant, tilt: float, time: float) -> complex:
-        field = Field.of({"rotation_rate": rate, "yaw": tilt})
-        moment = uninterrupted(of.step(time, field=field, duty=1.0))
-        if moment.ended:
-            why = f"{moment.ended} after {moment.time:.4g} s"
-            raise InputError(f"{of.robot.name} cannot be steered there: {why}; allowed: another place or rate")
-        return complex(*moment.pose.position[1:])
-
-    ahead = plant.copy()
-    before = place(ahead, 0.0, _SETTLED * turn)
-    straight, aside = place(ahead.copy(), 0.0, turn), place(ahead.copy(), MOST_TILT, turn)
-    orbit = complex(np.log(straight / before)) / turn if abs(before) > 0.0 and abs(straight) > 0.0 else 0j
-    gain = (aside - straight) / (MOST_TILT * pushed_for(orbit, turn))
-    return Steering(orbit, complex(gain), rate, plant.robot.body.length)
-
-
-_TASKS: tuple[type[Task], ...] = (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask, KeepAxisTask)
-TASKS = {task.kind: task for task in _TASKS}
-"""Tasks by their kinds."""
-
-
-def task_of(value: Task | Mapping[str, Any]) -> Task:
-    """A task from what a caller may give."""
-    if isinstance(value, Task):
-        return value
-    if "kind" not in value:
-        raise InputError(
-            f"task = {str(value)[:60]!r}; allowed: kind ({', '.join(TASKS)}) and the task's fields, by name"
-        )
-    kind = str(value["kind"])
-    if kind not in TASKS:
-        raise InputError(f"task = {kind[:60]!r}{did_you_mean(kind, TASKS)}; allowed: {', '.join(TASKS)}")
-    return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})

@@ -1,4 +1,4 @@
-"""Dry friction under a robot that is held sideways and slides along its tube, compiled."""
+"""Dry friction under a robot that is constrained to axial motion and slides along its tube, compiled."""
 
 from __future__ import annotations
 

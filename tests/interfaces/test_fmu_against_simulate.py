@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.exports.fmu import build
-from spirillum.exports.fmu.build import base_units
+from spirillum.interfaces import fmu as build
+from spirillum.interfaces.fmu import base_units
 from spirillum.quantities import QUANTITIES, unit_of
 
 fmpy: Any = pytest.importorskip("fmpy")

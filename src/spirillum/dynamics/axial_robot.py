@@ -1,0 +1,304 @@
+"""A robot in axial motion: two degrees of freedom, along and about its channel's axis, with motor and battery.
+
+Lateral motion and tilt are constrained and inertia is neglected, so speed and rates follow the motor's torque and an
+imposed flow at once and linearly, and the current I (signed about +x) is the only state with dynamics of its own. With
+duty d, imposed mean flow U_m, polarity p and joint torque tau = K_m I, (17) and the linear response read
+
+    L dI/dt = p d V(|I|) - R(|I|) I - K_b (omega - Omega),
+    (U, Omega, omega) = (a, b, c)_tau tau + (a, b, c)_m U_m.
+
+Runs of `simulate`, batches, systems of python-control and FMUs all rest on these numbers and equations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.kernels import axial_motor as kernel
+from spirillum.quantities import unit_of
+from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
+from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
+from spirillum.swimming.steady import calibrated_balance
+
+
+class AxialParameter(NamedTuple):
+    """One number of the equations."""
+
+    name: str
+    """Field of the robot file, or quantity of the registry."""
+    unit: str
+    """SI."""
+    meaning: str
+    """What it is, in half a sentence."""
+
+
+PARAMETERS = (
+    AxialParameter("motor.torque_constant", "N m/A", "K_m: torque in the joint per current, gear included"),
+    AxialParameter("motor.back_emf_constant", "V s/rad", "K_b: back-emf per rate of the joint, gear included"),
+    AxialParameter("motor.inductance", "H", "L"),
+    AxialParameter("motor.resistance.constant", "ohm", "R(I): constant part"),
+    AxialParameter("motor.resistance.decay", "ohm", "R(I): part that decays with the current"),
+    AxialParameter("motor.resistance.decay_rate", "1/A", "R(I): how fast it decays"),
+    AxialParameter("motor.resistance.growth", "ohm", "R(I): part that grows with the current"),
+    AxialParameter("motor.resistance.growth_rate", "1/A", "R(I): how fast it grows"),
+    AxialParameter("motor.resistance.slope", "ohm/A", "R(I): part in proportion to the current"),
+    AxialParameter("battery.voltage", "V", "V(I) without a current"),
+    AxialParameter("battery.internal_resistance", "ohm", "V(I): loss per current"),
+    AxialParameter("polarity", "1", "sense about +x in which the motor turns the tail: 1 or -1"),
+    *(
+        AxialParameter(f"{of}_per_{per}", unit_of(f"{of}_per_{per}"), f"{words} per {over}")
+        for per, over in (("torque", "joint torque"), ("flow", "imposed mean flow"))
+        for of, words in (
+            ("forward_velocity", "forward velocity"),
+            ("body_rotation_rate", "body rate"),
+            ("tail_rotation_rate", "tail rate"),
+        )
+    ),
+)
+"""The numbers in the order of the compiled equations, which know them by their columns."""
+STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
+"""The state; quantities of the registry. The compiled equations have two integrals of the current behind it."""
+INPUTS = ("duty", "mean_flow")
+"""Inputs; quantities of the registry."""
+OUTPUTS = (
+    *STATES[1:],
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "motor_current",
+    "motor_torque",
+    "battery_voltage",
+    "electrical_power",
+)
+"""Outputs; quantities of the registry."""
+_HALVINGS = 200
+_LARGEST_EXPONENT = 600.0
+
+
+@dataclass(frozen=True)
+class AxialRobot:
+    """The numbers of a robot in axial motion, SI; rates and current signed about +x."""
+
+    prediction: Prediction
+    """The steady motion, with robot, model and friction."""
+    values: tuple[float, ...]
+    """Of `PARAMETERS`."""
+
+    @classmethod
+    def of(cls, steady: Prediction) -> AxialRobot:
+        """The robot of a prediction, in axial motion."""
+        motor = steady.batch.electrics
+        if steady.batch.drive != "dc-motor" or motor is None:
+            raise InputError(
+                f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a current that changes"
+            )
+        response = responses(steady, steady.batch, np.array([steady.effective_friction]))[0]
+        return cls(steady, (*_of_motor(motor), *response.tolist()))
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.prediction.robot
+
+    @property
+    def flow(self) -> float | None:
+        """Mean flow that is imposed at the start, m/s; None: none is, and the equations have no such input."""
+        return self.prediction.batch.placement.flow
+
+    @property
+    def duty(self) -> float:
+        """The drive's own duty."""
+        motor = self.prediction.batch.electrics
+        return 1.0 if motor is None else float(motor.duty[0])
+
+    @cached_property
+    def numbers(self) -> Samples:
+        """The numbers as an array, (18,)."""
+        return np.array(self.values)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The numbers by name."""
+        return dict(zip((item.name for item in PARAMETERS), self.values, strict=True))
+
+    def check_steady(self, duty: float, flow: float) -> list[str]:
+        """Refuse a robot that moves far outside Stokes flow where a duty and a flow have become steady.
+
+        Returns:
+            A warning for each Reynolds number that is too large for an accurate answer.
+        """
+        batch, current = self.prediction.batch, steady_current(self.numbers, duty, flow)
+        speed, tail, _ = motion(self.numbers, current, flow)
+        limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, tail))
+        return list(check_stokes_flow(batch, [*limits, flow_limit(batch, flow)]).values())
+
+
+def axial_robot(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = AUTO,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+) -> AxialRobot:
+    """A robot in axial motion, as in a run of `simulate` with motion `held`; arguments as of `predict`.
+
+    With a `flow` in the placement the imposed flow is an input, which starts there.
+    """
+    placed = Placement.of(placement)
+    steady = predict(
+        robot,
+        model=model,
+        friction=friction,
+        calibrated=calibrated,
+        calibration=calibration,
+        placement=placed if placed.is_given else None,
+        band=False,
+    )
+    return AxialRobot.of(steady)
+
+
+def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
+    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6); the latter 0 without a flow.
+
+    Args:
+        steady: a prediction whose model, calibration, friction model and pose the robots share.
+        batch: the robots, or one for all.
+        effective: effective friction of each, N m s/rad, (n,).
+        viscosity: factor of each; in Stokes flow all resistances, and the wrench of a flow, are in proportion to it.
+    """
+    place = steady.batch.placement
+    batch = batch.placed(place if place.flow is None else place.model_copy(update={"flow": 1.0}))
+    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
+    if viscosity is not None:
+        s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
+    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
+    t = friction_torques(steady.friction, effective, rotor)
+    body, tail = rates_per_torque(s, t)
+    coasting_body, coasting_tail = coasting_rates(s, t)
+    columns = [s._replace(u_0=np.zeros(1)).speed(body, tail), body, tail]
+    columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
+    return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
+
+
+def _of_motor(motor: Electrics) -> tuple[float, ...]:
+    columns = (
+        motor.joint_torque_constant,
+        motor.joint_back_emf_constant,
+        motor.inductance,
+        motor.constant,
+        motor.decay,
+        motor.decay_rate,
+        motor.growth,
+        motor.growth_rate,
+        motor.slope,
+        motor.voltage,
+        motor.internal_resistance,
+        motor.polarity,
+    )
+    return tuple(float(column[0]) for column in columns)
+
+
+def motion(p: Samples, current: Any, flow: Any) -> Samples:
+    """U, omega and Omega, (3, ...), of robots with numbers `p` (..., 18), a current, A, and an imposed flow, m/s."""
+    torque = p[..., kernel.TORQUE] * current
+    pairs = ((kernel.SPEED, kernel.SPEED_FLOW), (kernel.TAIL, kernel.TAIL_FLOW), (kernel.BODY, kernel.BODY_FLOW))
+    return np.stack([p[..., per_torque] * torque + p[..., per_flow] * flow for per_torque, per_flow in pairs])
+
+
+def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
+    """All of `OUTPUTS`, (12, ...), of robots with numbers `p` (..., 18) in states (5 or more, ...)."""
+    current = states[kernel.CURRENT]
+    speed, tail, body = motion(p, current, flow)
+    voltage = p[..., kernel.VOLTAGE] - p[..., kernel.INTERNAL] * np.abs(current)
+    power = p[..., kernel.POLARITY] * duty * voltage * current
+    torque = p[..., kernel.TORQUE] * current
+    return np.stack([*states[1:5], speed, tail, body, tail - body, current, torque, voltage, power])
+
+
+def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
+    """d/dt of the state, (5,), which depends on the current alone.
+
+    Args:
+        p: the robot's numbers, (18,).
+        current: I, A.
+        duty: 0 to 1.
+        flow: imposed mean flow, m/s.
+    """
+    return np.array(
+        [_current_rate(p, current, duty, flow), *motion(p, current, flow), p[kernel.POLARITY] * duty * current]
+    )
+
+
+def winding(p: Samples, size: float) -> tuple[float, float]:
+    """R and dR/d|I|."""
+    falling = p[kernel.DECAY] * math.exp(-p[kernel.DECAY_RATE] * size)
+    rising = p[kernel.GROWTH] * math.exp(min(p[kernel.GROWTH_RATE] * size, _LARGEST_EXPONENT))
+    value = p[kernel.CONSTANT] + falling + rising + p[kernel.SLOPE] * size
+    slope = p[kernel.GROWTH_RATE] * rising - p[kernel.DECAY_RATE] * falling
+    return float(value), float(slope + p[kernel.SLOPE])
+
+
+def _current_rate(p: Samples, current: float, duty: float, flow: float) -> float:
+    size = abs(current)
+    supply = p[kernel.POLARITY] * duty * (p[kernel.VOLTAGE] - p[kernel.INTERNAL] * size)
+    slip = (p[kernel.TAIL] - p[kernel.BODY]) * p[kernel.TORQUE] * current
+    slip += (p[kernel.TAIL_FLOW] - p[kernel.BODY_FLOW]) * flow
+    return float((supply - winding(p, size)[0] * current - p[kernel.EMF] * slip) / p[kernel.INDUCTANCE])
+
+
+def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, Samples, Samples]:
+    """A (5, 5), B (5, 2), C (12, 5), D (12, 2) of the equations linearised at a current and duty, in closed form."""
+    size, sense, sign = abs(current), math.copysign(1.0, current), p[kernel.POLARITY]
+    r, r_slope = winding(p, size)
+    emf, inductance, internal = p[kernel.EMF], p[kernel.INDUCTANCE], p[kernel.INTERNAL]
+    voltage = p[kernel.VOLTAGE] - internal * size
+    per_current, per_flow = motion(p, 1.0, 0.0), motion(p, 0.0, 1.0)
+    a, b, c, d = np.zeros((5, 5)), np.zeros((5, 2)), np.zeros((12, 5)), np.zeros((12, 2))
+    a[0, 0] = -(sign * duty * internal * sense + r + r_slope * size + emf * (per_current[1] - per_current[2]))
+    a[0, 0] /= inductance
+    a[1:, 0] = [*per_current, sign * duty]
+    b[0] = sign * voltage / inductance, -emf * (per_flow[1] - per_flow[2]) / inductance
+    b[1:4, 1], b[4, 0] = per_flow, sign * current
+    c[:4, 1:] = np.eye(4)
+    electrical = [-internal * sense, sign * duty * (voltage - internal * size)]
+    c[4:, 0] = [*per_current, per_current[1] - per_current[2], 1.0, p[kernel.TORQUE], *electrical]
+    d[4:8, 1] = [*per_flow, per_flow[1] - per_flow[2]]
+    d[11, 0] = sign * voltage * current
+    return a, b, c, d
+
+
+def steady_current(p: Samples, duty: float, flow: float) -> float:
+    """The current at which it no longer changes, A: between none and that of the bare resistance, by bisection."""
+    at_rest = _current_rate(p, 0.0, duty, flow)
+    if at_rest == 0.0:
+        return 0.0
+    sense, reach = math.copysign(1.0, at_rest), 1e-9
+    while sense * _current_rate(p, sense * reach, duty, flow) > 0.0 and reach < 1e9:
+        reach *= 2.0
+    low, high = 0.0, reach
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if sense * _current_rate(p, sense * middle, duty, flow) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return sense * 0.5 * (low + high)

@@ -1,0 +1,283 @@
+"""A free robot as two rigid links: all that its rates follow from, ready for the compiled equations.
+
+The correct form of (15) with its motor: seven rates (U, Omega_b, omega_m) against weight, buoyancy, friction, the
+torque of motor or field, and the fluid: here the films at the wall of a channel whose walls are otherwise left out, see
+`spirillum.kernels.two_links`; `tube_robot` has the walls.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.films import films_of
+from spirillum.fluid.model import SwimmerModel
+from spirillum.kernels import rigid_links
+from spirillum.kernels import two_links as kernel
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.links import links_of
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+from spirillum.swimming.balance import friction_torques
+from spirillum.swimming.freedom import LINKS
+from spirillum.swimming.steady import calibrated_resistance
+
+_KINDS = {
+    "dc-motor": rigid_links.MOTOR,
+    "torque": rigid_links.TORQUE,
+    "rate": rigid_links.RATE,
+    "magnetic": rigid_links.MAGNETIC,
+}
+_ELECTRICS = {
+    "polarity": rigid_links.POLARITY,
+    "joint_torque_constant": rigid_links.TORQUE_CONSTANT,
+    "joint_back_emf_constant": rigid_links.BACK_EMF,
+    "inductance": rigid_links.INDUCTANCE,
+    "constant": rigid_links.CONSTANT,
+    "decay": rigid_links.DECAY,
+    "decay_rate": rigid_links.DECAY_RATE,
+    "growth": rigid_links.GROWTH,
+    "growth_rate": rigid_links.GROWTH_RATE,
+    "slope": rigid_links.SLOPE,
+    "voltage": rigid_links.VOLTAGE,
+    "internal_resistance": rigid_links.INTERNAL_RESISTANCE,
+    "duty": rigid_links.DUTY,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeRobot(ABC):
+    """What the compiled equations need of a free robot, SI, about the origin in body axes."""
+
+    tolerance: ClassVar[float]
+    """Error of a step over the sizes of the state's components."""
+
+    friction: Samples
+    """Friction of joint and wall against the seven rates (7, 7)."""
+    weight: Samples
+    """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
+    drive: Samples
+    """Drive and motor (23,), see `spirillum.kernels.rigid_links`."""
+    table: Samples = field(default_factory=lambda: np.zeros(0))
+    """The robot's table in its tube, see `spirillum.kernels.tube_table`; empty without walls."""
+    length: float
+    """A length of the robot's order, m."""
+    torque: float
+    """A torque of the order of those that act, N m."""
+    turn: float
+    """Time of the order of a turn of the tail, s."""
+
+    @property
+    @abstractmethod
+    def data(self) -> Samples:
+        """All but the table in one array, for the compiled equations."""
+
+    @property
+    @abstractmethod
+    def gap_count(self) -> int:
+        """Number of the gaps that are watched."""
+
+    @property
+    @abstractmethod
+    def roughness(self) -> float:
+        """Height of the asperities, m."""
+
+    @abstractmethod
+    def observe(self, time: Samples, states: Samples) -> Samples:
+        """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 26) in a tube."""
+
+    @abstractmethod
+    def contact_event(self, place: int, *, touches: bool) -> str:
+        """What happens where a gap becomes as thin as the roughness, or opens again."""
+
+    @classmethod
+    def integrator(cls) -> str:
+        """Method and tolerance of its integration."""
+        return f"Rodas5P, tolerance {cls.tolerance:g}"
+
+    @property
+    def bends(self) -> Samples:
+        """Times at which an imposed flow has a corner, s."""
+        return np.zeros(0)
+
+    def at_duty(self, duty: float) -> Self:
+        """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
+        drive = self.drive.copy()
+        drive[rigid_links.DUTY] = duty
+        return replace(self, drive=drive)
+
+    def between(self, start: float, stop: float) -> Self:  # noqa: ARG002 - of a tube
+        """The robot with what of an imposed flow matters from one time to another, s."""
+        return self
+
+    def range_left(self, state: Samples, time: float) -> str:
+        """A sentence on the range of the table that was left."""
+        raise NotImplementedError  # no table, no range
+
+    def step_sizes(self) -> Samples:
+        """Sizes of the state's components below which nothing matters; a small change of time; the time of a turn.
+
+        The small change of time is 0 where nothing depends on time; (21,).
+        """
+        resistance = self.drive[rigid_links.CONSTANT]
+        current = self.drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
+        found = np.ones(rigid_links.STATES + 2)
+        found[rigid_links.POSITION : rigid_links.POSITION + 3] = self.length
+        found[rigid_links.CURRENT] = found[rigid_links.CHARGE] = current
+        found[rigid_links.ELECTRICAL : rigid_links.CHARGE] = max(self.drive[rigid_links.VOLTAGE] * current, self.torque)
+        found[rigid_links.DRIVEN : rigid_links.STATES] = self.torque
+        changing = self.drive[rigid_links.KIND] == rigid_links.MAGNETIC or self.bends.size > 1
+        found[rigid_links.STATES :] = 1e-6 * self.turn if changing else 0.0, self.turn
+        return found
+
+
+def friction_of(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:
+    """The readings of (18) and (19) as torques against Omega_b about x (on the whole) and omega_m (in the joint)."""
+    rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
+    t = friction_torques(reading, np.array([effective]), rotor)
+    bb, br, rb, rr = (float(entry[0]) for entry in (t.bb, t.br, t.rb, t.rr))
+    found = np.zeros((7, 7))
+    roll, joint = rigid_links.ROTATION, rigid_links.JOINT
+    found[roll, roll], found[roll, joint] = (bb + br) + (rb + rr), br + rr
+    found[joint, roll], found[joint, joint] = rb + rr, rr
+    return found
+
+
+def weight_of(robot: Robot) -> Samples:
+    """Weight less buoyancy of both links; zero where the masses are not known."""
+    links = links_of(robot)
+    if not np.isfinite([link.mass for link in links]).all():
+        return np.zeros(rigid_links.WEIGHT)
+    density = robot.fluid.density
+    sizes = [link.mass - density * link.volume for link in links]
+    moments = [link.mass * link.centre - density * link.volume * link.centroid for link in links]
+    return STANDARD_GRAVITY * np.concatenate([sizes, *moments])
+
+
+def drive_of(batch: RobotBatch) -> Samples:
+    """Drive and motor of a batch of one at full duty (23,)."""
+    drive = np.zeros(rigid_links.DRIVE)
+    drive[rigid_links.KIND], drive[rigid_links.FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
+    drive[rigid_links.DUTY] = 1.0
+    if batch.drive == "torque":
+        drive[rigid_links.GIVEN] = batch.drive_torque[0]
+    elif batch.drive == "rate":
+        drive[rigid_links.GIVEN] = batch.drive_rate[0]
+    elif batch.drive == "magnetic":
+        moment, angle = float(batch.magnetic_moment[0]), float(batch.moment_angle[0])
+        drive[rigid_links.MOMENT : rigid_links.FIELD] = moment * np.cos(angle), 0.0, moment * np.sin(angle)
+        drive[rigid_links.FIELD], drive[rigid_links.FIELD_RATE] = batch.magnetic_field[0], batch.field_rate[0]
+    elif batch.electrics is not None:
+        for name, column in _ELECTRICS.items():
+            drive[column] = getattr(batch.electrics, name)[0]
+    return drive
+
+
+def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
+    """A torque of the order of those that act, N m.
+
+    The largest of the motor's stall torque, m B, a prescribed torque or that of a prescribed rate, and weight's.
+
+    Args:
+        drag: resistance against the seven rates (7, 7).
+        weight: submerged weight and moments (8,).
+        drive: drive and motor (23,).
+    """
+    kind = drive[rigid_links.KIND]
+    field = float(np.linalg.norm(drive[rigid_links.MOMENT : rigid_links.FIELD])) * drive[rigid_links.FIELD]
+    given = abs(drive[rigid_links.GIVEN]) * (
+        float(drag[rigid_links.JOINT, rigid_links.JOINT]) if kind == rigid_links.RATE else 1.0
+    )
+    heavy = float(np.abs(weight[: rigid_links.MOMENT_BODY]).sum()) * float(np.sqrt(drag[4, 4] / drag[1, 1]))
+    resistance = drive[rigid_links.CONSTANT]
+    stall = drive[rigid_links.TORQUE_CONSTANT] * drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 0.0
+    return float(max(stall, field, given if kind in (rigid_links.TORQUE, rigid_links.RATE) else 0.0, heavy, 1e-300))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoLinks(FreeRobot):
+    """A robot in unbounded fluid, with films between it and a channel's wall: see `spirillum.kernels.two_links`."""
+
+    tolerance: ClassVar[float] = 1e-8
+
+    drag: Samples
+    """Resistance of both links against the seven rates at phase 0 of the tail (7, 7)."""
+    wall: Samples
+    """The channel's wall (4,), see `spirillum.dynamics.films`."""
+    spots: Samples
+    """Rings that may near the wall (n, 6), see `spirillum.dynamics.films`."""
+
+    @property
+    def data(self) -> Samples:
+        """All of them in one array."""
+        return kernel.packed(self.drag, self.friction, self.weight, self.wall, self.spots, self.drive)
+
+    @property
+    def gap_count(self) -> int:
+        """The thinnest film."""
+        return 1
+
+    @property
+    def roughness(self) -> float:
+        """Height of the wall's asperities, m."""
+        return float(self.wall[kernel.ROUGHNESS])
+
+    @property
+    def is_walled(self) -> bool:
+        """Whether there are films at a wall."""
+        return bool(np.isfinite(self.wall[kernel.RADIUS]))
+
+    def observe(self, time: Samples, states: Samples) -> Samples:
+        """What `spirillum.kernels.two_links` observes, (n, 13)."""
+        out = np.empty((time.size, rigid_links.OBSERVED))
+        kernel.observe(time, np.ascontiguousarray(states), self.data, out)
+        return out
+
+    def contact_event(self, place: int, *, touches: bool) -> str:  # noqa: ARG002 - of a tube
+        """The roughness carries, or no longer does."""
+        return "film as thin as the roughness"
+
+
+def two_links(
+    robot: Robot,
+    batch: RobotBatch,
+    model: SwimmerModel,
+    *,
+    friction: FrictionReading,
+    effective: float,
+    calibrated: bool,
+    weight: bool,
+    roughness: float | None,
+) -> TwoLinks:
+    """Everything that a robot's rates follow from.
+
+    Args:
+        robot: the robot.
+        batch: that robot as a batch of one.
+        model: a model that knows all entries of R.
+        friction: reading of the friction.
+        effective: its B_eff, or B of the wall, N m s/rad.
+        calibrated: apply the robot's calibration factors.
+        weight: with weight and buoyancy, if the robot's masses are known.
+        roughness: of the wall's films, m; None: the default of `films_of`.
+    """
+    resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
+    drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
+    heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(batch)
+    length, torque = float(np.sqrt(drag[4, 4] / drag[1, 1])), torque_scale(drag, heavy, drive)
+    films = films_of(robot, roughness, float(drag[1, 1]), torque / length)
+    return TwoLinks(
+        drag=drag,
+        friction=friction_of(batch, friction, effective),
+        weight=heavy,
+        wall=films.wall,
+        spots=films.spots,
+        drive=drive,
+        length=length,
+        torque=torque,
+        turn=2.0 * np.pi * float(drag[rigid_links.ROTATION, rigid_links.ROTATION]) / torque,
+    )
