@@ -20,6 +20,7 @@ from spirillum.dynamics.averages import STEADY, run_averages, stretches_on
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
+from spirillum.notes import note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.swimming.balance import friction_torques, rates_per_torque
@@ -206,7 +207,7 @@ def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
     averages = _averages(dataset, prediction, switches, end)
     limits = motion_limits(batch, dataset["forward_velocity"].values, dataset["tail_rotation_rate"].values)
     said = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
-    return dataset.isel(time=np.isin(moments, time)).assign(averages).assign_attrs(warnings="\n".join(said))
+    return dataset.isel(time=np.isin(moments, time)).assign(averages).assign_attrs(note_attributes(said))
 
 
 def _dataset(

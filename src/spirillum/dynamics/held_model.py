@@ -16,6 +16,7 @@ import numpy as np
 from spirillum.arrays import PerRobot, Samples
 from spirillum.dynamics.held_equations import rates, steady_state
 from spirillum.errors import InputError
+from spirillum.notes import Note
 from spirillum.quantities import unit_of
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
@@ -139,7 +140,7 @@ def held_model(
     return HeldModel(steady, (*_of_motor(motor), *response.tolist()))
 
 
-def check_steady(held: HeldModel, duty: float, flow: float) -> list[str]:
+def check_steady(held: HeldModel, duty: float, flow: float) -> list[Note]:
     """Refuse a held robot that moves far outside Stokes flow where a duty and a flow have become steady.
 
     Returns:

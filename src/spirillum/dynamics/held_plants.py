@@ -15,6 +15,7 @@ from spirillum.dynamics.held_model import PARAMETERS, STATES, HeldModel, held_mo
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.kernels import held_motor as kernel
+from spirillum.notes import Note
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of
 from spirillum.robot.placement import Placement
@@ -184,7 +185,7 @@ class HeldPlants:
         """States in the order of `held_model.STATES`."""
         self.numbers: Samples = np.tile(np.array(self.held.values), (count, 1))
         """Numbers of each robot in the order of `held_model.PARAMETERS`."""
-        self.warnings: tuple[str, ...] = self.held.prediction.warnings
+        self.warnings: tuple[Note, ...] = self.held.prediction.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._viscosity: Samples = np.ones(count)

@@ -14,6 +14,7 @@ from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
 from spirillum.dynamics.integration import Reach, Trajectory
 from spirillum.kernels import rigid_links
+from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
@@ -96,7 +97,7 @@ def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[st
 
 
 def free_attributes(
-    prediction: Prediction, run: Trajectory, reach: Reach, title: str, integrator: str, warnings: Sequence[str]
+    prediction: Prediction, run: Trajectory, reach: Reach, title: str, integrator: str, notes: Sequence[Note]
 ) -> dict[str, Any]:
     """Attributes of a free robot's run."""
     return {
@@ -107,7 +108,7 @@ def free_attributes(
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
         "integrator": integrator,
-        "warnings": "\n".join(warnings),
+        **note_attributes(notes),
     }
 
 

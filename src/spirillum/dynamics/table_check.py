@@ -11,6 +11,7 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import largest_yaw
+from spirillum.notes import Note
 from spirillum.units import show
 
 
@@ -21,7 +22,7 @@ class Checked(NamedTuple):
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
     """Whether it comes nearer to the glass than where the table was checked."""
-    said: list[str]
+    said: list[Note]
     """What there is to say of both, a sentence each."""
 
 
@@ -43,21 +44,24 @@ def held_against_check(
     beyond = np.flatnonzero(np.abs(yaw) > checked)
     if beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
-        said.append(
-            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg against the wall, and "
-            f"its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
+        words = (
+            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "
+            "checked "
+            f"up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
         )
+        said.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
-        said.append(
-            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked at gaps from "
-            f"{_length(least)} on: the error estimate is that of such places"
+        words = (
+            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked from "
+            f"{_length(least)} on: the error estimate is that of larger gaps"
         )
+        said.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
     return Checked(not beyond.size, bool(near.size), said)
 
 
-def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[str]:
+def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
     """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
 
     Args:
@@ -69,11 +73,11 @@ def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contac
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []
-    return [
-        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
-        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
-        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
-    ]
+    words = (
+        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: it slides below "
+        f"{show(smoothed, 'um/s')}, where the friction law is smoothed, and has no error estimate"
+    )
+    return [Note("held-by-friction", words, ("in_tube.friction_coefficient", "forward_velocity"))]
 
 
 def _falls(time: Samples | None, first: int) -> str:

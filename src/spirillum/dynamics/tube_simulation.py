@@ -25,9 +25,11 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
+from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
@@ -178,13 +180,13 @@ def run_in_tube(
     dataset = tube_run(steady, links, begun, timetable, wait=asked.wait or 0.0, progress=progress)
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
-    said = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    said = list(notes_in(dataset.attrs))
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     if asked.flow is not None:
         limits.append(flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max())))
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
-        said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+        said.append(NO_WEIGHT)
     said += check_stokes_flow(steady.batch, limits).values()
     stuck = held_by_friction(
         links,
@@ -195,7 +197,7 @@ def run_in_tube(
     error = in_stokes_flow(table.speed_error_at(1.0), *limits)
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
-        warnings="\n".join(said),
+        **note_attributes(said),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -237,18 +239,17 @@ def links_in_tube(
     return links, start
 
 
-def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[str]:
+def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     """A sentence on a flow file of several rows whose times are not those of the run; none for any other."""
     first, last = float(flow[0, 0]), float(flow[-1, 0])
     if len(flow) == 1:
         return []
     if first >= end:
-        return [
-            f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row "
-            "throughout"
-        ]
+        words = f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row"
+        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
     if last < end * (1.0 - 1e-9):
-        return [f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"]
+        words = f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"
+        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
     return []
 
 

@@ -16,6 +16,7 @@ from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, s
 from spirillum.dynamics.held_model import STATES, HeldModel, check_steady, held_model
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
+from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
@@ -39,7 +40,7 @@ class LinearSystem(DisplayMixin):
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
     time_constant: float
     """Of the motor's current there, s; path, angles and charge only add up."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
     """What to be careful about, a sentence each."""
 
     def to_dict(self) -> dict[str, Any]:

@@ -78,7 +78,7 @@ class Observation(DisplayMixin):
                 "pixel": quantity(list(self.pixel), "px"),
             }
             content |= {name: item.to_dict() for name, item in self.rates.items()}
-        return envelope("live-observation", content, [flag.sentence for flag in self.flags])
+        return envelope("live-observation", content, [flag.note for flag in self.flags])
 
 
 def _known(value: float) -> float | None:
