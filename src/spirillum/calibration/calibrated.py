@@ -28,7 +28,7 @@ MEANINGS: dict[Quantity, tuple[str, str]] = {
 """Unit and meaning of what is compared."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Calibrated(DisplayMixin):
     """What a calibration found."""
 

@@ -79,7 +79,7 @@ class ModelRank:
     fit: Calibrated
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ranking(DisplayMixin):
     """Models from the best to the worst."""
 

@@ -82,7 +82,7 @@ class CandidateRobot:
         return self.behind <= _TIED * self.behind_error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Suggestion(DisplayMixin):
     """Candidates from the most to the least telling."""
 

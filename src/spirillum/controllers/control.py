@@ -103,7 +103,7 @@ _LAST_SEED = 2**31 - 1
 _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Control(DisplayMixin):
     """A controlled run, and scores over many."""
 

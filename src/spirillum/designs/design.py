@@ -398,4 +398,4 @@ def _near_step_out(robot: Robot, swum: Swimming) -> list[Note]:
         f"the field turns at {100 * share:.3g} % of the best design's step-out rate, beyond which it slips; "
         f"--subject-to 'step_out_rate >= {room}' leaves room"
     )
-    return [Note("field-slips", words, ("drive.rotation_rate", "step_out_rate"))]
+    return [Note("field-slips", words, ("magnetic.rotation_rate", "step_out_rate"))]

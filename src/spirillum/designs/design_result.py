@@ -86,7 +86,7 @@ class Learned(NamedTuple):
     relative."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design(DisplayMixin):
     """The best values of some fields of a robot, SI."""
 

@@ -98,7 +98,7 @@ _SAMPLES = 400
 """Samples of the way in an answer."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Settling(DisplayMixin):
     """How a robot settles, SI; azimuths about +x from the lowest place."""
 

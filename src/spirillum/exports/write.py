@@ -211,7 +211,7 @@ class Written:
     """What it holds, in words."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Export(DisplayMixin):
     """What was written, and the numbers of its geometry."""
 

@@ -45,7 +45,7 @@ PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
 """Points along the longest side of a plane and of a box."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flow(DisplayMixin):
     """The fluid around a swimming robot at one phase of its tail.
 

@@ -31,7 +31,7 @@ _LINKS = ("body", "rotor")
 """Order of the two links in a 12x12."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Resistance(DisplayMixin):
     """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 

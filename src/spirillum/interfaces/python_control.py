@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import control
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LinearSystem(DisplayMixin):
     """A robot's equations linearised, and where."""
 

@@ -16,7 +16,7 @@ State = Literal["learning", "tracking", "lost"]
 """`learning`: the robot's appearance is not yet known; `lost`: it is not where it should be, or not in full view."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Observation(DisplayMixin):
     """A robot on one frame, from this frame and those before it; SI, NaN where it was not seen."""
 

@@ -240,7 +240,7 @@ class _Log:
                 "clock: all "
                 "rates are wrong by that factor; check the frame rate"
             )
-            self._clocks = Note("clock-in-doubt", words, ("frames_per_second",))
+            self._clocks = Note("clock-in-doubt", words, ("camera.frames_per_second",))
 
     def _hint(self) -> str:
         """What helps a film that has ended while the robot was still learnt."""

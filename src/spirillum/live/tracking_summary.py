@@ -15,7 +15,7 @@ from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.notes import Note
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tracked(DisplayMixin):
     """A source that was tracked to its end."""
 

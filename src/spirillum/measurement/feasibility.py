@@ -76,7 +76,7 @@ class Check:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Feasibility(DisplayMixin):
     """The feasibility of an experiment."""
 

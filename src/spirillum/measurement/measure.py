@@ -125,7 +125,7 @@ TABLE = "observations.csv"
 """Name of the table that a measurement writes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Measurement(DisplayMixin):
     """What was measured of a robot in one or several trials."""
 

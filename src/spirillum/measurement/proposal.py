@@ -65,7 +65,7 @@ class Finding:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Proposal(DisplayMixin):
     """A setup as far as a film tells it."""
 

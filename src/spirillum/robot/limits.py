@@ -12,7 +12,7 @@ from spirillum.arrays import Flags, PerRobot
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
-from spirillum.units import show_apart
+from spirillum.units import show, show_apart
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,11 @@ class Limit:
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
         return self._said(index, "allowed")
+
+    def bound_in_words(self) -> str:
+        """What is allowed, for the first robot; empty where there is no bound."""
+        bound = float(self.bound[0])
+        return f"{self.relation} {show(bound, self.unit)}" if np.isfinite(bound) else ""
 
     def _said(self, index: int, word: str) -> str:
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))

@@ -27,7 +27,7 @@ from spirillum.swimming.steady_quantities import STEADY, headline
 _UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 

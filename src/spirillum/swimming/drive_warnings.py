@@ -39,7 +39,7 @@ def drive_warnings(
                 "field-slips",
                 f"the field is faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips, and rates and "
                 "speed are averages; lower the field's rate",
-                ("drive.rotation_rate",),
+                ("magnetic.rotation_rate",),
             )
         ]
     factors = robot.calibration.get(model.name)

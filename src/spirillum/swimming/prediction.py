@@ -49,7 +49,7 @@ from spirillum.units import KINDS, parse_option, show
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prediction(DisplayMixin):
     """Steady swimming of one robot, SI, rates signed about +x.
 

@@ -34,7 +34,7 @@ _NOT_KEPT = Note(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
 

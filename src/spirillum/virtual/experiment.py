@@ -87,7 +87,7 @@ class Planned:
         return f"{self.folder}/{self.name}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VirtualExperiment(DisplayMixin):
     """A virtual experiment that was written."""
 

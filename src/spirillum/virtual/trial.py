@@ -131,7 +131,7 @@ _LEAST_DEPTH = 1e-6
 """Least distance of the stated axis from the floor and from the oil's surface, m."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VirtualTrial(DisplayMixin):
     """A virtual trial that was written."""
 

@@ -100,7 +100,7 @@ _LARGEST_TURN = 0.25
 """Largest part of a turn of the tail between two frames at which its sense can still be seen (aliasing)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Film(DisplayMixin):
     """A film that was written."""
 
