@@ -335,6 +335,20 @@ def part_listing(words: str) -> str:
     return "```toml\n" + "\n".join(lines[start : end + 1]) + "\n```\n"
 
 
+def notes(severity: str) -> str:
+    """The codes of notes of one severity, each with what it means and an anchor of its own."""
+    from spirillum.notes import KINDS
+
+    parts: dict[str, list[str]] = {}
+    for code, kind in KINDS.items():
+        if kind.severity == severity:
+            parts.setdefault(kind.explanation, []).append(code)
+    return "\n".join(
+        "".join(f"(note-{code})=\n" for code in codes) + f"### {', '.join(f'`{code}`' for code in codes)}\n\n{words}\n"
+        for words, codes in parts.items()
+    )
+
+
 LISTINGS: dict[str, Callable[..., str]] = {
     "robot-fields": robot_fields,
     "study-fields": study_fields,
@@ -352,6 +366,7 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "file": file_listing,
     "function": function_listing,
     "part": part_listing,
+    "notes": notes,
 }
 
 

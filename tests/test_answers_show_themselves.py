@@ -15,6 +15,7 @@ ANSWER = {
     "absent": {"value": None, "unit": "m"},
     "matrix": {"value": [[1.0]], "unit": [["N"]]},
     "trials": [{"name": "first", "advance": {"value": 1e-3, "unit": "m"}}],
+    "notes": [{"code": "misfit", "severity": "caution", "sentence": "1 < 2", "fields": []}],
     "warnings": ["1 < 2"],
 }
 
@@ -22,10 +23,10 @@ ANSWER = {
 def test_text_has_units_ends_parts_and_warnings() -> None:
     lines = text_of(ANSWER).splitlines()
     assert lines[0] == "<b>mine</b>: some kind"
-    assert lines[1].split() == ["forward", "velocity", "20", "um/s", "(10", "to", "30)"]
-    assert lines[2].split()[-2:] == ["0", "fW"]
+    assert lines[1] == "caution: 1 < 2"
+    assert lines[2].split() == ["forward", "velocity", "20", "um/s", "(10", "to", "30)"]
+    assert lines[3].split()[-2:] == ["0", "fW"]
     assert "  trials: first" in lines
-    assert lines[-1] == "warning: 1 < 2"
     assert not any("absent" in line or "matrix" in line for line in lines)
 
 
@@ -40,8 +41,15 @@ def test_html_is_escaped() -> None:
 def test_prediction_shows_five_quantities_and_completes_all() -> None:
     answer = sp.predict("biorob2012-wide", model="sbt")
     lines = str(answer).splitlines()
-    assert [line.split()[0] for line in lines[1:6]] == ["forward", "tail", "body", "motor", "hydrodynamic"]
-    assert f"{1e3 * answer.forward_velocity:.4g} mm/s" in lines[1]
+    assert repr(answer) == f"Prediction(biorob2012-wide, sbt, U = {1e3 * answer.forward_velocity:.4g} mm/s)"
+    assert [line.split()[0] for line in lines if line.startswith("  ")][:5] == [
+        "forward",
+        "tail",
+        "body",
+        "motor",
+        "hydrodynamic",
+    ]
+    assert any(f"forward velocity         {1e3 * answer.forward_velocity:.4g} mm/s" in line for line in lines)
     assert {"battery_run_time", "cost_of_transport", "to_dict"} <= set(dir(answer))
     assert "<table>" in answer._repr_html_()
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
+from spirillum.notes import Note, notes_in_answer, notes_of, shown_cautions
+from spirillum.quantities import QUANTITIES
 from spirillum.units import among, in_unit
 
 
@@ -72,15 +74,31 @@ def percent(share: float) -> str:
 
 
 class DisplayMixin(ABC):
-    """What every answer gives to `print` and to notebooks: its quantities with units, and its warnings."""
+    """What every answer gives to `print` and to notebooks: its quantities with units, and its notes."""
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The answer as data, as the command of the same name prints it with `--json`."""
 
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What is assumed or violated, what that does to the answer and what to do, each with a code."""
+        return notes_of(getattr(self, "warnings", ()))
+
     def _shown(self) -> tuple[Mapping[str, Any], Iterable[str] | None]:
         """The answer as data, and the names of the quantities to show; None: all."""
         return self.to_dict(), None
+
+    def __repr__(self) -> str:
+        """The answer in a line: whose it is, by which model, and its first quantity."""
+        answer, only = self._shown()
+        words = [str(answer[name]) for name in ("robot", "model") if isinstance(answer.get(name), str)]
+        for name in answer if only is None else only:
+            if rows := rows_of(answer, [name]):
+                symbol = QUANTITIES[name].symbol if name in QUANTITIES else rows[0].name
+                words.append(f"{symbol} = {rows[0].value} {rows[0].unit}".rstrip())
+                break
+        return f"{type(self).__name__}({', '.join(words)})"
 
     def __str__(self) -> str:
         """The answer as text, for `print`."""
@@ -92,17 +110,19 @@ class DisplayMixin(ABC):
 
 
 def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
-    """An answer as text: a title, a line for each quantity, what is to be said of it, its warnings."""
+    """An answer as text: its title, the weightiest cautions, a line for each quantity, the number of its notes."""
     rows = rows_of(answer, only)
-    lines = [_title(answer), *_lines(rows, "  ")]
+    notes = notes_in_answer(answer)
+    cautions = shown_cautions(notes)
+    lines = [_title(answer), *(f"caution: {note}" for note in cautions), *_lines(rows, "  ")]
     if len(rows) < (whole := len(rows_of(answer))):
         lines.append(f"  and {whole - len(rows)} more: dir(answer), answer.to_dict()")
     lines += [f"  {name}: {text}" for name, text in _words(answer)]
     for title, part in _parts(answer) if only is None else ():
         lines += [f"  {title}", *_lines(part, "    ")]
-    lines += [f"{name}: {text}" for name, text in _errors(answer)]
-    lines += [f"warning: {warning}" for warning in answer.get("warnings", ())]
-    return "\n".join(lines)
+    lines += [f"{name}: {text}" for name, text in _errors(answer)[:-1]]
+    left = len(notes) - len(cautions)
+    return "\n".join([*lines, *([f"{counted(left, 'more note')}: answer.notes"] if left else [])])
 
 
 def _lines(rows: Sequence[QuantityRow], indent: str) -> list[str]:
@@ -128,9 +148,9 @@ def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str
     said = "".join(
         f"<p><b>{escape(name)}:</b> {escape(text)}</p>" for name, text in (*_words(answer), *_errors(answer))
     )
-    warnings = "".join(f"<p><b>warning:</b> {escape(warning)}</p>" for warning in answer.get("warnings", ()))
+    notes = "".join(f"<p><b>{note.severity}:</b> {escape(note)}</p>" for note in notes_in_answer(answer))
     table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody>"
-    return f"<table><caption>{escape(_title(answer))}</caption>{table}</table>{said}{warnings}"
+    return f"<table><caption>{escape(_title(answer))}</caption>{table}</table>{said}{notes}"
 
 
 def _cells(texts: Iterable[str]) -> str:

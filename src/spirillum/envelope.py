@@ -1,4 +1,4 @@
-"""The form of every answer: quantities with units, a schema and warnings, as JSON or as text."""
+"""The form of every answer: quantities with units, a schema and notes, as JSON or as text."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+
+from spirillum.notes import notes_of
 
 
 def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> dict[str, Any]:
@@ -27,9 +29,21 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def envelope(kind: str, content: Mapping[str, Any], warnings: Iterable[str]) -> dict[str, Any]:
-    """An answer of one kind with its schema's name and its warnings."""
-    return {"schema": f"spirillum.{kind}/1", **content, "warnings": list(warnings)}
+def envelope(kind: str, content: Mapping[str, Any], notes: Iterable[str]) -> dict[str, Any]:
+    """An answer of one kind with its schema's name and its notes; `warnings` are their sentences."""
+    found = notes_of(notes)
+    return {
+        "schema": f"spirillum.{kind}/1",
+        **content,
+        "notes": [note.to_dict() for note in found],
+        "warnings": [note.sentence for note in found],
+    }
+
+
+def with_notes_last(answer: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """An answer with more entries, before its notes."""
+    notes = {name: answer[name] for name in ("notes", "warnings")}
+    return {**{name: item for name, item in answer.items() if name not in notes}, **more, **notes}
 
 
 def as_json(answer: Mapping[str, Any]) -> str:

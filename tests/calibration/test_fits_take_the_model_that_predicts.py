@@ -87,7 +87,7 @@ def test_a_robot_without_a_table_is_fitted_without_walls_and_told_so(observed: P
     found = sp.calibrate(observed, new, **QUICK)
     assert found.problem.model.name == "sbt"
     assert found.warnings[0].startswith(
-        "model 'sbt' leaves the walls out, which its fitted numbers then stand for: 1 of 1"
+        "wall effects are not modelled by 'sbt', and fitted numbers compensate for them: 1 of 1"
     )
     assert "--prepare" in found.warnings[0]
     assert np.isnan(found.friction[0].low)

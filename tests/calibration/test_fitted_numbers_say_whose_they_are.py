@@ -50,7 +50,7 @@ def test_a_tail_that_was_not_fitted_has_the_middle_in_predict_and_in_study(calib
         found = dataset["motor_rotation_rate"].sel(friction="rotor").sel(wavelength=wavelength, method="nearest")
         assert float(found.squeeze()) == pytest.approx(alone.motor_rotation_rate, rel=1e-12)
     assert "B_eff of 1 of 2 tails was not fitted" in dataset.attrs["warnings"]
-    assert "inferred under friction reading 'rotor' and is used under 'paper'" in dataset.attrs["warnings"]
+    assert "inferred with friction 'rotor' and is another torque with 'paper'" in dataset.attrs["warnings"]
     assert "o.csv says that its numbers are synthetic" in dataset.attrs["warnings"]
 
 
@@ -133,7 +133,7 @@ def test_a_fit_refuses_what_it_would_not_use(
 def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibration: Path) -> None:
     other = load(WIDE, **{"tail.wavelength": "13 mm"})
     found = sp.predict(other, model="rft", calibration=calibration, friction="paper").warnings
-    assert any("the middle of 3 fitted tails" in words and "8e-06 to 1.6e-05" in words for words in found)
+    assert any("the median of 3 fitted tails" in words and "8e-06 to 1.6e-05" in words for words in found)
     assert any("and is used under 'paper'" in words for words in found)
     assert any("o.csv says that its numbers are synthetic" in words for words in found)
     own = sp.predict(WIDE, model="rft", calibration=calibration)
@@ -146,7 +146,7 @@ def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibratio
 def test_a_negative_friction_is_zero_and_said(calibration: Path) -> None:
     calibration.write_text(calibration.read_text().replace("8e-06", "0.0"))
     found = sp.predict(WIDE, model="rft", calibration=calibration)
-    assert any("came out negative in the calibration: zero is used" in words for words in found.warnings)
+    assert any("is negative: zero is used" in words for words in found.warnings)
     assert not any("unset" in words for words in found.warnings)
 
 
@@ -221,12 +221,12 @@ def test_a_second_calibration_leaves_nothing_of_the_first(
 
 def test_friction_of_another_models_torque_is_said(calibration: Path) -> None:
     calibration.write_text(calibration.read_text().replace("synthetic = true", 'synthetic = true\nmodel = "sbt"'))
-    words = "B_eff was inferred with the torque of model 'sbt' and is used with 'rft'"
+    words = "B_eff was inferred with model 'sbt' and is another torque with 'rft'"
     found = {model: sp.predict(WIDE, model=model, calibration=calibration).warnings for model in ("sbt", "rft")}
     assert any(words in said for said in found["rft"])
-    assert not any("the torque of model" in said for said in found["sbt"])
+    assert not any("was inferred with model" in said for said in found["sbt"])
     at_rate = sp.predict(WIDE, model="rft", calibration=calibration, tail_rate="1 Hz").warnings
-    assert not any("the torque of model" in said for said in at_rate)
+    assert not any("was inferred with model" in said for said in at_rate)
     compared = sp.compare_models(WIDE, models=["sbt", "rft"], calibration=calibration).warnings
     assert any(said.startswith("rft: ") and words in said for said in compared)
     study = {"title": "t", "models": ["sbt", "rft"], "friction": ["rotor"], "robots": [WIDE]}

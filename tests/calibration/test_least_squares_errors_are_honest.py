@@ -17,7 +17,7 @@ def test_planted_factors_come_back_without_noise(made: Callable[..., Path]) -> N
     found = sp.calibrate(path, PRESETS, method="least-squares", model="sbt")
     assert found.values["body_drag[40 mm]"].value == pytest.approx(2.2, rel=1e-6)
     assert found.values["body_rotation[30 mm]"].value == pytest.approx(1.3, rel=1e-6)
-    assert any("observed once for each tail" in warning for warning in found.warnings)
+    assert any("observed once a tail" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(("seeds", "least"), [(4, 12), pytest.param(16, 54, marks=pytest.mark.slow)])
@@ -41,7 +41,7 @@ def test_a_wrong_model_says_by_how_much_it_misses(made: Callable[..., Path]) -> 
     found = sp.calibrate(path, PRESETS[0], model="rft", method="least-squares")
     fitted = found.values["body_drag"]
     assert found.discrepancy["advance"].value > 0.05
-    assert any("model 'rft' misses the speed" in warning for warning in found.warnings)
+    assert any("'rft' misses the speed" in warning for warning in found.warnings)
     # The interval is as wide as the misfit says, not as narrow as five trials of 2 % would make it.
     assert (fitted.high - fitted.low) / fitted.value > 4 * 1.96 * 0.02 / np.sqrt(5 * 6)
 

@@ -47,7 +47,7 @@ def test_chains_that_have_not_mixed_are_refused_loudly(
     hasty = Sampling(ensembles=2, walkers=24, warm_up=2, steps=10, doublings=0)
     found = sp.calibrate(made(), [WIDE, "biorob2012-narrow"], sampling=hasty, model="sbt")
     assert not found.converged
-    assert found.warnings[0].startswith("the posterior may not be used")
+    assert found.warnings[0].startswith("do not use the posterior")
     write_calibration(found, tmp_path, figures=False)
     assert "has not converged" in (tmp_path / "calibration.toml").read_text()
 

@@ -174,11 +174,13 @@ def test_runs_take_model_and_motion_of_what_was_fitted(fitted: Any) -> None:
     run = sp.simulate(WIDE, calibration=folder / "calibration.toml", timing=timing)
     assert (run.attrs["model"], run.attrs["motion"], run.attrs["calibrated"]) == ("sbt", "held", 1)
     said = run.attrs["warnings"].split("\n")
-    assert said[0].startswith("the run takes model 'sbt': ")
-    assert said[1].startswith("model 'sbt' knows the entries along and about the motor axis only: the run is held")
+    assert said[0].startswith("the run uses model 'sbt': ")
+    assert said[1].startswith(
+        "model 'sbt' knows the entries along and about the motor axis only: the run is axial motion"
+    )
     other = sp.simulate(WIDE, model="rft", calibration=folder / "calibration.toml", timing=timing)
     assert (other.attrs["model"], other.attrs["motion"]) == ("rft", "free")
-    assert "on which its factors do not act; allowed: also --model sbt" in other.attrs["warnings"].split("\n")[0]
+    assert "on which its factors do not act; use --model sbt" in other.attrs["warnings"].split("\n")[0]
     plain = sp.simulate(WIDE, motion="held", timing=timing)
     assert (plain.attrs["model"], plain.attrs["motion"]) == ("tube", "held")
     with pytest.raises(sp.InputError, match="allowed: --model sbt"):

@@ -102,7 +102,7 @@ def test_a_few_tails_have_no_standard_error(
     from rich.console import Console
 
     from spirillum.calibration.ranking import _cautions
-    from spirillum.cli.tables.model_ranking import table
+    from spirillum.cli.tables import blocks_of
 
     few = tuple(
         replace(item, pointwise=item.pointwise[:count], difference=-30.0 * place, difference_error=0.0)
@@ -112,7 +112,7 @@ def test_a_few_tails_have_no_standard_error(
     for item in answer["models"]:
         assert item["difference"]["standard_error"] is None
         assert item["expected_log_density"]["standard_error"] is None
-    table(answer, Console(width=300))
+    Console(width=300).print(*blocks_of(answer))
     printed = capsys.readouterr().out
     assert "-30.0 (error: -)" in printed
     assert "+-" not in printed
@@ -120,16 +120,16 @@ def test_a_few_tails_have_no_standard_error(
     fit = SimpleNamespace(experiment=SimpleNamespace(**seen), warnings=())
     words = _cautions([replace(ranking.best, fit=fit, pareto=np.zeros(count))])
     assert words == [
-        f"only {said}: standard errors of the log density are withheld, for over fewer than 4 they are chance"
+        f"only {said}: standard errors of the log density are chance below 4, and not given; measure more tails"
     ]
 
 
 def test_failures_say_on_which_scale_they_are(ranking: Any, capsys: pytest.CaptureFixture[str]) -> None:
     from rich.console import Console
 
-    from spirillum.cli.tables.model_ranking import table
+    from spirillum.cli.tables import blocks_of
 
-    table(ranking.to_dict(), Console(width=300))
+    Console(width=300).print(*blocks_of(ranking.to_dict()))
     printed = capsys.readouterr().out
     assert "standard deviations" in printed
     assert "misses motor rate by" not in printed

@@ -113,7 +113,7 @@ def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
     """The stated error is how much the difference varies between independent sets of draws."""
     from rich.console import Console
 
-    from spirillum.cli.tables.suggestion import table
+    from spirillum.cli.tables import blocks_of
     from spirillum.fitted import posterior_file
 
     path = candidates(fitted, "40,20,2.5", "40,20.01,2.5", "40,12,1.5")
@@ -138,7 +138,7 @@ def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
     close = replace(
         found, candidates=tuple(replace(item, behind=0.002, behind_error=0.004) for item in found.candidates)
     )
-    table(close.to_dict(), Console(width=300))
+    Console(width=300).print(*blocks_of(close.to_dict()))
     printed = capsys.readouterr().out
     assert "0.002 +- 0.004" in printed
     assert "a tie: 2 others are within two standard errors of the first" in printed
@@ -217,7 +217,7 @@ def test_a_set_field_of_robots_that_nobody_named_says_whose_they_are(fitted: Pat
     few = ("--candidates", str(candidates(fitted, "40,20,2.5")))
     found = run("suggest", str(fitted / "posterior.nc"), *few, "--set", "motor.resistance=5 ohm", "--json")
     assert found.code == 0
-    assert "biorob2012-wide and biorob2012-narrow, are taken" in json.loads(found.out)["warnings"][0]
+    assert "biorob2012-wide and biorob2012-narrow, are used" in json.loads(found.out)["warnings"][0]
 
 
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -225,7 +225,7 @@ def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatc
 
     found = sp.suggest(fitted / "posterior.nc", candidates=candidates(fitted, "40,20,2.5", "30,20,2.5"))
     assert len(found.candidates) == 2
-    assert "biorob2012-wide and biorob2012-narrow, are taken" in found.warnings[0]
+    assert "biorob2012-wide and biorob2012-narrow, are used" in found.warnings[0]
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):
         monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path, one=changed: one)
@@ -236,5 +236,5 @@ def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatc
 def test_another_geometry_is_said(fitted: Path) -> None:
     other = {"extends": WIDE, "channel": {"diameter": "24 mm"}}
     found = sp.suggest(fitted / "posterior.nc", other, candidates=candidates(fitted, "24,20,2.5"))
-    assert any("used outside its geometry: channel.diameter = 24 mm" in warning for warning in found.warnings)
+    assert any("used outside its geometry, channel.diameter = 24 mm" in warning for warning in found.warnings)
     assert len(found.candidates) == 1

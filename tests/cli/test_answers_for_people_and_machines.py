@@ -66,7 +66,7 @@ def test_prediction_has_the_keys_of_the_contract(run: Callable[..., Any], preset
 
 def test_table_shows_the_same_numbers_and_every_warning(run: Callable[..., Any]) -> None:
     changed = ("--set", "channel.diameter=35 mm", "--set", "body.diameter=17mm")
-    outcome = run("predict", "biorob2012-wide", "--model", "sbt", *changed)
+    outcome = run("predict", "biorob2012-wide", "--model", "sbt", "--notes", *changed)
     other = sp.load("biorob2012-wide", channel={"diameter": "35 mm"}, body={"diameter": "17 mm"})
     expected = sp.predict(other, model="sbt")
     assert outcome.code == 0

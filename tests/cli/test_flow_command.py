@@ -48,7 +48,7 @@ def test_summary_agrees_with_the_files(run: Callable[..., Any], tmp_path: Path) 
     assert answer["schema"] == "spirillum.flow/1"
     assert answer["frame"] == "lab"
     assert answer["phase"] == {"value": pytest.approx(np.pi / 2), "unit": "rad"}
-    assert any("walls are not computed" in warning for warning in answer["warnings"])
+    assert any("wall effects are not modelled" in warning for warning in answer["warnings"])
     assert [item["file"] for item in answer["files"]] == [str(plane), str(box)]
     for item in answer["files"]:
         with xr.open_dataset(item["file"]) as stored:
@@ -98,7 +98,7 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
     assert answer["placement"]["gap"]["value"] == pytest.approx(1e-3)
     assert answer["placement"]["ends"] == "closed"
     assert "plug_velocity" in answer
-    assert not any("walls" in warning for warning in answer["warnings"])
+    assert not any("wall" in warning for warning in answer["warnings"])
     table = run("flow", WIDE, *SMALL, *files, *place).out
     assert "model tube, lab frame" in table
     assert "ends of the channel: closed" in table

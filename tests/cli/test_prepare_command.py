@@ -58,7 +58,7 @@ def test_an_error_above_the_allowed_one_is_written_with_digits_that_differ() -> 
         worse = replace(found.table, error={**found.table.error, "sideways_force": error})
         (sentence,) = Prepared(found.robot, worse).warnings
         assert f"sideways force is off by up to {said} at yawed places" in sentence
-        assert "more than the 2 %" in sentence
+        assert "at most 2 % is expected" in sentence
 
 
 @pytest.mark.parametrize("workers", [0, 65, True])

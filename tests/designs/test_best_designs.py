@@ -182,8 +182,8 @@ def test_calibration_factors_are_named(unsure: sp.Design) -> None:
     """The preset has those of Table III for `sbt`, which stand for the walls."""
     assert unsure.calibrated
     assert unsure.to_dict()["calibrated"]
-    assert any("calibration factors, the same for every design, stand for the" in item for item in unsure.warnings)
-    assert not any("walls are left out" in item for item in unsure.warnings)
+    assert any("the same drag factors in place of walls" in item for item in unsure.warnings)
+    assert not any("wall effects are not modelled" in item for item in unsure.warnings)
 
 
 @pytest.mark.parametrize("judged", [{"statistic": "quantile"}, {"level": 0.2}, {"draws": 64}, {"confidence": 0.9}])
@@ -215,20 +215,20 @@ def test_a_posterior_is_said_what_predict_says_of_it(tmp_path) -> None:
         "ecoli", {"tail.wavelength": "2 um:2.5 um"}, maximise="forward_velocity", posterior=file, judged=few
     )
     assert set(sp.predict("ecoli", posterior=file).warnings) <= set(away.warnings)
-    assert any("is used outside its geometry: channel.diameter = none" in item for item in away.warnings)
+    assert any("is used outside its geometry, channel.diameter = none" in item for item in away.warnings)
     assert any("o.csv says that its numbers are synthetic" in item for item in away.warnings)
     bare = sp.load("biorob2012-wide").model_copy(update={"calibration": {}})
     found = sp.design(bare, {"tail.wavelength": "20 mm:30 mm"}, maximise="forward_velocity", posterior=file, judged=few)
     assert found.calibrated
-    assert any("calibration factors, the same for every design, stand for the" in item for item in found.warnings)
-    assert not any("walls are left out" in item for item in found.warnings)
+    assert any("the same drag factors in place of walls" in item for item in found.warnings)
+    assert not any("wall effects are not modelled" in item for item in found.warnings)
 
 
 def test_a_lead_within_the_models_error_is_no_lead(unsure: sp.Design) -> None:
     """The best design is two per cent ahead of today's, by a model whose speeds are 31 % off."""
     lead = 1.0 - unsure.alternatives[0].objective / unsure.objective
     assert 0 < lead < 0.31
-    (sentence,) = (sentence for sentence in unsure.warnings if "than the error of 31 %" in sentence)
+    (sentence,) = (sentence for sentence in unsure.warnings if "within the error of 31 %" in sentence)
     assert f"leads today's design by {100 * lead:.2g} %" in sentence
 
 
@@ -238,7 +238,7 @@ def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design
     one_per_cent = tuple(replace(item, **close) for item in unsure.alternatives)
     learned = replace(unsure, model="tube", learned=Learned(20, 1e-3, 2e-2), alternatives=one_per_cent)
     (sentence,) = lead_warnings(learned)
-    assert "differ by a tenth of a range or more by 1 %, less than the error of 2 % with which the learned" in sentence
+    assert "the runner-up by 1 %, within the error of 2 % with which the learned" in sentence
     breaking = tuple(replace(item, keeps=False) for item in one_per_cent)
     assert lead_warnings(replace(learned, alternatives=breaking)) == ()
 
@@ -249,7 +249,7 @@ def test_a_better_design_outside_the_ranges_is_said_to_be_one() -> None:
     today = sp.predict("biorob2012-wide", model="sbt").forward_velocity
     assert today > found.objective
     better = 100.0 * (today / found.objective - 1.0)
-    assert any(f"is better than the best design within them, by {better:.2g} %" in line for line in found.warnings)
+    assert any(f"is better than the best one within them by {better:.2g} %" in line for line in found.warnings)
     assert not any("leads today's design" in line for line in found.warnings)
 
 
@@ -333,10 +333,10 @@ def test_a_design_that_is_about_to_step_out_says_so() -> None:
     best = sp.design("magnetic-helix", vary, maximise="forward_velocity", model="rft")
     rate = sp.load("magnetic-helix").magnetic.rotation_rate  # type: ignore[union-attr]
     assert rate / best.quantities["step_out_rate"] > 0.95
-    assert any("of the step-out rate" in line for line in best.warnings)
+    assert any("step-out rate, beyond which it slips" in line for line in best.warnings)
     room = ["step_out_rate >= 1.2 Hz"]
     safe = sp.design("magnetic-helix", vary, maximise="forward_velocity", model="rft", subject_to=room)
-    assert not any("of the step-out rate" in line for line in safe.warnings)
+    assert not any("step-out rate, beyond which it slips" in line for line in safe.warnings)
 
 
 def test_conditions_have_the_units_of_their_quantity() -> None:

@@ -58,7 +58,7 @@ def test_a_run_in_a_tilted_field_comes_to_swim_along_its_axis() -> None:
     assert speeds[3:] == pytest.approx(speeds[:3], rel=1e-3)
     assert run.attrs["field_yaw"] == pytest.approx(yaw)
     said = run.attrs["warnings"]
-    assert "(yaw 20 deg, pitch 10 deg), and velocities are those along x" in said
+    assert "(yaw 20 deg, pitch 10 deg): velocities are those along x" in said
     assert float(said.partition("it swims at ")[2].split()[0]) == pytest.approx(1e3 * speeds[0], rel=0.01)
 
 

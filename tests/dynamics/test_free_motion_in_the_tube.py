@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics import table_check
+from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import observed_at
 from spirillum.dynamics.return_map import STEPS, ReturnMap
@@ -227,7 +227,7 @@ def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() ->
         sp.simulate("biorob2012-wide", model="tube", timing={"duration": "0.1 s"}, placement={"gap": gap})
         for gap in ("0.2 mm", "0.5 mm")
     )
-    assert "mm, and its table was checked at gaps from 0.29 mm on" in thin.attrs["warnings"]
+    assert "mm, and its table was checked from 0.29 mm on" in thin.attrs["warnings"]
     assert "its gap falls" not in wide.attrs["warnings"]
     assert np.isfinite(thin.attrs["error_estimate"])
 
@@ -236,7 +236,7 @@ def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() ->
 def test_run_states_an_error_up_to_the_yaw_at_which_the_table_was_checked(
     monkeypatch: pytest.MonkeyPatch, checked: float, known: bool
 ) -> None:
-    monkeypatch.setattr(table_check, "largest_yaw", lambda *_: np.radians(checked))
+    monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: np.radians(checked))
     place = {"gap": "1 mm", "yaw": "3 deg"}
     run = sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.1 s"}, placement=place)
     assert np.isfinite(run.attrs["error_estimate"]) == known

@@ -157,7 +157,7 @@ def test_a_sweep_says_that_walls_are_left_out() -> None:
     channel = {"diameter": "20 mm", "length": "200 mm"}
     for robot, said in ((sp.load("magnetic-helix", channel=channel), True), (sp.load("magnetic-helix"), False)):
         sweep = sp.magnetic_sweep(robot, ["0.5 Hz"], turns=4.0, model="rft")
-        assert ("the channel's walls are left out (model 'rft')" in sweep.attrs["warnings"]) is said
+        assert ("wall effects are not modelled by 'rft'" in sweep.attrs["warnings"]) is said
 
 
 @pytest.mark.parametrize(

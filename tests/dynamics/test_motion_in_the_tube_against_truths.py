@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics import table_check
+from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.integration import Reach, integrate, observed_at
 from spirillum.dynamics.run_summary import run_answer
 from spirillum.dynamics.timing import Timing
@@ -454,8 +454,8 @@ def test_start_has_the_gap_pitch_yaw_and_azimuth_asked_for(made: Any) -> None:
 
 def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ends, flow over time, waiting, friction, and the table's error; the flow file is checked."""
-    monkeypatch.setattr(table_check, "largest_yaw", lambda *_: 1.0)  # the stand-in holds at any yaw and gap
-    monkeypatch.setattr(table_check, "least_checked_gap", lambda _: 0.0)
+    monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: 1.0)  # the stand-in holds at any yaw and gap
+    monkeypatch.setattr(tube_simulation, "least_checked_gap", lambda _: 0.0)
     steady, links, _ = made()
     table = SimpleNamespace(packed=links.table, speed_error_at=lambda yaw: 0.02 if yaw else 0.01, key="name")
     file = tmp_path / "flow.csv"

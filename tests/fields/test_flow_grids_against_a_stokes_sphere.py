@@ -124,11 +124,11 @@ def test_blocks_and_progress_do_not_change_the_answer(around: Flow, monkeypatch:
 def test_settings_and_versions_go_into_the_attributes(around: Flow) -> None:
     attributes = around.plane(resolution=5).attrs
     assert {"robot", "frame", "phase", "forward_velocity", "settings", "versions", "warnings"} <= set(attributes)
-    assert "walls are not computed" in attributes["warnings"]
+    assert "wall effects are not modelled" in attributes["warnings"]
     free = Flow(
         sp.predict(sp.load("biorob2012-wide", channel="none"), tail_rate=7.5, model="sbt"), around.field, 0.0, "lab"
     )
-    assert "walls" not in free.plane(resolution=5).attrs["warnings"]
+    assert "wall" not in free.plane(resolution=5).attrs["warnings"]
 
 
 def test_files_are_read_back(around: Flow, tmp_path: Any) -> None:

@@ -79,8 +79,8 @@ def test_without_a_band_nothing_of_it_is_there(leaning: Any, question: dict[str,
     dataset = sp.study(question)
     assert not [name for name in dataset.data_vars if str(name).endswith(("_low", "_high", "_at_place"))]
     assert "place" not in dataset.dims
-    assert "gap and pitch are not given: model 'walled' answers at one place" in dataset.attrs["warnings"]
-    assert "answers at one place" not in banded.attrs["warnings"]
+    assert "gap and pitch are unknown: answers are for one pose" in dataset.attrs["warnings"]
+    assert "answers are for one pose" not in banded.attrs["warnings"]
     assert dataset.attrs["fingerprint"] != banded.attrs["fingerprint"]
 
 

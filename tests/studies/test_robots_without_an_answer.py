@@ -56,7 +56,7 @@ def test_a_robot_without_a_channel_says_that_it_takes_the_walls_of_the_others(tm
     short.write_text('extends = "ecoli"\nname = "ecoli"\ntail.length = "2 um"\n')
     found = sp.study({"robots": ["biorob2012-wide", str(short)], "friction": ["none"]})
     assert found["model"].values.tolist() == ["slender"]
-    assert "one model answers for all robots, and ecoli has no channel" in found.attrs["warnings"]
+    assert "one model answers for all, and ecoli has no channel" in found.attrs["warnings"]
 
 
 @pytest.mark.parametrize(("amplitudes", "code"), [('["2.5 mm", "25 mm"]', 0), ('["25 mm"]', 2)])

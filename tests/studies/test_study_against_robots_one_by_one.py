@@ -98,5 +98,5 @@ def test_a_model_that_solves_brings_its_error_estimate_and_what_sets_it_apart(sm
         assert float(dataset["forward_velocity"].sel(place)) == pytest.approx(one.forward_velocity, rel=1e-12)
         assert float(dataset["error_estimate"].sel(place)) == pytest.approx(one.error_estimate, rel=1e-9)
     assert dataset["error_estimate"].sel(model="sbt").isnull().all()
-    assert "calibration factors stand for the walls with sbt and not with slender" in dataset.attrs["warnings"]
-    assert "the coupling turns with the tail in slender and is left out by sbt" in dataset.attrs["warnings"]
+    assert "drag factors are fitted for sbt and not for slender" in dataset.attrs["warnings"]
+    assert "the coupling is modelled by slender and not by sbt" in dataset.attrs["warnings"]

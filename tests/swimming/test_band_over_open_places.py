@@ -186,13 +186,13 @@ def test_comparison_stays_at_the_reference_place(leaning: Any) -> None:
 
 def test_command_line(leaning: Any, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
-        main(["predict", WIDE, "--model", "walled", "--tail-rate", "1.2Hz"])
+        main(["predict", WIDE, "--model", "walled", "--tail-rate", "1.2Hz", "--notes"])
     out = capsys.readouterr().out
     assert stopped.value.code == 0
     row = next(line for line in out.splitlines() if "forward velocity" in line)
     value, low, high = (float(cell) for cell in row.split("│")[1:4])
     assert low < value < high
-    assert "band: low and high are the least and the largest of 10 places" in out
+    assert "band: low and high are the least and the largest of 10 poses" in out
     assert re.search(
         r"gap 0.5 mm \(open: band over 0.1 to 1 mm\), pitch 0 deg \(open: band over 0 to 5.4\d* deg\)", out
     )

@@ -123,15 +123,15 @@ def test_factors_for_some_models_only_are_pointed_out(tmp_path: Any) -> None:
         'channel_diameter = "40 mm"\nbody_diameter = "18 mm"\nbody_length = "35 mm"\n'
     )
     uneven = sp.compare_models(WIDE, models=["sbt", "rft"], calibration=path)
-    assert any("stand for the walls with sbt and not with rft" in sentence for sentence in uneven.warnings)
+    assert any("drag factors are fitted for sbt and not for rft" in sentence for sentence in uneven.warnings)
     even = sp.compare_models(WIDE, models=["sbt", "rft"], calibration=path, calibrated=False)
-    assert not any("stand for the walls" in sentence for sentence in even.warnings)
+    assert not any("drag factors are fitted" in sentence for sentence in even.warnings)
 
 
 def test_a_coupling_that_some_models_leave_out_is_pointed_out(monkeypatch: pytest.MonkeyPatch) -> None:
     def pointed_out(robot: sp.Robot) -> bool:
         found = sp.compare_models(robot, models=["sbt", "rft"], tail_rate=1.0)
-        return "turns with the tail in rft and is left out by sbt" in " ".join(found.warnings)
+        return "the coupling is modelled by rft and not by sbt" in " ".join(found.warnings)
 
     assert not pointed_out(sp.load(WIDE))
     monkeypatch.setattr(type(SWIMMER_MODELS["rft"]), "parts", ("body", "coupling", "tail"))

@@ -67,7 +67,7 @@ def test_a_robot_that_the_tube_does_not_know_is_answered_without_walls_and_says_
     tight = sp.load(WIDE, **{"channel.diameter": "18.5 mm"})
     found = sp.predict(tight, tail_rate="1.2 Hz")
     assert found.model.name == "slender"
-    assert found.warnings[0].startswith("the channel's walls are left out")
+    assert found.warnings[0].startswith("wall effects are not modelled")
     assert "channel.diameter = 18.5 mm" in found.warnings[0]
     with pytest.raises(sp.InputError, match=r"model 'tube'.*channel\.diameter"):
         sp.predict(tight, tail_rate="1.2 Hz", placement={"gap": "0.1 mm"})  # a place needs walls
@@ -79,7 +79,7 @@ def test_what_would_take_minutes_without_a_table_is_answered_without_walls(monke
     monkeypatch.setattr(library, "find_table", lambda *_: None)
     found = choose_model("auto", robot, placement=Placement(), tables_only=True)
     assert found.model == "slender"
-    assert "`spirillum prepare` makes one" in found.caution
+    assert "run `spirillum prepare`" in found.caution
     assert choose_model("auto", robot).model == "tube"
 
 
@@ -90,7 +90,7 @@ def test_one_place_without_a_table_says_what_a_table_adds() -> None:
     found = sp.predict(robot, tail_rate="1.2 Hz", placement={"gap": "4 mm"})
     assert found.answered_by["form"] == "direct"
     assert found.band is None
-    assert any(said.startswith("pitch") and "`spirillum prepare`" in said for said in found.warnings)
+    assert any(said.startswith("pitch is unknown") and "`spirillum prepare`" in said for said in found.warnings)
 
 
 def test_other_models_say_what_they_say_alone(answer: Any) -> None:
@@ -142,7 +142,7 @@ def test_studies_take_one_model_for_all_robots() -> None:
     assert models(robots=[WIDE, NARROW]) == (("tube",), ())
     mixed, (said,) = models(robots=[WIDE, "ecoli"])
     assert mixed == ("slender",)
-    assert said.endswith("one model answers for all robots, and ecoli has no channel")
+    assert said.endswith("one model answers for all, and ecoli has no channel")
     assert models(robots=[WIDE], models=["sbt", "auto", "tube"]) == (("sbt", "tube"), ())
     tails = {"wavelengths": ["25 mm", "24.3 mm"], "amplitudes": ["2.5 mm"], "channels": {"wide": WIDE}}
     found, cautions = models(grid=tails)

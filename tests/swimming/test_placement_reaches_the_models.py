@@ -46,13 +46,13 @@ def test_a_robot_without_weight_is_not_known_to_lie_on_the_floor(walled: Any) ->
     light = sp.load(WIDE, **{"body.mass": None})
     for robot, placement, said in ((light, None, True), (light, {"gap": "1 mm"}, False), (sp.load(WIDE), None, False)):
         answer = sp.predict(robot, model="walled", tail_rate="1 Hz", placement=placement, band=False)
-        assert any("nothing tells that its weight keeps" in sentence for sentence in answer.warnings) is said
+        assert any("the robot is assumed to rest on the floor" in sentence for sentence in answer.warnings) is said
 
 
 def test_fast_flow_warns(walled: Any) -> None:
     answer = sp.predict(WIDE, model="walled", tail_rate="1 Hz", placement={"flow": "-50 mm/s"}, band=False)
     assert any("Reynolds number (imposed flow, body diameter) = 0.25" in sentence for sentence in answer.warnings)
-    assert any("the imposed flow does work on the robot too" in sentence for sentence in answer.warnings)
+    assert any("the imposed flow does work on the robot" in sentence for sentence in answer.warnings)
 
 
 def test_resistance(walled: Any) -> None:
@@ -65,9 +65,9 @@ def test_comparison_places_those_that_ask(walled: Any) -> None:
     answer = sp.compare_models(WIDE, models=["sbt", "walled"], tail_rate="1 Hz", placement=LOW)
     assert answer.predictions["walled"].batch.placement == Placement.of(LOW)
     assert not answer.predictions["sbt"].batch.placement.is_given
-    assert any("walls are computed by walled and not by sbt" in sentence for sentence in answer.warnings)
+    assert any("wall effects are modelled by walled and not by sbt" in sentence for sentence in answer.warnings)
     both = sp.compare_models(WIDE, models=["sbt", "walled"], tail_rate="1 Hz", calibrated=True)
-    assert not any("with sbt and not with walled" in sentence for sentence in both.warnings)
+    assert not any("for sbt and not for walled" in sentence for sentence in both.warnings)
 
 
 def test_models_without_walls_refuse(walled: Any) -> None:
@@ -119,7 +119,9 @@ def test_command_line(walled: Any, run: Callable[..., tuple[int, str, str]]) -> 
     assert code == 0
     assert "placement: in the channel, gap - mm" not in out
     assert "plug velocity" in out
-    code, out, _ = run("resistance", WIDE, *model, "--eccentricity", "0.5", "--pitch", "0deg", "--tail-drop", "1mm")
+    code, out, _ = run(
+        "resistance", WIDE, *model, "--eccentricity", "0.5", "--pitch", "0deg", "--tail-drop", "1mm", "--notes"
+    )
     assert (code, "placement: in the channel, ends open" in out) == (0, True)
     code, out, _ = run("compare-models", WIDE, *model, "--model", "rft", "--gap", "1mm", "--json")
     walls = next(entry for entry in json.loads(out)["models"] if entry["model"] == "walled")

@@ -96,7 +96,7 @@ def test_a_film_shows_what_predict_says_where_no_model_is_named() -> None:
     assert rates["forward_velocity"] == pytest.approx(said.forward_velocity, rel=1e-9)
     _, source, warnings = steady_rates(load(ROBOT, **{"tail.wavelength": "17 mm"}), asked)
     assert source == "slender"
-    assert "walls are left out" in warnings[-1]
+    assert "wall effects are not modelled" in warnings[-1]
 
 
 def test_a_planted_wrong_depth_stands_in_the_setup_alone(trial: Any, tmp_path: Path) -> None:
@@ -321,4 +321,4 @@ def test_a_seed_of_which_nothing_is_drawn_is_said_to_change_nothing(tmp_path: Pa
         (({"seed": 3}, True), ({"seed": 3, "degradation": {"noise": 2.0}}, False), ({}, False))
     ):
         found = sp.render("biorob2012-wide", tmp_path / f"{number}.mp4", **short, **more)
-        assert any(line.startswith("seed = 3 changes nothing") for line in found.warnings) is said
+        assert any(line.startswith("seed = 3 has no effect") for line in found.warnings) is said

@@ -18,6 +18,7 @@ from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Post
 from spirillum.calibration.problem import Problem
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
+from spirillum.notes import Note
 
 MEANINGS: dict[Quantity, tuple[str, str]] = {
     "advance": ("m/rad", "advance per radian of the tail"),
@@ -27,7 +28,7 @@ MEANINGS: dict[Quantity, tuple[str, str]] = {
 """Unit and meaning of what is compared."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Calibrated(DisplayMixin):
     """What a calibration found."""
 
@@ -54,7 +55,7 @@ class Calibrated(DisplayMixin):
     least_squares: LeastSquares | None
     posterior: Posterior | None
     identifiability: Identifiability | None
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     friction_given: tuple[Estimate, ...] = ()
     """B_eff of every robot with its constants as they are, on which predictions of these robots rest; empty where that
     is `friction`."""

@@ -32,6 +32,7 @@ from spirillum.measurement.observations import (
 )
 from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.swimming.discrepancy import error_of_mean
 
@@ -129,9 +130,9 @@ class Experiment:
     """Hash of the file."""
     synthetic: bool
     """Whether the file says that its numbers were made by a program."""
-    outliers: tuple[str, ...] = ()
+    outliers: tuple[Note, ...] = ()
     """Trials that are far off the others of their tail, a sentence each."""
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Note, ...] = ()
     """What is doubtful of the rows, such as trials of one tail that are equal in every number, a sentence each."""
 
     @property
@@ -264,15 +265,17 @@ def _check_variety(path: Path, observations: Sequence[ObservationRow]) -> None:
         )
 
 
-def _copies(items: Sequence[ObservationRow]) -> list[str]:
-    """A sentence on trials of one tail that are equal in every number; none where they differ."""
+def _copies(items: Sequence[ObservationRow]) -> list[Note]:
+    """A note on trials of one tail that are equal in every number; none where they differ."""
     alike: dict[str, list[int]] = {}
     for item in items:
         numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
         alike.setdefault(repr(numbers), []).append(item.row)
     return [
-        f"rows {', '.join(map(str, rows))} are equal in every number: copies of one trial make the scatter of trials, "
-        "and with it all intervals, too small"
+        Note(
+            "intervals-incomplete",
+            f"rows {', '.join(map(str, rows))} are equal in every number: copies of a trial make intervals too small",
+        )
         for rows in alike.values()
         if len(rows) > 1
     ]

@@ -43,6 +43,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.fluid.tube.tabled import TabledTube, tables_of
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
 from spirillum.robot.load import load
@@ -84,8 +85,10 @@ def choose_fitted_model(
 
 
 def _without_walls(why: str) -> ModelChoice:
-    caution = f"model '{UNWALLED}' leaves the walls out, which its fitted numbers then stand for: {why}"
-    return ModelChoice(UNWALLED, why.partition(":")[0], caution)
+    reason, _, remedy = why.partition(": ")
+    words = f"wall effects are not modelled by '{UNWALLED}', and fitted numbers compensate for them: {reason}"
+    caution = Note("walls-left-out", f"{words}; {remedy}" if remedy else words, ("model", "channel"))
+    return ModelChoice(UNWALLED, reason, caution)
 
 
 _READINGS = ("rotor", "paper")
@@ -189,7 +192,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         posterior=None,
         identifiability=None,
         warnings=(
-            "method 'paper' gives no uncertainty",
+            Note("intervals-incomplete", "method 'paper' gives no uncertainty; use --method posterior", ("method",)),
             *outlier_warnings(problem, z),
             *prior_warnings(problem, z),
             *factor_misfit_warnings(problem, z),
@@ -258,7 +261,7 @@ def _by_posterior(
     given, within, friction = _friction(problem, own, middle, error, reading, rng)
     sensitivity = friction_sensitivity(problem, middle, reading)
     values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
-    wrong = [f"the posterior may not be used: {sentence}" for sentence in posterior.problems()]
+    wrong = [Note("posterior-unusable", f"do not use the posterior: {words}") for words in posterior.problems()]
     warnings = [
         *wrong,
         *edge_warnings(problem, posterior.flat[:, : len(problem.coordinates)]),

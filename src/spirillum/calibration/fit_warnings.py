@@ -16,13 +16,16 @@ from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.parameters import LogUniform, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.display import percent
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robust import mad_scale
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, reynolds_limits, tail_reynolds
 
-RATES_IN_RADIANS = (
-    "a motor that is too weak for most tails is most often a unit: are the rates in Hz, turns a second, and not in "
-    "rad/s (6.3 times larger)?"
+RATES_IN_RADIANS = Note(
+    "units-doubtful",
+    "the motor is too weak for most tails, most often by a unit: check that rates are in Hz and not in rad/s "
+    "(6.3 times)",
+    ("tail_rate_Hz", "body_rate_Hz", "motor_rate_Hz"),
 )
 """Said where most of the robots would need more torque than their motors give."""
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
@@ -72,18 +75,23 @@ def check_plausible(problem: Problem, z: Samples) -> None:
             )
 
 
-def prior_warnings(problem: Problem, z: Samples) -> list[str]:
+def prior_warnings(problem: Problem, z: Samples) -> list[Note]:
     """Fitted values far out in their prior."""
     values = problem.values_at(z)
     return [
-        f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from the middle "
-        f"of its prior ({item.prior.words(item.parameter.unit)}): the model, a unit or the robot may be wrong"
+        Note(
+            "prior-decides",
+            f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from its prior's "
+            "median "
+            f"({item.prior.words(item.parameter.unit)}); check model, units and robot",
+            (item.label,),
+        )
         for item, place in zip(problem.coordinates, z, strict=True)
         if abs(place) > FAR
     ]
 
 
-def edge_warnings(problem: Problem, draws: Samples) -> list[str]:
+def edge_warnings(problem: Problem, draws: Samples) -> list[Note]:
     """Posteriors that pile up at an end of their prior, which then decides their interval.
 
     Args:
@@ -102,16 +110,16 @@ def edge_warnings(problem: Problem, draws: Samples) -> list[str]:
             ("upper", item.prior.high, float(np.mean(share > 1.0 - _EDGE))),
         ):
             if near > _PILED:
-                found.append(
-                    f"{item.label}: {percent(near)} of the posterior lies in the outermost {percent(_EDGE)} of its "
-                    f"prior, at the {end} end of {value:.3g} {item.parameter.unit}".rstrip()
-                    + ": that end decides the interval, and the observations ask for a value beyond it, or the model "
-                    "lacks something"
+                words = (
+                    f"{item.label}: {percent(near)} of the posterior lies at the {end} end of its prior "
+                    f"({value:.3g} {item.parameter.unit}".rstrip()
+                    + "), which decides the interval; check the model"
                 )
+                found.append(Note("prior-decides", words, (item.label,)))
     return found
 
 
-def outlier_warnings(problem: Problem, z: Samples) -> list[str]:
+def outlier_warnings(problem: Problem, z: Samples) -> list[Note]:
     """Outliers: rows whose trial, or whose robot, deviates from all others."""
     experiment = problem.experiment
     found = list(experiment.outliers)
@@ -124,14 +132,16 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[str]:
         limit = max(_OUTLYING * float(mad_scale(off)), _LEAST_OUTLYING)
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
-            found.append(
-                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
-                "off the fit, far more than that of other tails: an outlier?"
+            words = (
+                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is "
+                f"{percent(float(relative[place]))} off "
+                "the fit, far more than that of other tails; check the row"
             )
+            found.append(Note("outlier", words, (name,)))
     return found
 
 
-def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[str]:
+def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[Note]:
     """State the model's discrepancy, so that a wrong model does not look certain.
 
     Args:
@@ -140,54 +150,56 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
         fit: its best fit, with the degrees of freedom that are left and what the residuals say of the misfit.
     """
     found = []
+    model = problem.model.name
     for name, size in discrepancy.items():
+        called, code = CALLED[name], "intervals-incomplete"
         if fit.left[name] < FEWEST_LEFT:
-            found.append(
-                f"the fit has as many free numbers as the {CALLED[name]} has means: nothing is left to tell by how "
-                f"much model '{problem.model.name}' misses, and the intervals take what models of this kind miss by"
+            words = (
+                f"the fit has as many free numbers as means of the {called}: the misfit of '{model}' is unknown, and a "
+                "typical one is used; measure more tails"
             )
         elif np.count_nonzero(problem.ratio(name).seen) == 1:
-            found.append(
-                f"the {CALLED[name]} of one tail does not tell by how much model '{problem.model.name}' misses that of "
-                "others: the intervals take what models of this kind miss by"
+            words = (
+                f"one tail's {called} does not tell the misfit of '{model}': a typical one is used; measure more tails"
             )
         elif not problem.ratio(name).freedom.sum() > 0:
             once = not np.any(problem.ratio(name).trials > 1)
-            why = "was observed once for each tail" if once else "has means without the scatter of their trials"
-            found.append(
-                f"the {CALLED[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
-                "discrepancy holds both"
-            )
+            why = "was observed once a tail" if once else "has means without scatter"
+            words = f"the {called} {why}: errors of trials and of the model cannot be separated; repeat trials"
             if size.value > _BEYOND_TRIALS:
-                found.append(
-                    f"the discrepancy of the {CALLED[name]}, {percent(size.value)}, is more than trials are off by: "
-                    f"model '{problem.model.name}' misses the {CALLED[name]} from tail to tail, its fitted numbers "
-                    "stand for what it lacks, and hold for these tails"
-                )
+                found.append(Note(code, words, (name,)))
+                code, words = "misfit", _misfit(model, called, size.value, "more than trials err")
         elif min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT:  # the residuals say so, and not the prior alone
-            found.append(
-                f"model '{problem.model.name}' misses the {CALLED[name]} by {percent(size.value)} from tail to tail, "
-                "beyond the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for "
-                "these tails"
-            )
+            code, words = "misfit", _misfit(model, called, size.value, "beyond the scatter of trials")
+        else:
+            continue
+        found.append(Note(code, words, (name,)))
     return found
 
 
-def factor_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
+def _misfit(model: str, called: str, size: float, beyond: str) -> str:
+    """That a model misses a quantity from tail to tail."""
+    misses = f"'{model}' misses the {called} by {percent(size)} from tail to tail, {beyond}"
+    return f"{misses}: fitted numbers compensate for it and hold for these tails only"
+
+
+def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
     """Root mean square misfit of a fit without an error model."""
     found = []
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.seen] ** 2)))
         if size > _LARGE_MISFIT:
-            found.append(
-                f"model '{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root "
-                "mean square over the tails), errors of the trials included"
+            words = (
+                f"'{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root "
+                "mean square "
+                "over the tails, errors of trials included)"
             )
+            found.append(Note("misfit", words, (name,)))
     return found
 
 
-def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
+def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[Note]:
     """Assumptions of a fit about the friction.
 
     Args:
@@ -197,11 +209,11 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
     """
     unset = all(robot.friction.effective is None for robot in problem.experiment.robots)
     if problem.by_motor_rate and unset and "shared_friction" not in problem.free:
-        return [
-            "the motor rate is predicted with the rotor's own B_m alone, for friction.effective is unset: what the "
-            f"joint rubs more goes into {', '.join(name for name in problem.free if name != 'friction')}; allowed: "
-            "shared_friction free too"
-        ]
+        words = (
+            "friction.effective is unset, and B_m alone acts: further friction goes into "
+            f"{', '.join(name for name in problem.free if name != 'friction')}; free shared_friction too"
+        )
+        return [Note("friction-assumed", words, ("friction.effective",))]
     if reading != "paper" or "friction" not in problem.free:
         return []
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -209,27 +221,28 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
     known = ratio[np.isfinite(ratio)]
     if known.size == 0 or np.all(np.abs(known - 1.0) < _PRINTED):
         return []
-    return [
-        f"friction reading 'paper': with (19) as printed the body turns at {np.median(known):.2g} times its observed "
-        f"rate (median of the tails, {known.min():.2g} to {known.max():.2g}) where the motor turns as observed: B_eff "
-        "of this reading does not give the observed rates back, for the factors follow from (15) without (19)"
-    ]
+    words = (
+        f"with (19) as printed the body turns at {np.median(known):.2g} times its observed rate ({known.min():.2g} to "
+        f"{known.max():.2g}): B_eff does not reproduce it; use --friction rotor"
+    )
+    return [Note("friction-assumed", words, ("friction.reading", "turning"))]
 
 
-def friction_interval_warnings(problem: Problem) -> list[str]:
+def friction_interval_warnings(problem: Problem) -> list[Note]:
     """What the intervals of B_eff leave out without repeated trials: how trials differ, or all of the rate's error."""
     rate = problem.experiment.motor_rate
     if "friction" not in problem.free or not rate.seen.any() or rate.freedom.sum() > 0:
         return []
     if rate.explained:
-        return ["one trial for each tail: the intervals of B_eff hold its stated errors, and not how trials differ"]
-    return [
-        "the motor rate has no repeated trials and states no error (columns tail_rate_Hz_ci95 and body_rate_Hz_ci95), "
-        "so that its error is not in the intervals of B_eff, which are too narrow"
-    ]
+        words = (
+            "one trial a tail: intervals of B_eff include its stated errors and not how trials differ; repeat trials"
+        )
+    else:
+        words = "the motor rate states no error: intervals of B_eff are too narrow; repeat trials or add *_ci95 columns"
+    return [Note("intervals-incomplete", words, ("friction",))]
 
 
-def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) -> list[str]:
+def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) -> list[Note]:
     """A narrower channel whose wall seems to hold the body back less than that of a wider one."""
     drag = [(problem.experiment.channels[item.channel], item.label) for item in problem.coordinates
             if item.parameter.name == "body_drag" and item.channel is not None]  # fmt: skip
@@ -239,19 +252,21 @@ def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) ->
         if less.value >= more.value:
             continue
         overlap = " (their intervals overlap)" if less.high >= more.low else ""
-        found.append(
-            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower channel "
-            "holds a body back more: channels may be mixed up, or the factors stand for something else"
+        words = (
+            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower "
+            "channel has "
+            "more drag; check which channel is which"
         )
+        found.append(Note("drag-order", words, (narrow, wide)))
     return found
 
 
-def synthetic_warning(source: str) -> str:
-    """The warning of every answer from synthetic observations."""
-    return f"{source} says that its numbers are synthetic: nothing here is measured"
+def synthetic_warning(source: str) -> Note:
+    """The note of every answer from synthetic observations."""
+    return Note("synthetic", f"{source} says that its numbers are synthetic: nothing here is measured")
 
 
-def inertia_warnings(experiment: Experiment) -> list[str]:
+def inertia_warnings(experiment: Experiment) -> list[Note]:
     """Return warnings of observations at Reynolds numbers at which Stokes flow is not accurate."""
     batch = RobotBatch.of(experiment.robots)
     rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
@@ -261,30 +276,33 @@ def inertia_warnings(experiment: Experiment) -> list[str]:
     return list(check_stokes_flow(batch, limits).values())
 
 
-def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]:
+def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note]:
     """Warnings common to all methods."""
     experiment = problem.experiment
     found = [*experiment.doubts, *inertia_warnings(experiment)]
     if experiment.synthetic:
         found.append(synthetic_warning(experiment.source))
     if "gap" in problem.free and "pitch" not in problem.free:
-        found.append(
-            "the robots are taken to be level, as the pitch is not free (--free gap,pitch): another pitch changes "
-            "speeds, and the fitted gap with them; `predict` with this fit has no band over either"
+        words = (
+            "robots are assumed level, and another pitch changes speeds and the fitted gap; free both (--free "
+            "gap,pitch)"
         )
+        found.append(Note("pose-unknown", words, ("pitch",)))
     negative = [n for n, item in enumerate(friction) if item.value < 0]
     if negative:
-        found.append(
-            f"B_eff comes out negative for {len(negative)} of {len(friction)} robots, the first: "
-            f"{experiment.labels()[negative[0]]}: the model's torque exceeds what the motor gives; a prediction of "
-            "these tails takes zero"
+        words = (
+            f"B_eff is negative for {len(negative)} of {len(friction)} robots "
+            f"({experiment.labels()[negative[0]]}, ...): the "
+            "model's torque exceeds the motor's; predictions use zero"
         )
+        found.append(Note("friction-negative", words, ("friction",)))
         if 2 * len(negative) > len(friction):
             found.append(RATES_IN_RADIANS)
     if problem.interpolation_error > 0:
-        where = "at places that were not used for them" if problem.model.placed else "at one wire between their points"
-        found.append(
-            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction, "
-            f"checked {where}"
+        where = "at poses between the nodes" if problem.model.placed else "at one wire between the nodes"
+        words = (
+            f"resistances are interpolated, with an error of up to {percent(problem.interpolation_error)}, checked "
+            f"{where}"
         )
+        found.append(Note("interpolated", words))
     return found

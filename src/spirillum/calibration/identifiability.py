@@ -24,6 +24,7 @@ from spirillum.calibration.least_squares import (
 from spirillum.calibration.parameters import ASSUMABLE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
+from spirillum.notes import Note
 
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
@@ -53,7 +54,7 @@ class Identifiability:
     """(directions, numbers), unit vectors in coordinates of the prior."""
     correlation: Samples
     """Between the numbers, from the observations alone."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     """What is not identifiable, in words."""
 
     @property
@@ -116,8 +117,8 @@ def _slopes(problem: Problem, z: Samples) -> Samples:
     return np.array([(up[name] - down[name]) / (2.0 * step * max(abs(at[name]), 1e-300)) for name in at])
 
 
-def _words(problem: Problem, z: Samples, singular: float, direction: Samples) -> str:
-    """A poorly known direction in plain words; none for a number that the observations took far from its prior."""
+def _words(problem: Problem, z: Samples, singular: float, direction: Samples) -> Note | None:
+    """A note on a poorly known direction; none for a number that the observations took far from its prior."""
     # By the change of the numbers themselves, and of their coordinates: a wide prior makes a large change small there.
     relative = np.abs(direction * _slopes(problem, z))
     share = np.maximum(np.abs(direction), relative / max(float(relative.max()), 1e-300))
@@ -126,19 +127,22 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
     if len(named) == 1:
         if abs(z[named[0]]) > FAR:  # `prior_warnings` says so
-            return ""
-        return (
-            f"{labels[0]} is hardly identifiable: the observations say {known} about it, for they hardly change "
-            "with it, or as they do with others"
+            return None
+        words = (
+            f"{labels[0]} is hardly identifiable: the observations say {known} about it; fix it or state its "
+            "uncertainty"
         )
+        return Note("not-identifiable", words, labels)
     moved = z + 0.5 * direction * np.sign(direction[named[0]])
     before, after = problem.values_at(z), problem.values_at(moved)
     changes = [f"{label} by {_change(before[label], after[label])}" for label in labels]
     effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
-    return (
-        f"{_listed(labels)} trade off: changing {_listed(changes)} together moves all predictions by {effect} "
-        f"standard errors in all; the observations say {known} about that"
+    words = (
+        f"{_listed(changes)} trade off: together they move predictions by {effect} standard errors, and the "
+        "observations "
+        f"say {known}; fix one"
     )
+    return Note("not-identifiable", words, labels)
 
 
 def _listed(items: list[str]) -> str:

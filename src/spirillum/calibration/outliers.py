@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.measurement.observations import ObservationRow
+from spirillum.notes import Note
 from spirillum.robust import mad_scale
 
 _LIMIT = 8.0
@@ -20,9 +21,9 @@ _COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
 
 def outlying_trials(
     groups: Sequence[Sequence[ObservationRow]], ratios: Sequence[tuple[Samples, Samples]]
-) -> tuple[str, ...]:
+) -> tuple[Note, ...]:
     """A sentence for each row whose advance or turning is an outlier among the trials of its tail."""
-    found: list[str] = []
+    found: list[Note] = []
     for number, column in enumerate(_COLUMNS):
         deviations = [_deviations(own[number]) for own in ratios]
         known = np.concatenate([own[np.isfinite(own)] for own in deviations]) if deviations else np.empty(0)
@@ -32,10 +33,11 @@ def outlying_trials(
         for group, own in zip(groups, deviations, strict=True):
             for item, off in zip(group, own.tolist(), strict=False):
                 if np.isfinite(off) and abs(off) > max(_LIMIT * scale, _LEAST):
-                    found.append(
+                    words = (
                         f"row {item.row}, column {column}: {1.0 + off:.3g} times the median of its tail's trials, each "
-                        "over its own rate: an outlier, or a slip of the pen?"
+                        "over its own rate; check the number"
                     )
+                    found.append(Note("outlier", words, (column,)))
     return tuple(found)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.likelihood import LEAST_RELATIVE
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
+from spirillum.notes import note_attributes
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
         "quantities": json.dumps(list(problem.quantities)),
         "settings": json.dumps([robot.model_dump() for robot in experiment.robots], allow_nan=False),
         "versions": versions(),
-        "warnings": "\n".join(found.warnings),
+        **note_attributes(found.warnings),
     }
     tree.attrs["checksum"] = posterior_checksum({str(name): item for name, item in tree.attrs.items()}, values)
     return tree

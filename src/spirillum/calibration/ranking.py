@@ -29,6 +29,7 @@ from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 
 _CLEAR = 4.0
@@ -78,12 +79,12 @@ class ModelRank:
     fit: Calibrated
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ranking(DisplayMixin):
     """Models from the best to the worst."""
 
     ranked: tuple[ModelRank, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
     @property
     def best(self) -> ModelRank:
@@ -225,7 +226,8 @@ def rank_models(
             )
         except UnexplainedError as error:
             failed.append(error)
-            said.append(f"{name} is not ranked, it does not explain the observations: {str(error).partition(';')[0]}")
+            words = f"{name} is not ranked, it does not explain the observations: {str(error).partition(';')[0]}"
+            said.append(Note("without-answer", words))
     if not fits:
         raise failed[0]
     found = ranked_fits(fits)
@@ -289,26 +291,32 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
     return Ranking(tuple(ranked), tuple(_cautions(ranked)))
 
 
-def _cautions(ranked: Sequence[ModelRank]) -> list[str]:
+def _cautions(ranked: Sequence[ModelRank]) -> list[Note]:
     said = []
     for item in ranked:
         bad = int(np.count_nonzero(item.pareto > _PARETO))
         if bad:
-            said.append(
-                f"{item.model}: leaving out {bad} of {item.pareto.size} robots by importance sampling cannot be "
-                f"trusted (Pareto k above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
+            words = (
+                f"{item.model}: {bad} of {item.pareto.size} robots cannot be left out by importance sampling "
+                "(Pareto k above "
+                f"{_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
             )
-        said += [f"{item.model}: {sentence}" for sentence in item.fit.warnings if "may not be used" in sentence]
+            said.append(Note("intervals-incomplete", words))
+        unusable = (note for note in item.fit.warnings if note.code == "posterior-unusable")
+        said += [note.prefixed(f"{item.model}: ") for note in unusable]
     if all(RATES_IN_RADIANS in item.fit.warnings for item in ranked):
         said.append(RATES_IN_RADIANS)
     count = ranked[0].fit.experiment.size
     if count < _FEWEST_ROBOTS:
-        said.append(
-            f"only {counted(count, 'robot')}: standard errors of the log density are withheld, for over fewer than "
-            f"{_FEWEST_ROBOTS} they are chance"
+        words = (
+            f"only {counted(count, 'robot')}: standard errors of the log density are chance below "
+            f"{_FEWEST_ROBOTS}, and not "
+            "given; measure more tails"
         )
+        said.append(Note("intervals-incomplete", words))
     elif count < _MANY_ROBOTS:
-        said.append(f"only {count} robots: differences of the log density are hardly known")
+        words = f"only {count} robots: differences of the log density are hardly known; measure more tails"
+        said.append(Note("intervals-incomplete", words))
     said += inertia_warnings(ranked[0].fit.experiment)
     if ranked[0].fit.experiment.synthetic:
         said.append(synthetic_warning(ranked[0].fit.experiment.source))

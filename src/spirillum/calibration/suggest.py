@@ -36,6 +36,7 @@ from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.formats.tables import check_present, read_table
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
@@ -81,14 +82,14 @@ class CandidateRobot:
         return self.behind <= _TIED * self.behind_error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Suggestion(DisplayMixin):
     """Candidates from the most to the least telling."""
 
     posterior: PosteriorFile
     trials: int
     candidates: tuple[CandidateRobot, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum suggest --json`."""
@@ -147,13 +148,13 @@ def suggest(
     for robot in listed:
         outside = _outside(known, robot)
         if outside:
-            left_out.append(f"{tail_words(robot)} is left out: {outside}")
+            left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))
             continue
         found.append(_candidate(known, robot, trials, numbers, names))
     if not found:
         raise InputError(f"no candidate can be built and answered: {left_out[0]}")
     if len(left_out) > _SAID:
-        left_out[_SAID:] = [f"{len(left_out) - _SAID} more candidates are left out"]
+        left_out[_SAID:] = [Note("without-answer", f"{len(left_out) - _SAID} more candidates are left out")]
     return Suggestion(
         known,
         trials,
@@ -213,20 +214,21 @@ def _check_channels(robots: Sequence[Robot]) -> None:
         seen.add(diameter)
 
 
-def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[str]:
-    said = [f"{robot.name}: {words}" for robot in robots for words in calibration_warnings(robot, known.model)]
+def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[Note]:
+    said = [note.prefixed(f"{robot.name}: ") for robot in robots for note in calibration_warnings(robot, known.model)]
     if known.synthetic:
         said.append(synthetic_warning(known.observations))
     return said
 
 
-def _inaccurate(known: PosteriorFile, listed: Sequence[Robot]) -> list[str]:
-    """A sentence for each limit within which the model is accurate that candidates break, with the first of them."""
-    broken_by: dict[str, list[str]] = {}
+def _inaccurate(known: PosteriorFile, listed: Sequence[Robot]) -> list[Note]:
+    """A note for each limit within which the model is accurate that candidates break, with the first of them."""
+    broken_by: dict[str, list[Note]] = {}
     for robot in listed:
         for limit in broken(find_swimmer_model(known.model).cautions(RobotBatch.of(robot))):
-            broken_by.setdefault(limit.flag, []).append(f"{tail_words(robot)}: {limit.caution()}")
-    return [f"{len(said)} of {counted(len(listed), 'candidate')}, the first {said[0]}" for said in broken_by.values()]
+            broken_by.setdefault(limit.flag, []).append(limit.caution().prefixed(f"{tail_words(robot)}: "))
+    whole = counted(len(listed), "candidate")
+    return [said[0].prefixed(f"{len(said)} of {whole}, the first ") for said in broken_by.values()]
 
 
 def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:

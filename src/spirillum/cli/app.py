@@ -49,6 +49,7 @@ from spirillum.cli.shared_options import (
     TailRate,
     Tolerance,
     Yaw,
+    add_notes_option,
     complete_auto_models,
     complete_models,
     complete_parts,
@@ -426,4 +427,4 @@ app.add_typer(observations_app, name="observations", rich_help_panel="Files")
 @cache
 def command_line() -> Any:
     """The tree of commands and their parameters, made once in a process: that takes as long as a short command."""
-    return typer.main.get_command(app)
+    return add_notes_option(typer.main.get_command(app))

@@ -23,6 +23,7 @@ from spirillum.cli.shared_options import (
     complete_auto_models,
     complete_models,
 )
+from spirillum.notes import note_attributes, notes_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -249,8 +250,7 @@ def simulate(
         )
         write_dataset(dataset, target)
         files, warnings = _drawn(dataset, picture, width, movie, progress)
-    found = run_answer(dataset)
-    found["warnings"] += warnings
+    found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
     renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
     if any(event["what"] == INTERRUPTED for event in found["events"]):
         raise KeyboardInterrupt

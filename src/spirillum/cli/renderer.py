@@ -1,20 +1,24 @@
-"""One renderer for all answers: JSON for machines, or the table of the answer's kind for people."""
+"""One renderer for all answers: JSON for machines, or title, cautions and tables for people."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from importlib import import_module
 from typing import Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 from spirillum.cli.progress_lines import progress_lines
-from spirillum.cli.tables.parts import Answer
-from spirillum.envelope import as_json
+from spirillum.cli.shared_options import every_note
+from spirillum.cli.tables import blocks_of
+from spirillum.cli.tables.parts import Answer, Block, Detail
+from spirillum.display import counted
+from spirillum.envelope import as_json, with_notes_last
+from spirillum.notes import Note, notes_in_answer, shown_cautions
 
 _NARROWEST = 80
 
@@ -32,29 +36,65 @@ class _PipedConsole(Console):
 
 
 def show(answer: Answer, *, json: bool, **options: Any) -> None:
-    """Print an answer as JSON, or as the table of its kind followed by its warnings.
+    """Print an answer as JSON, or as title, cautions, tables and the number of its notes, which `--notes` prints.
 
-    The table is the function `table` of the module in `spirillum.cli.tables` that is named after the answer's schema.
+    Its blocks come from the function of `spirillum.cli.tables` that is named after the answer's schema.
     """
     if json:
-        try:
-            typer.echo(as_json(answer))
-        except BrokenPipeError as error:
-            raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
+        _print_json(answer)
         return
     console = _PipedConsole()
     if console.width < _NARROWEST:
         console = _PipedConsole(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
-    kind = str(answer["schema"]).removeprefix("spirillum.").partition("/")[0]
-    import_module(f"spirillum.cli.tables.{kind.replace('-', '_')}").table(answer, console, **options)
-    for warning in answer["warnings"]:
-        console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)
+    notes, every = notes_in_answer(answer), every_note.get()
+    cautions = [] if every else shown_cautions(notes)
+    title, *blocks = blocks_of(answer, **options)
+    details = [block for block in blocks if isinstance(block, Detail)]
+    _print_title(console, title, cautions)
+    for block in blocks:
+        if every or not isinstance(block, Detail):
+            _print(console, block)
+    left = len(details) + len(notes) - len(cautions)
+    if every:
+        for note in notes:
+            _print_note(console, note, f" [{note.code}]")
+    elif left:
+        _print(console, f"{counted(left, 'note')}: --notes")
+
+
+def _print_json(answer: Answer) -> None:
+    try:
+        typer.echo(as_json(answer))
+    except BrokenPipeError as error:
+        raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
+
+
+def _print(console: Console, block: Block, style: str = "") -> None:
+    console.print(block, highlight=False, soft_wrap=isinstance(block, str), markup=False, style=style or None)
+
+
+def _print_title(console: Console, block: Block, cautions: Sequence[Note]) -> None:
+    """The title, which may be that of a table, with the weightiest cautions below it."""
+    if isinstance(block, Table):
+        title, block.title = block.title, None
+        console.print(title, highlight=False, soft_wrap=True, style="bold")
+    else:
+        _print(console, block, "bold")
+    for note in cautions:
+        _print_note(console, note)
+    if isinstance(block, Table):
+        _print(console, block)
+
+
+def _print_note(console: Console, note: Note, code: str = "") -> None:
+    colour = "yellow" if note.severity == "caution" else "blue"
+    line = f"[{colour}]{note.severity}:[/{colour}] {escape(note + code)}"
+    console.print(line, highlight=False, soft_wrap=True)
 
 
 def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
-    """An answer with the files that a command has written for it; its warnings stay last."""
-    content = {name: item for name, item in answer.items() if name != "warnings"}
-    return {**content, **files, "warnings": answer["warnings"]}
+    """An answer with the files that a command has written for it; its notes stay last."""
+    return with_notes_last(answer, **files)
 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:

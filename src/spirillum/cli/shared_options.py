@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextvars import ContextVar
+from copy import copy
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -232,3 +234,21 @@ Phases = Annotated[
         rich_help_panel=MODEL_PANEL,
     ),
 ]
+
+
+def add_notes_option(command: Any) -> Any:
+    """Give every command that has `--json`, and so prints an answer, the option `--notes` too."""
+    for below in getattr(command, "commands", {}).values():
+        add_notes_option(below)
+    json = next((parameter for parameter in command.params if "--json" in parameter.opts), None)
+    if json is not None:
+        notes = copy(json)
+        notes.name, notes.opts, notes.secondary_opts, notes.expose_value = "notes", ["--notes"], [], False
+        notes.help = "Print all notes with their codes, and how the answer came about."
+        notes.callback = lambda _context, _parameter, value: every_note.set(bool(value))
+        command.params.insert(command.params.index(json) + 1, notes)
+    return command
+
+
+every_note: ContextVar[bool] = ContextVar("every_note", default=False)
+"""Whether the command that runs was given `--notes`."""

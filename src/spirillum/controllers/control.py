@@ -30,6 +30,7 @@ from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.notes import Note, note_attributes
 from spirillum.processes import imap_unordered
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.fields import field_values
@@ -120,7 +121,7 @@ _LAST_SEED = 2**31 - 1
 _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Control(DisplayMixin):
     """A controlled run, and scores over many."""
 
@@ -146,7 +147,7 @@ class Control(DisplayMixin):
     """Over many seeds; None without `seeds`."""
     interrupted: bool
     """Whether run or scores were interrupted; what was done until then is here."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """The answer as data; with `settings`, `task`, `lab` and `seed` the run can be done again."""
@@ -193,10 +194,14 @@ class Control(DisplayMixin):
         answer = self.to_dict()
         error, scores = answer.pop("error"), answer.pop("scores") or {}
         controllers = [{"controller": name, **one} for name, one in scores.get("controllers", {}).items()]
-        kept = {name: item for name, item in answer.items() if name not in ("commands", "frames", "lab", "warnings")}
+        kept = {
+            name: item
+            for name, item in answer.items()
+            if name not in ("commands", "frames", "lab", "notes", "warnings")
+        }
         verdict = "good enough" if self.score.good else "not good enough"
         found = {**kept, error["meaning"]: error, "verdict": verdict, "controllers": controllers}
-        return {**found, "warnings": answer["warnings"]}, None
+        return {**found, "notes": answer["notes"], "warnings": answer["warnings"]}, None
 
 
 def control(
@@ -264,7 +269,7 @@ def control(
         drawn=drawn,
         score=task.score(run, job.brief),
         run=run,
-        dataset=dataset.assign_attrs(warnings="\n".join(warnings)),
+        dataset=dataset.assign_attrs(note_attributes(warnings)),
         late=None if pace is None else pace.late,
         learnt=None if learner is None else learner.learnt,
         scores=scores,
@@ -290,15 +295,21 @@ class _Pace:
         self.late = max(0.0, -left)
 
 
-def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[str]]:
+def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[Note]]:
     """A lab without the pulse of flow where a model knows no flow, and the sentence that says so."""
     if model == "tube" or not lab.pulse.velocity:
         return lab, []
     still = lab.pulse.model_copy(update={"velocity": 0.0})
-    return lab.model_copy(update={"pulse": still}), [f"model '{model}' knows no flow: there is no pulse"]
+    return lab.model_copy(update={"pulse": still}), [
+        Note(
+            "input-unused",
+            f"model '{model}' has no flow: the pulse of flow is left out; use model tube",
+            ("lab.pulse",),
+        )
+    ]
 
 
-def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[str]]:
+def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[Note]]:
     """Scores of every controller from every seed; with an interrupt of the runs that are done, and a sentence."""
     jobs = [replace(job, controller=name, seed=job.seed + n) for n in range(seeds) for name in CONTROLLERS]
     outcomes: list[Outcome] = []
@@ -310,8 +321,10 @@ def _scores(job: ControlJob, seeds: int, workers: int, progress: Progress | None
     except KeyboardInterrupt:
         pass
     complete = len(outcomes) == len(jobs)
-    sentence = f"interrupted after {len(outcomes)} of {len(jobs)} runs: scores are of these"
-    return scored(job.task, outcomes) if outcomes else None, [] if complete else [sentence]
+    note = Note(
+        "run-cut-short", f"interrupted after {len(outcomes)} of {len(jobs)} runs: scores are of these", ("seeds",)
+    )
+    return scored(job.task, outcomes) if outcomes else None, [] if complete else [note]
 
 
 def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
@@ -355,19 +368,22 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
             raise InputError(f"plant.{str(name)[:60]} is not known{hint}; allowed: {', '.join(_ALLOWED)}")
 
 
-def _warnings_of(run: LoopRun, lab: Lab) -> list[str]:
+def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
     """What to be careful about in a run."""
     warnings = []
     end, latency = run.moments[-1].time, lab.camera.latency
     if latency >= end:
-        warnings.append(
+        words = (
             f"no picture reached the controller: camera.latency = {show(latency, 's')}, and the run lasted "
-            f"{show(end, 's')}"
+            f"{show(end, 's')}; use a longer run"
         )
+        warnings.append(Note("run-cut-short", words, ("camera.latency",)))
     if run.silent is not None:
-        warnings.append(f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}")
+        words = f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}"
+        warnings.append(Note("run-cut-short", words, ("camera",)))
     if run.ended:
-        warnings.append(f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off")
+        words = f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off"
+        warnings.append(Note("run-cut-short", words, ("duration",)))
     return warnings
 
 

@@ -25,6 +25,7 @@ from spirillum.designs.unknowns import SampledRobots, Unknowns, unknowns_of
 from spirillum.errors import InputError
 from spirillum.fitted.fit_notes import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -349,27 +350,26 @@ def _built(given: Robot, space: Space, best: Samples) -> Robot:
 
 def _warnings(
     given: Robot, unknowns: Unknowns, stated: Evaluation, best: Samples, swum: Swimming, bound_by: Sequence[str]
-) -> tuple[str, ...]:
-    """What to be careful about, a sentence each."""
+) -> tuple[Note, ...]:
+    """What to be careful about."""
     found = list(given.warnings)
     known, built = unknowns.robot, _built(unknowns.robot, stated.space, best)
     if given.channel is not None and stated.model.name == "tube":
         gap = gap_of(Placement(), given.body.diameter, 0.5 * given.channel.diameter)
-        found.append(
-            f"all designs lie at the reference place (a gap of {1e3 * gap:.4g} mm, level): `spirillum predict` gives "
-            "the band over gap and pitch"
+        words = (
+            f"all designs have the reference pose (gap {1e3 * gap:.4g} mm, level); `spirillum predict` gives the band"
         )
+        found.append(Note("reference-pose", words, ("placement.gap", "placement.pitch")))
+    elif given.channel is not None and stated.model.name in known.calibration:
+        words = (
+            "all designs have the same drag factors in place of walls, which may change their order; predict with tube"
+        )
+        found.append(Note("reference-pose", words, ("calibration",)))
     elif given.channel is not None:
-        name = stated.model.name
-        walls = (
-            f"calibration factors, the same for every design, stand for the channel's walls (model '{name}')"
-            if name in known.calibration
-            else f"the channel's walls are left out, which makes a robot faster than it is (model '{name}')"
+        words = (
+            "wall effects are not modelled: speeds are too high, and the order may change; predict the best with tube"
         )
-        found.append(
-            f"{walls}: let `spirillum predict` with model tube answer for the best design and others near it, whose "
-            "order walls may change"
-        )
+        found.append(Note("walls-left-out", words, ("model", "channel")))
     if stated.model.name in known.calibration:
         found += calibration_warnings(built, stated.model.name)
     reading = friction_reading(given.friction.reading)
@@ -378,14 +378,15 @@ def _warnings(
     found += fitted_of(None, unknowns.posterior).answer_warnings(known, stated.model, reading, stated.tail_rate)
     found += _near_step_out(built, swum)
     limits = reynolds_limits(stated.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
-    found += [limit.sentence() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
+    found += [limit.caution() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     found += reynolds_warnings(limits).values()
     if any("end of its range" in words for words in bound_by):
-        found.append("the best design lies at the end of a range: a wider one may hold a better design")
+        words = "the best design lies at the end of a range; widen the range"
+        found.append(Note("design-at-limit", words))
     return tuple(dict.fromkeys(found))
 
 
-def _near_step_out(robot: Robot, swum: Swimming) -> list[str]:
+def _near_step_out(robot: Robot, swum: Swimming) -> list[Note]:
     """That the best design hardly follows its field: it is the fastest just before it slips."""
     if robot.magnetic is None:
         return []
@@ -393,7 +394,8 @@ def _near_step_out(robot: Robot, swum: Swimming) -> list[str]:
     if not share > _MOST_OF_STEP_OUT:
         return []
     room = show(1.2 * abs(robot.magnetic.rotation_rate), "Hz")
-    return [
-        f"at the best design the field turns at {100 * share:.3g} % of the step-out rate, beyond which the robot slips "
-        f"behind it: --subject-to 'step_out_rate >= {room}' leaves room"
-    ]
+    words = (
+        f"the field turns at {100 * share:.3g} % of the best design's step-out rate, beyond which it slips; "
+        f"--subject-to 'step_out_rate >= {room}' leaves room"
+    )
+    return [Note("field-slips", words, ("magnetic.rotation_rate", "step_out_rate"))]

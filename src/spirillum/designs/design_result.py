@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady_quantities import LEVEL, STEADY
 
@@ -85,7 +86,7 @@ class Learned(NamedTuple):
     relative."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design(DisplayMixin):
     """The best values of some fields of a robot, SI."""
 
@@ -115,7 +116,7 @@ class Design(DisplayMixin):
     swum: int
     refused: int
     breaking: int
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     learned: Learned | None = None
     """How well a model that solves for the flow is known; None where it was asked for every design."""
     model_reason: str = ""

@@ -9,6 +9,7 @@ import numpy as np
 from spirillum.designs.design_result import Alternative, Design
 from spirillum.display import percent
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 
 _ALIKE = 1e-9
 """Relative range of an objective below which it does not change."""
@@ -17,9 +18,10 @@ ALTERNATIVES = {
     "runner_up": "the best of the designs that differ by a tenth of a range or more",
 }
 """What the designs are called that the best one is compared with."""
+_SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 
-def lead_warnings(answer: Design) -> tuple[str, ...]:
+def lead_warnings(answer: Design) -> tuple[Note, ...]:
     """Sentences on fields that do not matter, on a better design, and on leads below the error of the objective.
 
     Returns:
@@ -36,27 +38,32 @@ def lead_warnings(answer: Design) -> tuple[str, ...]:
             continue
         lead = sign * (best - other.objective) / abs(best)
         if lead < -_ALIKE and other.name == "today":
-            said += (
-                f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best design within them, by "
-                f"{percent(-lead)} of it: wider ranges would hold a better one",
+            words = (
+                f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best one within them by "
+                f"{percent(-lead)}; widen the ranges"
             )
+            said += (Note("design-at-limit", words),)
         elif lead < error[0]:
-            leads.setdefault(error, []).append(f"{ALTERNATIVES[other.name]} by {percent(lead)}")
+            leads.setdefault(error, []).append(f"{_SHORT[other.name]} by {percent(lead)}")
     return said + tuple(
-        f"the best design leads {' and '.join(led)}, less than the error of {percent(error)} {of}: it is surely the "
-        "better one only as far as they share that error"
+        Note(
+            "design-tie",
+            f"the best design leads {' and '.join(led)}, within the error of {percent(error)} {of}; they may be equal",
+            ("objective",),
+        )
         for (error, of), led in leads.items()
     )
 
 
-def _without_effect(answer: Design) -> tuple[str, ...]:
+def _without_effect(answer: Design) -> tuple[Note, ...]:
     """A sentence for each field along which the objective stays as it is."""
     found = []
     for profile in answer.profiles:
         known = profile.objective[np.isfinite(profile.objective)]
         if known.size > 1 and np.ptp(known) <= _ALIKE * np.abs(known).max():
             name = answer.objectives[0].name.replace("_", " ")
-            found.append(f"the {name} does not depend on {profile.path}: every value of the range is as good")
+            words = f"the {name} does not depend on {profile.path}: every value of the range is as good"
+            found.append(Note("design-tie", words, (profile.path,)))
     return tuple(found)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.timing import Switch
+from spirillum.notes import Note
 from spirillum.quantities import attributes
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def _turn(time: Samples, angle: Samples, stretch: DutyInterval) -> float:
     return (stretch.end - middle) / turned if turned > 0 else float("inf")
 
 
-def vertical_drift(run: xr.Dataset) -> list[str]:
+def vertical_drift(run: xr.Dataset) -> list[Note]:
     """A sentence on a robot that sinks or rises over the last two thirds of a run; none where it hardly does."""
     late = run.isel(time=slice(run.sizes["time"] // 3, None))
     way = late["position"].values[-1] - late["position"].values[0]
@@ -151,7 +152,9 @@ def vertical_drift(run: xr.Dataset) -> list[str]:
         return []
     upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
     pitch = float(np.degrees(late["pitch"].values[-1]))
-    return [
-        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the "
-        f"run, at last pitched by {pitch:.3g} deg: velocities are those along x"
-    ]
+    words = (
+        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of "
+        "the run, "
+        f"pitched by {pitch:.3g} deg at the end: velocities are those along x"
+    )
+    return [Note("velocity-along-x", words, ("mean_forward_velocity",))]

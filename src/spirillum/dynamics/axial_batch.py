@@ -15,6 +15,7 @@ from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.kernels import axial_motor as kernel
+from spirillum.notes import Note
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of
 from spirillum.robot.placement import Placement
@@ -185,7 +186,7 @@ class AxialBatch:
         """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7)."""
         self.numbers: Samples = np.tile(np.array(self.axial.values), (count, 1))
         """Numbers of each robot in the order of `axial_robot.PARAMETERS`."""
-        self.warnings: tuple[str, ...] = self.axial.prediction.warnings
+        self.warnings: tuple[Note, ...] = self.axial.prediction.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._viscosity: Samples = np.ones(count)

@@ -24,6 +24,7 @@ import numpy as np
 from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.kernels import axial_motor as kernel
+from spirillum.notes import Note
 from spirillum.quantities import unit_of
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
@@ -136,7 +137,7 @@ class AxialRobot:
         """The numbers by name."""
         return dict(zip((item.name for item in PARAMETERS), self.values, strict=True))
 
-    def check_steady(self, duty: float, flow: float) -> list[str]:
+    def check_steady(self, duty: float, flow: float) -> list[Note]:
         """Refuse a robot that moves far outside Stokes flow where a duty and a flow have become steady.
 
         Returns:

@@ -15,6 +15,7 @@ from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
 from spirillum.kernels import axial_motor as kernel
+from spirillum.notes import note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics
 from spirillum.swimming.motor import winding_resistance
@@ -82,7 +83,7 @@ def axial_run(prediction: Prediction, timing: Timing, integrator: AxialIntegrato
         events=json.dumps(events),
         switches=", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
         integrator=integrator.name,
-        warnings="\n".join(said),
+        **note_attributes(said),
     )
 
 

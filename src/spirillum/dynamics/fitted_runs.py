@@ -13,6 +13,7 @@ from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.fit_notes import CALIBRATED_HELD
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
@@ -73,19 +74,23 @@ def chosen_run(
         fitted = fitted_models(calibration, posterior)
         if fitted and choice.model not in fitted:
             source = calibration if posterior is None else posterior.source
-            said.append(
-                f"{source} was fitted with model '{fitted[0]}' and the run takes '{choice.model}', on which its "
-                f"factors do not act; allowed: also --model {fitted[0]}"
+            words = (
+                f"{source} was fitted with model '{fitted[0]}', and the run uses '{choice.model}', on which its "
+                "factors do "
+                f"not act; use --model {fitted[0]}"
             )
+            said.append(Note("fit-not-used", words, ("model",)))
         return choice, motion or "free", said
-    said.append(f"the run takes model '{choice.model}': {choice.reason}")
+    said.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
     chosen = find_swimmer_model(choice.model)
     if motion is None and chosen.placed and contact.friction_coefficient:
-        said.append("dry friction is fitted, and acts on a free robot: the run is free")
+        words = "dry friction is fitted and acts on a free robot: the run is a free motion"
+        said.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed):
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
-        said.append(f"model '{choice.model}' {why}: the run is held, with two degrees of freedom")
+        words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
+        said.append(Note("model-chosen", words, ("motion",)))
         return choice, "held", said
     if motion != "held" and chosen.placed and posterior is None:
         said.append(CALIBRATED_HELD)
@@ -134,14 +139,13 @@ def with_intervals(
         for over in _OVER:
             values = np.array(found[name + over]) * np.prod([off[factor] for factor in factors], axis=0)
             scalars |= _limits(name + over, values, dataset)
-    said = str(dataset.attrs.get("warnings", ""))
+    notes = notes_in(dataset.attrs)
     if len(drawn) < _SURE:
-        few = (
-            f"draws = {len(drawn)}: a 95 % interval of so few is about their extremes, and varies from one set of "
-            f"draws to the next; accurate: {_SURE} and more"
+        words = (
+            f"draws = {len(drawn)}: a 95 % interval from so few varies from one set to the next; use {_SURE} or more"
         )
-        said = f"{said}\n{few}" if said else few
-    return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL, warnings=said)
+        notes = (*notes, Note("intervals-incomplete", words, ("draws",)))
+    return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL, **note_attributes(notes))
 
 
 def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset) -> dict[str, Any]:

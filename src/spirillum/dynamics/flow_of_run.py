@@ -18,6 +18,7 @@ from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.progress_messages import OF_A_RUN
 from spirillum.fluid.tube.tube import Tube
+from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
@@ -126,8 +127,8 @@ def moment_of_run(
     now = _sample(dataset, int(np.argmin(np.abs(times - moment))))
     nearest = float(now["time"])
     if abs(nearest - moment) > _SAME_TIME * float(np.min(np.diff(times), initial=np.inf)):
-        said = f"the run has no sample at {moment:.7g} s: the flow is that at the nearest one, {nearest:.7g} s"
-        now = now.assign_attrs(warnings="\n".join([said, now.attrs["warnings"]]))
+        words = f"the run has no sample at {moment:.7g} s: the flow is that at the nearest one, {nearest:.7g} s"
+        now = now.assign_attrs(note_attributes([Note("drawn-otherwise", words, ("time",)), *notes_in(now.attrs)]))
     return _motion(now, resolution)
 
 
@@ -143,6 +144,7 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
         said = show(float(one["wall_gap"][0]), "um")
         raise InputError(f"the run's variable 'wall_gap' is {said}; allowed: at least 0 m, a body inside its tube")
     texts = {name: one.attrs.get(name, "") for name in ("warnings", "fitted_by")}
+    texts |= note_attributes(notes_in(one.attrs)) if isinstance(texts["warnings"], str) else {}
     for name, text in texts.items():
         if not isinstance(text, str):
             raise InputError(f"the run's attribute {name!r} = {text!r}; allowed: text")
@@ -171,13 +173,13 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
         batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": drawn}))
-    warnings = [line for line in now.attrs["warnings"].split("\n") if line]
+    notes = list(notes_in(now.attrs))
     if gap < drawn:
-        warnings.append(
-            f"the film of {show(gap, 'um')} under the body is thinner than is resolved: the robot is drawn "
-            f"{show(drawn - gap, 'um')} further off the wall, with the same velocities, and neither the pressure in "
-            "the film nor the force across the tube is that of the run"
+        words = (
+            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is drawn "
+            f"{show(drawn - gap, 'um')} further off the wall; ignore film pressure and force"
         )
+        notes.append(Note("drawn-otherwise", words, ("wall_gap", "held_force")))
     nothing = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
         "forward_velocity": float(now["velocity"].values[0]),
@@ -196,7 +198,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         batch=batch,
         swimming=swimming,
         error_estimate=float("nan"),
-        warnings=tuple(warnings),
+        warnings=tuple(notes),
         motion="free",
         fitted_by=now.attrs["fitted_by"],
     )

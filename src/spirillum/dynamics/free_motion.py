@@ -37,10 +37,12 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.drives import current_at
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
@@ -230,17 +232,19 @@ def _checked(run: LongRun, links: TubeRobot) -> Checked:
     return held_against_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
 
 
-def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
-    """What to be careful about, a sentence each."""
+def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
+    """What to be careful about."""
     found = []
     if weight and not links.weight.any():
-        found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+        found.append(NO_WEIGHT)
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
-        found.append(
-            f"the steady motion is approached with a time constant of {slow:.3g} s: a trial of some turns does not "
-            "reach it; `simulate` follows the way there"
+        words = (
+            f"the steady motion is approached with a time constant of {slow:.3g} s, which a trial of some turns "
+            "does not "
+            "reach; `simulate` follows it"
         )
+        found.append(Note("unsteady", words, ("duration",)))
     return found
 
 

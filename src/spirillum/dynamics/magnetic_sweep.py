@@ -24,6 +24,7 @@ from spirillum.dynamics.timing import Switch
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
+from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, with_resolution
@@ -152,14 +153,15 @@ def magnetic_sweep(
     return _dataset(held, closed, asked, found, np.array(settled, dtype=float), turns, said)
 
 
-def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, str]:
-    """Warnings where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate."""
-    found: dict[str, str] = {}
+def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, Note]:
+    """Notes where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate."""
+    found: dict[str, Note] = {}
     for rate, one, turned in zip(rates.tolist(), speed, turning, strict=True):
         limits = reynolds_limits(batch, body_reynolds(batch, one), tail_reynolds(batch, turned))
         if problem := stokes_flow_problem(batch, limits):
             raise InputError(f"at a field of {show(rate, 'Hz')} (--rate) {problem}")
-        found |= {flag: f"at a field of {show(rate, 'Hz')} {said}" for flag, said in reynolds_warnings(limits).items()}
+        where = f"at a field of {show(rate, 'Hz')} "
+        found |= {flag: note.prefixed(where) for flag, note in reynolds_warnings(limits).items()}
     return found
 
 
@@ -255,26 +257,26 @@ def _pushed(attitude: Samples) -> Samples:
     return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
 
 
-def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[str]:
+def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[Note]:
     """A sentence on the rates at which the motion still changes."""
     if np.all(settled):
         return []
     open_ = np.abs(rates[settled == 0])
-    return [
-        f"at {open_.size} of {rates.size} rates, {show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}, "
-        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns: those numbers depend on "
-        f"how long the field is given, and on the start, at which the axis is pushed aside by {show(_TILT, 'deg')}"
-    ]
+    words = (
+        f"at {open_.size} of {rates.size} rates ({show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}) "
+        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns; use more turns"
+    )
+    return [Note("unsteady", words, ("forward_velocity", "wobble_angle"))]
 
 
-def _without_walls(held: Prediction) -> list[str]:
+def _without_walls(held: Prediction) -> list[Note]:
     """A sentence on the walls of a robot's channel, which a sweep leaves out; none without a channel."""
     if held.robot.channel is None:
         return []
-    return [
-        f"the channel's walls are left out (model '{held.model.name}'): near them the robot swims otherwise and "
-        "steps out at lower rates, which `spirillum predict` gives with model 'tube'"
-    ]
+    words = (
+        f"wall effects are not modelled by '{held.model.name}': speed and step-out rate are too high; predict with tube"
+    )
+    return [Note("walls-left-out", words, ("model", "channel"))]
 
 
 def _dataset(
@@ -284,7 +286,7 @@ def _dataset(
     found: Sequence[_Mean],
     settled: Samples,
     turns: float,
-    warnings: Sequence[str],
+    notes: Sequence[Note],
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -323,7 +325,7 @@ def _dataset(
             "known_error": held.known_error,
             "integrator": TwoLinks.integrator(),
             "references": " ".join(held.references),
-            "warnings": "\n".join([*warnings, *_unsettled(rates, settled, turns)]),
+            **note_attributes([*notes, *_unsettled(rates, settled, turns)]),
             "versions": versions(),
         },
     )

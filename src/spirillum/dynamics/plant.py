@@ -42,6 +42,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as tube
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -172,7 +173,7 @@ class Plant:
             band=False,
         )
         """The steady state of the robot held where it starts, by the same model."""
-        self.warnings: tuple[str, ...] = (*self.steady.warnings, *([chosen.caution] if chosen.caution else []))
+        self.warnings: tuple[Note, ...] = (*self.steady.warnings, *([chosen.caution] if chosen.caution else []))
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight

@@ -13,6 +13,7 @@ from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import Reach, Trajectory
 from spirillum.kernels import rigid_links
+from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
@@ -97,7 +98,7 @@ def series_of(prediction: Prediction, links: FreeRobot, run: Trajectory) -> dict
 
 
 def free_attributes(
-    prediction: Prediction, links: FreeRobot, run: Trajectory, reach: Reach, title: str, warnings: Sequence[str]
+    prediction: Prediction, links: FreeRobot, run: Trajectory, reach: Reach, title: str, notes: Sequence[Note]
 ) -> dict[str, Any]:
     """Attributes of a free robot's run."""
     return {
@@ -108,7 +109,7 @@ def free_attributes(
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
         "integrator": links.integrator(),
-        "warnings": "\n".join(warnings),
+        **note_attributes(notes),
     }
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from spirillum.envelope import envelope, quantity
+from spirillum.notes import notes_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,10 +31,6 @@ _ENDS = (
     "electrical_energy",
     "battery_charge_used",
 )
-
-
-def _warnings(dataset: xr.Dataset) -> list[str]:
-    return [line for line in dataset.attrs["warnings"].split("\n") if line]
 
 
 def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
@@ -72,7 +69,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         for name in _ENDS
         if name in dataset
     }
-    return envelope("simulation", content, _warnings(dataset))
+    return envelope("simulation", content, notes_in(dataset.attrs))
 
 
 def _interval(dataset: xr.Dataset, name: str) -> dict[str, Any]:
@@ -95,7 +92,7 @@ def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
         for name, variable in dataset.data_vars.items()
         if variable.ndim == 1
     }
-    return envelope("magnetic-sweep", content, _warnings(dataset))
+    return envelope("magnetic-sweep", content, notes_in(dataset.attrs))
 
 
 def _in_the_tube(dataset: xr.Dataset) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.notes import Note
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction, predict
@@ -97,7 +98,7 @@ _SAMPLES = 400
 """Samples of the way in an answer."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Settling(DisplayMixin):
     """How a robot settles, SI; azimuths about +x from the lowest place."""
 
@@ -171,7 +172,7 @@ class Settling(DisplayMixin):
         return np.array([f.normal_resistance for f in self.films]) / thin if length > 0 else np.full(len(thin), np.nan)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each."""
         return self.prediction.warnings
 

@@ -27,12 +27,14 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.kernels import rigid_links
+from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
@@ -173,14 +175,13 @@ def simulate(  # noqa: PLR0913 - the options of the command
             number,
             tell,
         )
-    warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     more = {"model_reason": choice.reason} if choice.reason else {}
     more |= {f"field_{name}": angle for name, angle in about.model_dump(exclude_none=True).items()}
     said += _along_tilted_axis(dataset, about)
-    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **more)
+    return dataset.assign_attrs(**note_attributes([*said, *notes_in(dataset.attrs)]), **more)
 
 
-def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[str]:
+def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
     """A sentence on the speed along the axis of a tilted field; none for one along x."""
     yaw, pitch = about.yaw or 0.0, about.pitch or 0.0
     if not (yaw or pitch):
@@ -189,11 +190,12 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[str]:
     way = late["position"].values[-1] - late["position"].values[0]
     axis = TurningField(rotation_rate=0.0, strength=0.0, yaw=yaw, pitch=pitch).axis
     speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
-    return [
-        f"the axis of the field is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg), and "
-        f"velocities are those along x: along that axis it swims at {speed:.4g} mm/s over the last two thirds of the "
-        "run"
-    ]
+    words = (
+        f"the field's axis is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg): "
+        "velocities are "
+        f"those along x; along that axis it swims at {speed:.4g} mm/s"
+    )
+    return [Note("velocity-along-x", words, ("field.yaw", "field.pitch"))]
 
 
 def _table(
@@ -236,7 +238,7 @@ def _free_run(
     dataset = dataset_of(steady, links, run, on, more, attrs)
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     way = [*vertical_drift(dataset), *check_stokes_flow(steady.batch, limits).values()]
-    dataset.attrs["warnings"] = "\n".join([*way, *said])
+    dataset.attrs |= note_attributes([*way, *said])
     dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], *limits)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
@@ -278,14 +280,14 @@ def _check_held(
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'{or_walls}")
 
 
-def _left_out(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:
+def _left_out(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[Note]:
     """What this form of a free motion leaves out, a sentence each."""
     found = []
     if steady.robot.channel is not None:
-        found.append(
-            "motion in a channel without its walls: the fluid is unbounded but for films between robot and wall, which "
-            "resist what nears the wall and nothing that slides along it"
+        words = (
+            "wall effects are not modelled beyond the film at the nearest wall: the speed is too high; use model tube"
         )
+        found.append(Note("walls-left-out", words, ("model", "channel")))
     if weight and not links.weight.any():
-        found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+        found.append(NO_WEIGHT)
     return found

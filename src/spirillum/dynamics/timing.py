@@ -13,6 +13,7 @@ from pydantic import BeforeValidator
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.formats.tables import read_series
+from spirillum.notes import Note
 from spirillum.robot.arguments import Options
 from spirillum.scalars import is_number, is_whole
 from spirillum.units import KINDS, parse_option
@@ -186,7 +187,7 @@ class Timetable(NamedTuple):
     """Evenly spaced samples from 0 to the end, s."""
     switches: list[Switch]
     """Every switching of the remote, the first at 0."""
-    said: list[str]
+    said: list[Note]
     """Where the schedule of the remote and the run do not meet, a sentence each."""
 
 
@@ -222,14 +223,16 @@ class Timing(Options):
         time = sample_times(end, turn, self.samples_per_turn, [switch.time for switch in switches])
         return Timetable(end, time, switches, self._unused(switches, end))
 
-    def _unused(self, switches: Sequence[Switch], end: float) -> list[str]:
+    def _unused(self, switches: Sequence[Switch], end: float) -> list[Note]:
         """What of the schedule lies beyond the end of the run, a sentence each."""
         said = []
         if all(switch.duty == 0 for switch in switches):
-            said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
+            words = f"the remote switches nothing on before the run ends at {end:.4g} s"
+            said.append(Note("schedule-outside-run", words, ("on",)))
         late = [(start, stop) for start, stop in self.on or () if start >= end]
         if late:
             first, last = late[0]
             also = f" and {len(late) - 1} more" if len(late) > 1 else ""
-            said.append(f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s")
+            words = f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s"
+            said.append(Note("schedule-outside-run", words, ("on",)))
         return said

@@ -30,6 +30,7 @@ from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roug
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.notes import Note
 from spirillum.swimming.prediction import Prediction
 
 if TYPE_CHECKING:
@@ -105,7 +106,8 @@ def tube_run(
     ended = float(run.time[-1])
     said = [*steady.warnings]
     if ended < times.end:
-        said.append(f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}")
+        words = f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}"
+        said.append(Note("run-cut-short", words, ("duration",)))
     said += times.said
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
     attrs = free_attributes(steady, robot, run, reach, title, said)

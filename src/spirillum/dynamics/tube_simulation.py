@@ -24,9 +24,11 @@ from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import largest_yaw
+from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
+from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
@@ -177,13 +179,13 @@ def run_in_tube(
     dataset = tube_run(steady, links, begun, timetable, wait=asked.wait or 0.0, progress=progress)
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
-    said = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    said = list(notes_in(dataset.attrs))
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     if asked.flow is not None:
         limits.append(flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max())))
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
-        said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+        said.append(NO_WEIGHT)
     said += check_stokes_flow(steady.batch, limits).values()
     stuck = held_by_friction(
         links,
@@ -194,7 +196,7 @@ def run_in_tube(
     error = in_stokes_flow(table.speed_error_at(1.0), *limits)
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
-        warnings="\n".join(said),
+        **note_attributes(said),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -236,18 +238,17 @@ def links_in_tube(
     return links, start
 
 
-def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[str]:
+def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     """A sentence on a flow file of several rows whose times are not those of the run; none for any other."""
     first, last = float(flow[0, 0]), float(flow[-1, 0])
     if len(flow) == 1:
         return []
     if first >= end:
-        return [
-            f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row "
-            "throughout"
-        ]
+        words = f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row"
+        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
     if last < end * (1.0 - 1e-9):
-        return [f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"]
+        words = f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"
+        return [Note("schedule-outside-run", words, ("in_tube.flow",))]
     return []
 
 
@@ -314,7 +315,7 @@ class Checked(NamedTuple):
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
     """Whether it comes nearer to the glass than where the table was checked."""
-    said: list[str]
+    said: list[Note]
     """What there is to say of both, a sentence each."""
 
 
@@ -336,21 +337,24 @@ def held_against_check(
     beyond = np.flatnonzero(np.abs(yaw) > checked)
     if beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
-        said.append(
-            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg against the wall, and "
-            f"its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
+        words = (
+            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "
+            "checked "
+            f"up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
         )
+        said.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
-        said.append(
-            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked at gaps from "
-            f"{_length(least)} on: the error estimate is that of such places"
+        words = (
+            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked from "
+            f"{_length(least)} on: the error estimate is that of larger gaps"
         )
+        said.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
     return Checked(not beyond.size, bool(near.size), said)
 
 
-def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[str]:
+def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
     """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
 
     Args:
@@ -362,11 +366,11 @@ def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contac
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []
-    return [
-        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
-        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
-        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
-    ]
+    words = (
+        f"dry friction (coefficient {float(robot.tube[kernel.COEFFICIENT]):g}) holds the robot: it slides below "
+        f"{show(smoothed, 'um/s')}, where the friction law is smoothed, and has no error estimate"
+    )
+    return [Note("held-by-friction", words, ("in_tube.friction_coefficient", "forward_velocity"))]
 
 
 def _falls(time: Samples | None, first: int) -> str:

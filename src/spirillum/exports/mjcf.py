@@ -11,12 +11,14 @@ from spirillum.errors import InputError
 from spirillum.exports.parts import MESH_SCALE, MeshFile
 from spirillum.exports.sidecar import joint_friction
 from spirillum.exports.urdf import numbers
+from spirillum.notes import Note
 from spirillum.robot.links import Link, links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 
-FLUID_WARNING = (
-    "MuJoCo's own fluid must stay off (density and viscosity 0): its model of ellipsoids gives a helix no thrust; "
-    "the robot swims only if a program applies the forces of the resistance matrix at every step"
+FLUID_WARNING = Note(
+    "physics-engine-fluid",
+    "MuJoCo's own fluid gives a helix no thrust and must stay off; apply the forces of the resistance matrix at "
+    "each step",
 )
 _LEAST = 1e-15
 """MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers."""

@@ -45,7 +45,7 @@ Message = tuple[str, str, float, dict[str, Any]]
 """Topic, name of the schema, time in s, content."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording(DisplayMixin):
     """What was written."""
 

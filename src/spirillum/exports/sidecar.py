@@ -10,6 +10,7 @@ from spirillum.arrays import Samples
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.links import Link, links_of
@@ -41,7 +42,7 @@ class _Resistance(NamedTuple):
     """Stated error of the model."""
     references: list[str]
     """Sources of the model."""
-    warnings: list[str]
+    warnings: list[Note]
 
 
 def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
@@ -90,9 +91,10 @@ def _resistance(robot: Robot, model: str) -> _Resistance:
     if outside:
         raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
     matrix = chosen.resistance(batch, np.zeros(1))[0]
-    warnings = [limit.sentence() for limit in broken(chosen.cautions(batch))]
+    warnings = [limit.caution() for limit in broken(chosen.cautions(batch))]
     if robot.coupling.length > 0 and "coupling" not in chosen.parts:
-        warnings.append(f"model '{model}' leaves the coupling out")
+        words = f"model '{model}' has no coupling: its drag is missing; use another of {', '.join(FULL_MODELS)}"
+        warnings.append(Note("coupling-left-out", words, ("coupling",)))
     return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
 
 

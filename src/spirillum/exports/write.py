@@ -22,6 +22,7 @@ from spirillum.exports.sidecar import sidecar_of
 from spirillum.exports.solid import UnitedBody, is_watertight, is_watertight_file, stl_bytes, united
 from spirillum.exports.urdf import urdf_text
 from spirillum.files import MARK, output_folder, output_target, protected, whole_files
+from spirillum.notes import Note, notes_in_answer
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
@@ -182,20 +183,19 @@ def _stl_of(robot: Robot, body: UnitedBody, unit: str) -> bytes:
     return stl_bytes(body.vertices / STL_UNITS[unit], body.faces, f"{robot.name}, unit {unit}")
 
 
-def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[str]:
+def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[Note]:
     """Why a program may refuse an STL file, a sentence each."""
     unit = found["unit"]
-    sentences = []
+    notes = []
     if found["bodies"] != 1:
-        sentences.append(f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it")
+        words = f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it"
+        notes.append(Note("mesh-not-closed", words))
     if not found["watertight"]:
         better = next((name for name in STL_UNITS if is_watertight_file(_stl_of(robot, body, name))), None)
         remedy = f"use --unit {better}" if better else "repair it before printing"
-        sentences.append(
-            f"the STL file is not watertight in {unit}: programs that read it merge vertices closer than 1e-8 {unit}; "
-            f"{remedy}"
-        )
-    return sentences
+        words = f"the STL file is not watertight in {unit}: vertices closer than 1e-8 {unit} are merged; {remedy}"
+        notes.append(Note("mesh-not-closed", words, ("unit",)))
+    return notes
 
 
 _DESCRIPTIONS = (".urdf", ".mjcf", ".xml")
@@ -211,7 +211,7 @@ class Written:
     """What it holds, in words."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Export(DisplayMixin):
     """What was written, and the numbers of its geometry."""
 
@@ -227,7 +227,7 @@ class Export(DisplayMixin):
     """Mass, centre, inertia and displaced volume of body and rotor."""
     solid: Mapping[str, Any] | None
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     """What to be careful about, a sentence each."""
     held: AxialRobot | None = None
     """Of an FMU: the equations in it."""
@@ -336,7 +336,7 @@ def _shape_of(
     pieces = robot_mesh(robot, phase=0.0 if still else angle, fineness=fineness)
     beside = {} if resistance is None else sidecar_of(robot, resistance, angle if described else 0.0)
     solid: Mapping[str, Any] | None = None
-    cautions: list[str] = []
+    cautions: list[Note] = []
     if target.suffix == ".stl":
         printable, solid, cautions = printable_solid(robot, pieces, unit)
         contents = {target.name: printable}
@@ -348,11 +348,11 @@ def _shape_of(
     _commit(target, {name: content.data for name, content in contents.items()})
     files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
     cautions += [
-        f"{name} is not watertight in mm, the unit of mesh files: a program that needs closed bodies may refuse it"
+        Note("mesh-not-closed", f"{name} is not watertight in mm: a program that needs closed bodies may refuse it")
         for name, content in contents.items()
         if name.endswith("-solid.stl") and not is_watertight_file(content.data)
     ]
-    warnings = [*robot.warnings, *beside.get("warnings", []), *cautions]
+    warnings = [*robot.warnings, *notes_in_answer(beside), *cautions]
     if target.suffix in (".mjcf", ".xml"):
         warnings.append(FLUID_WARNING)
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))

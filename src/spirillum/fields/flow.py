@@ -20,6 +20,7 @@ from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.domain import seat_of
+from spirillum.notes import Note, note_attributes
 from spirillum.quantities import unit_of
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
@@ -44,7 +45,7 @@ PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
 """Points along the longest side of a plane and of a box."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flow(DisplayMixin):
     """The fluid around a swimming robot at one phase of its tail.
 
@@ -85,12 +86,12 @@ class Flow(DisplayMixin):
         return np.array([1.0, 0.0, 0.0]) if self.seat is None else self.seat.forward
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each."""
         if self.robot.channel is None or self.seat is not None:
             return self.prediction.warnings
-        walls = "the channel's walls are not computed: this is the flow in unbounded fluid"
-        return (*self.prediction.warnings, walls)
+        words = "wall effects are not modelled: this is the flow in unbounded fluid; use model tube"
+        return (*self.prediction.warnings, Note("incomplete-flow-field", words, ("channel",)))
 
     def to_dict(self) -> dict[str, Any]:
         """The motion and its settings, as data."""
@@ -370,7 +371,7 @@ def _attributes(flow: Flow) -> dict[str, Any]:
         "placement": json.dumps(motion.placement),
         "settings": json.dumps(motion.robot.model_dump(), sort_keys=True),
         "references": " ".join(motion.references),
-        "warnings": "\n".join(flow.warnings),
+        **note_attributes(flow.warnings),
         "versions": versions(),
         "Conventions": "CF-1.11",
     }

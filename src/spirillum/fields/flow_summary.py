@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.envelope import quantity
+from spirillum.envelope import quantity, with_notes_last
 from spirillum.fields.flow import Flow
 from spirillum.quantities import unit_of
 
@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any]:
     """The flow around a robot and what was computed of it, as `spirillum flow` prints them."""
-    found = flow.to_dict()
-    warnings = found.pop("warnings")
-    return {**found, "files": [_file(path, dataset) for path, dataset in written.items()], "warnings": warnings}
+    return with_notes_last(flow.to_dict(), files=[_file(path, dataset) for path, dataset in written.items()])
 
 
 def _file(path: Path, dataset: xr.Dataset) -> dict[str, Any]:

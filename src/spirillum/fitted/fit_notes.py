@@ -19,20 +19,22 @@ from spirillum.fitted.calibration_file import (
 )
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 """Fitted fields that act on `rft` alone."""
 
-FITTED_HELD = (
-    "the posterior was fitted to robots that are held at their places; this one is let go and finds its own: its "
-    "intervals are of that motion, and need not hold the observations that were fitted"
+FITTED_HELD = Note(
+    "fit-other-motion",
+    "the posterior was fitted to robots held at a pose, and this one moves freely: its intervals need not contain the "
+    "fitted observations",
 )
 """Said of a free motion in the tube over a posterior."""
-CALIBRATED_HELD = (
-    "the calibration is of robots that are held at their places; this one is let go and finds its own, and need not "
-    "swim as it was observed"
+CALIBRATED_HELD = Note(
+    "fit-other-motion",
+    "the calibration was fitted to robots held at a pose, and this one moves freely: it need not swim as observed",
 )
 """Said of a free motion in the tube with a calibration file."""
 
@@ -81,13 +83,16 @@ class Fitted:
 
     def idle_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
-    ) -> list[str]:
+    ) -> list[Note]:
         """Models to which nothing of a calibration file applies."""
         replaced = self.file is not None and self.file.calibration
         instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
         idle = [model for model in models if not any(self.serves(robot, model, friction=friction) for robot in robots)]
         return [
-            f"nothing in {self.name or 'the calibration'} is for {self._not_for(robots, model)}: {instead}"
+            Note(
+                "fit-not-used",
+                f"nothing in {self.name or 'the calibration'} is for {self._not_for(robots, model)}: {instead}",
+            )
             for model in idle
         ]
 
@@ -103,46 +108,49 @@ class Fitted:
 
     def outside_warnings(
         self, robot: Robot, model: SwimmerModel, posterior: PosteriorFile, *, friction: bool = True
-    ) -> list[str]:
+    ) -> list[Note]:
         """Whether draws of a posterior leave a robot's answer as it is without them."""
         if posterior.acts_on(robot, walls=model.placed, friction=friction):
             return []
         whom = self._not_for([robot], model)
-        return [f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over places are used"]
+        words = f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over poses are used"
+        return [Note("fit-not-used", words)]
 
     def origin_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
-    ) -> list[str]:
+    ) -> list[Note]:
         """Whether anything of it that is used was measured."""
         pairs = ((robot, model) for robot in robots for model in models)
         if not self.synthetic or not any(self.serves(*pair, friction=friction) for pair in pairs):
             return []
-        return [
-            f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
-        ]
+        words = f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
+        return [Note("synthetic", words)]
 
-    def reading_warnings(self, readings: Sequence[str]) -> list[str]:
+    def reading_warnings(self, readings: Sequence[str]) -> list[Note]:
         """Whether B_eff is used under another reading than the one under which it was inferred."""
         other = [name for name in readings if name in ("rotor", "paper") and name != self.reading]
         if not (self.friction and self.reading and other):
             return []
-        return [
-            f"B_eff was inferred under friction reading '{self.reading}' and is used under '{other[0]}', where it "
-            "means another torque: rates and speeds of that reading do not follow from the observations"
-        ]
+        words = (
+            f"B_eff was inferred with friction '{self.reading}' and is another torque with '{other[0]}': rates "
+            "and speeds "
+            f"do not follow from the observations; use '{self.reading}'"
+        )
+        return [Note("friction-other-fit", words, ("friction.effective",))]
 
-    def model_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[str]:
+    def model_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[Note]:
         """Whether B_eff is used with another model than the one whose torque it was inferred with."""
         other = [name for name in models if name != self.model]
         if not (self.friction and self.model and other and {"rotor", "paper"} & set(readings)):
             return []
         names = " and ".join(f"'{name}'" for name in other)
-        return [
-            f"B_eff was inferred with the torque of model '{self.model}' and is used with {names}, where it makes up "
-            "for another torque: rates and speeds of the robot's own drive do not follow from the observations there"
-        ]
+        words = (
+            f"B_eff was inferred with model '{self.model}' and is another torque with {names}: rates and speeds do not "
+            f"follow from the observations; use '{self.model}'"
+        )
+        return [Note("friction-other-fit", words, ("friction.effective",))]
 
-    def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[str]:
+    def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
         """All that has to be said beside a steady motion.
 
         Args:
@@ -157,7 +165,7 @@ class Fitted:
             return [*idle, *self.run_warnings(robot, model, reading)]
         return [*idle, *self.origin_warnings([robot], [model], friction=acts)]
 
-    def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[str]:
+    def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[Note]:
         """All that has to be said of a robot that is driven by its own motor."""
         return [
             *self.tail_warnings(robot),
@@ -166,37 +174,35 @@ class Fitted:
             *self.origin_warnings([robot], [model]),
         ]
 
-    def tail_warnings(self, robot: Robot) -> list[str]:
+    def tail_warnings(self, robot: Robot) -> list[Note]:
         """Whose B_eff a robot that is driven by its own motor has."""
         own, others = friction_of_tails(robot, self.friction)
         if own is not None and own > 0:
             return []
         if own is not None:
-            return [
-                "B_eff of this tail came out negative in the calibration: zero is used, and the rates are upper bounds"
-            ]
+            words = "the calibrated B_eff of this tail is negative: zero is used, and the rates are upper bounds"
+            return [Note("friction-negative", words, ("friction.effective",))]
         if not others:
             return []
-        return [
-            f"B_eff of this tail was not fitted: the middle of {len(others)} fitted tails is used, "
-            f"{np.median(others):.4g} N m s/rad; they range from {min(others):.4g} to {max(others):.4g}"
-        ]
+        words = (
+            f"B_eff of this tail was not fitted: the median of {len(others)} fitted tails is used, "
+            f"{np.median(others):.4g} N m s/rad (range {min(others):.4g} to {max(others):.4g})"
+        )
+        return [Note("friction-not-fitted", words, ("friction.effective",))]
 
-    def tails_warnings(self, robots: Sequence[Robot]) -> list[str]:
+    def tails_warnings(self, robots: Sequence[Robot]) -> list[Note]:
         """How many robots have a B_eff that was not fitted, or came out negative."""
         found = [friction_of_tails(robot, self.friction) for robot in robots]
         unknown = sum(1 for own, others in found if own is None and others)
         zero = sum(1 for own, _ in found if own is not None and own <= 0)
         sentences = []
         if unknown:
-            sentences.append(
-                f"B_eff of {unknown} of {len(robots)} tails was not fitted: the middle of the fitted tails in their "
-                "channel is used" + (", and intervals hold their spread" if self.drawn else "")
-            )
+            words = f"B_eff of {unknown} of {len(robots)} tails was not fitted: the median of the fitted tails is used"
+            words += ", and intervals include their spread" if self.drawn else ""
+            sentences.append(Note("friction-not-fitted", words, ("friction.effective",)))
         if zero:
-            sentences.append(
-                f"B_eff of {zero} of {len(robots)} tails came out negative in the calibration: zero is used"
-            )
+            words = f"the calibrated B_eff of {zero} of {len(robots)} tails is negative: zero is used"
+            sentences.append(Note("friction-negative", words, ("friction.effective",)))
         return sentences
 
 

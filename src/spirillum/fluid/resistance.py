@@ -16,6 +16,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
 from spirillum.fluid.registry import check_placement, find_model
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load, with_resolution
@@ -30,7 +31,7 @@ _LINKS = ("body", "rotor")
 """Order of the two links in a 12x12."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Resistance(DisplayMixin):
     """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 
@@ -48,7 +49,7 @@ class Resistance(DisplayMixin):
     """Where the model places the robot."""
     matrix: Samples
     """B, 6x6, or 12x12 for body and rotor in this order, SI; NaN where the model does not know an entry."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     """What to be careful about, a sentence each."""
 
     @property
@@ -140,14 +141,15 @@ def resistance(
     return Resistance(ready, chosen, part, about, angle, place, matrix, _warnings(ready, chosen, batch, part))
 
 
-def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:
+def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[Note, ...]:
     found = list(robot.warnings)
     if part not in ("body", "coupling"):
-        found += [limit.sentence() for limit in broken(model.cautions(batch))]
+        found += [limit.caution() for limit in broken(model.cautions(batch))]
     if model.axial_only:
-        found.append(
-            f"model '{model.name}' gives the entries along and about the motor axis only; the others are unknown"
-        )
+        words = f"model '{model.name}' gives the entries along and about the motor axis only; the others are unknown"
+        found.append(Note("axial-only", words, ("matrix",)))
     if part in ("rotor", "robot", _BOTH) and robot.coupling.length > 0 and "coupling" not in model.parts:
-        found.append(f"model '{model.name}' leaves the coupling out")
+        found.append(
+            Note("coupling-left-out", f"model '{model.name}' has no coupling: its drag is missing", ("coupling",))
+        )
     return tuple(found)

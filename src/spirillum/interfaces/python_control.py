@@ -26,6 +26,7 @@ from spirillum.dynamics.axial_robot import (
 )
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
+from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     import control
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LinearSystem(DisplayMixin):
     """A robot's equations linearised, and where."""
 
@@ -49,7 +50,7 @@ class LinearSystem(DisplayMixin):
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
     time_constant: float
     """Of the motor's current there, s; path, angles and charge only add up."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
     """What to be careful about, a sentence each."""
 
     def to_dict(self) -> dict[str, Any]:

@@ -289,7 +289,7 @@ def _ports() -> str:
     return ", ".join(found[:8]) if found else "a serial port, of which this machine has none now"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RemoteRun(DisplayMixin):
     """A motor that was on for a time, through a remote."""
 

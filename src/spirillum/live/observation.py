@@ -16,7 +16,7 @@ State = Literal["learning", "tracking", "lost"]
 """`learning`: the robot's appearance is not yet known; `lost`: it is not where it should be, or not in full view."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Observation(DisplayMixin):
     """A robot on one frame, from this frame and those before it; SI, NaN where it was not seen."""
 
@@ -78,7 +78,7 @@ class Observation(DisplayMixin):
                 "pixel": quantity(list(self.pixel), "px"),
             }
             content |= {name: item.to_dict() for name, item in self.rates.items()}
-        return envelope("live-observation", content, [flag.sentence for flag in self.flags])
+        return envelope("live-observation", content, [flag.note for flag in self.flags])
 
 
 def _known(value: float) -> float | None:

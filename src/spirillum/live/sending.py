@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from spirillum.errors import InputError
+from spirillum.notes import Note
 
 _LOOPBACK = "127.0.0.1"
 _DIGITS = 5
@@ -44,11 +45,12 @@ class Datagrams:
             self._unsent, self._reason = self._unsent + 1, error.strerror or str(error)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """A sentence if the network took some of the lines not."""
         if not self._unsent:
             return ()
-        return (f"udp = {self._address}: {self._unsent} of {self._lines} lines could not be sent ({self._reason})",)
+        words = f"udp = {self._address}: {self._unsent} of {self._lines} lines could not be sent ({self._reason})"
+        return (Note("lines-not-sent", words, ("udp",)),)
 
     def close(self) -> None:
         """No more lines."""

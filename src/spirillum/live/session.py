@@ -12,13 +12,14 @@ from pathlib import Path
 from threading import Condition, Event, Thread
 from typing import Any
 
-from spirillum.envelope import quantity
+from spirillum.envelope import quantity, with_notes_last
 from spirillum.errors import InputError
 from spirillum.live.observation import Observation
 from spirillum.live.sending import Datagrams, line_of
 from spirillum.live.sources import Arrived, Source, source_of
 from spirillum.live.tracker import LiveTracker, seconds
 from spirillum.live.tracking_summary import Tracked
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.vision.setup import load_setup
 
@@ -147,10 +148,8 @@ def track(
 
 def observation_line(observation: Observation, latency: float | None) -> dict[str, Any]:
     """An observation as JSON, with its latency before its warnings."""
-    answer = observation.to_dict()
-    warnings = answer.pop("warnings")
     more = {} if latency is None else {"latency": quantity(latency, "s")}
-    return {**answer, **more, "warnings": warnings}
+    return with_notes_last(observation.to_dict(), **more)
 
 
 def _robot(setup: str | Path, file: str, overrides: Mapping[str, Any] | None) -> Any:
@@ -186,7 +185,7 @@ class _Log:
     latencies: list[float] = field(default_factory=list)
     _next: int = 0
     _first: tuple[float, float] | None = None
-    _clocks: str = ""
+    _clocks: Note | None = None
 
     def run(self, report: OnObservation) -> None:
         """Look at all frames; what stops it on the way is noted, if anything was looked at.
@@ -234,12 +233,14 @@ class _Log:
         if self.source.kind == "film":
             return
         theirs, ours = frame.time - self._first[0], frame.clock - self._first[1]
-        self._clocks = ""
+        self._clocks = None
         if abs(theirs - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
-            self._clocks = (
-                f"{self.source.name}: {theirs:.1f} s by the times of the frames were {ours:.1f} s by this computer's: "
-                "frames are lost, or the rate is another than stated; all rates are wrong by that factor"
+            words = (
+                f"{self.source.name}: {theirs:.1f} s by the frames' times were {ours:.1f} s by this computer's "
+                "clock: all "
+                "rates are wrong by that factor; check the frame rate"
             )
+            self._clocks = Note("clock-in-doubt", words, ("camera.frames_per_second",))
 
     def _hint(self) -> str:
         """What helps a film that has ended while the robot was still learnt."""
@@ -249,7 +250,7 @@ class _Log:
             return "; a shorter --learn needs less of it, and `spirillum measure` looks at a film as a whole"
         return "; a film this short is tracked with --pace fast, which waits for the learning"
 
-    def answer(self, more: tuple[str, ...] = ()) -> Tracked:
+    def answer(self, more: tuple[Note, ...] = ()) -> Tracked:
         """The answer, with further notes."""
         trial = None
         try:
@@ -266,7 +267,7 @@ class _Log:
             learnt=self.learnt,
             latencies=tuple(self.latencies),
             trial=trial,
-            notes=(*self.source.notes, *more, *([self._clocks] if self._clocks else [])),
+            source_notes=(*self.source.notes, *more, *([self._clocks] if self._clocks else [])),
             stopped=self.stopped,
             interrupted=self.interrupted,
         )

@@ -14,6 +14,7 @@ import numpy as np
 from spirillum.argument_validation import as_number
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
+from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import CameraSetup
@@ -77,9 +78,9 @@ class Source:
         yield from _pictures(self)
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What was odd about its pictures, a sentence each: for example, that a film breaks off."""
-        return tuple(flag.sentence for flag in self.flags)
+    def notes(self) -> tuple[Note, ...]:
+        """What was odd about its pictures: for example, that a film breaks off."""
+        return tuple(flag.note for flag in self.flags)
 
 
 def source_of(

@@ -12,9 +12,10 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.measurement.setup_template import setup_remarks
 from spirillum.measurement.trials import RATE_NAMES, Trial
+from spirillum.notes import Note
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tracked(DisplayMixin):
     """A source that was tracked to its end."""
 
@@ -34,7 +35,7 @@ class Tracked(DisplayMixin):
     """Time from each tracked picture's arrival to its observation, s; empty with the pace `fast`."""
     trial: Trial | None = field(repr=False)
     """Speed and rates over all frames; None if the robot was never learnt."""
-    notes: tuple[str, ...] = ()
+    source_notes: tuple[Note, ...] = ()
     """What to be careful about that lies in the source."""
     stopped: str = ""
     """Why it ended before its time, in a sentence; empty for a film that ended, or a time that was asked for."""
@@ -46,16 +47,16 @@ class Tracked(DisplayMixin):
         return float(np.quantile(self.latencies, share)) if self.latencies else math.nan
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to be careful about, a sentence each."""
-        found = [*self.notes, *([self.stopped] if self.stopped else [])]
+    def warnings(self) -> tuple[Note, ...]:
+        """What to be careful about."""
+        found = [*self.source_notes, *([Note("run-cut-short", self.stopped)] if self.stopped else [])]
         if self.trial is not None:
-            said = [flag.sentence for flag in self.trial.flags]
+            said = [flag.note for flag in self.trial.flags]
             found += [*said, *setup_remarks(self.trial.track.setup)]
             for name in RATE_NAMES:
                 item = self.trial.quantities[name]
                 if not math.isfinite(item.value) and item.reason not in said:
-                    found.append(f"{name.replace('_', ' ')} not given: {item.reason}")
+                    found.append(Note("not-measured", f"{name.replace('_', ' ')} not given: {item.reason}", (name,)))
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.measurement.depth import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
@@ -43,8 +44,6 @@ _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Sizes at which the tracker passes its tests with a margin, pixels."""
 _NEEDED = {"robot": 20.0, "spacing": 3.0}
 """Sizes below which ruler or robot are not detected, pixels."""
-_OTHERWISE = "--expect-speed and --expect-body-rate take what `spirillum predict` says"
-"""How else to come to expected rates with walls than by `spirillum prepare`, a clause."""
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
     f"{_WAVE_ERROR:g} pixels of the wire across; {_CORRELATION:g} neighbouring frames err alike, "
@@ -77,7 +76,7 @@ class Check:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Feasibility(DisplayMixin):
     """The feasibility of an experiment."""
 
@@ -95,7 +94,7 @@ class Feasibility(DisplayMixin):
     """Time for which the whole robot is in view, s."""
     shares: Mapping[str, float]
     """Relative standard uncertainty of lengths by source."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
     @property
     def feasible(self) -> bool:
@@ -212,27 +211,24 @@ def _check_video(video: str | Path | None, view_width: str | float | None, pictu
 
 def _warnings(
     checks: Sequence[Check], expected: Mapping[str, tuple[float, str]], pixel: float, shares: Mapping[str, float]
-) -> list[str]:
-    """Warnings, a sentence each."""
-    warnings = [check.sentence for check in checks if not check.passed]
+) -> list[Note]:
+    """What to be careful about in the checks."""
+    warnings = [Note("cannot-resolve", check.sentence, (check.name,)) for check in checks if not check.passed]
     if not math.isfinite(pixel):
-        warnings.append(
-            "nothing says how large a pixel is, so sizes in the picture and intervals are not given; allowed: "
-            "--view-width, markers.length_per_pixel, or a VIDEO that shows the ruler"
-        )
+        words = "the size of a pixel is unknown: sizes in the picture and intervals are not given; state --view-width"
+        warnings.append(Note("pixel-size-unknown", words, ("markers.length_per_pixel",)))
     if expected["forward_velocity"][0] < 0:
-        warnings.append(
-            "with this sense of rotation the robot swims backwards; forward are positive rates of the tail of a "
-            "right-handed robot and negative ones of a left-handed one"
-        )
+        words = "the robot swims backwards at this sign of the tail rate; forward is positive for a right-handed tail"
+        warnings.append(Note("swims-backwards", words, ("tail_rotation_rate", "tail.handedness")))
     if not shares:
-        warnings.append("the setup gives no uncertainty of heights: 10 mm of depth can be 7 % of a length")
+        words = "the setup states no uncertainty of heights: 10 mm of depth can be 7 % of a length; state it"
+        warnings.append(Note("setup-incomplete", words))
     return warnings
 
 
 def _expected(
     robot: Robot, tail_rate: str | float | None, body_rate: str | float | None, speed: str | float | None
-) -> tuple[dict[str, tuple[float, str]], tuple[str, ...]]:
+) -> tuple[dict[str, tuple[float, str]], tuple[Note, ...]]:
     """Expected motion by name, each value with its source, and what to be careful about in a prediction."""
     given: dict[str, float | None] = {
         "forward_velocity": None if speed is None else parse_option("expect-speed", speed, KINDS["velocity"]),
@@ -247,7 +243,7 @@ def _expected(
     from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
-        choice = choose_model(AUTO, robot, tables_only=True, other_way=_OTHERWISE)
+        choice = choose_model(AUTO, robot, tables_only=True)
         answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
     except InputError as error:
         raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error

@@ -30,6 +30,7 @@ from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.track_check import check_track
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
 from spirillum.measurement.untracked import Untracked, untracked
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.vision.flag import Flag
@@ -124,7 +125,7 @@ TABLE = "observations.csv"
 """Name of the table that a measurement writes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Measurement(DisplayMixin):
     """What was measured of a robot in one or several trials."""
 
@@ -146,25 +147,28 @@ class Measurement(DisplayMixin):
     """Datasets of other measurements that lie in the same folder."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to be careful about, a sentence each."""
-        found = [sentence for trial in self.trials for sentence in _sentences(trial)]
+    def warnings(self) -> tuple[Note, ...]:
+        """What to be careful about."""
+        found = [note for trial in self.trials for note in _notes(trial)]
         if any(math.isfinite(trial.track.scale.length_per_pixel) for trial in self.trials):
             found += setup_remarks(self.trials[0].track.setup)
-        found += [f"{video}: not measured: {sentence}" for video, sentence in self.failures]
+        found += [Note("not-measured", f"{video}: not measured: {sentence}") for video, sentence in self.failures]
         total = self.summary.trials
         few = {name: count for name, count in self.summary.counts.items() if name in RATE_NAMES and 0 < count < total}
         found += [
-            f"the mean {name.replace('_', ' ')} rests on {count} of {total} trials" for name, count in few.items()
+            Note("not-measured", f"the mean {name.replace('_', ' ')} rests on {count} of {total} trials", (name,))
+            for name, count in few.items()
         ]
         if len(self.trials) == 1:
-            found.append("one trial: the intervals are its own, and say nothing of how trials differ")
+            words = "one trial: intervals are its own and do not include how trials differ; measure more trials"
+            found.append(Note("intervals-incomplete", words))
         if self.files and TABLE not in self.files:
             free = self.robot.channel is None
             why = f"the robot has no channel, which {TABLE} states" if free else "no trial gives a speed or a rate"
-            found.append(f"{why}: {TABLE} is not written")
+            found.append(Note("files", f"{why}: {TABLE} is not written"))
         if self.left:
-            found.append(f"not of this measurement, and left in the folder from before: {', '.join(self.left)}")
+            words = f"not of this measurement, and left in the folder from before: {', '.join(self.left)}"
+            found.append(Note("files", words))
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:
@@ -180,16 +184,19 @@ class Measurement(DisplayMixin):
         return envelope("measurement", content, self.warnings)
 
 
-def _sentences(trial: Trial) -> list[str]:
+def _notes(trial: Trial) -> list[Note]:
     """Flags of a trial, and why a rate is missing where no flag says it."""
-    flags = [flag.sentence for flag in trial.flags]
+    flags = [flag.note for flag in trial.flags]
     reasons: dict[str, list[str]] = {}
     for name in RATE_NAMES:
         item = trial.quantities[name]
         if not math.isfinite(item.value) and item.reason not in flags:
-            reasons.setdefault(item.reason, []).append(name.replace("_", " "))
-    missing = [f"{', '.join(names)} not given: {reason}" for reason, names in reasons.items()]
-    return [f"{trial.name}: {sentence}" for sentence in (*flags, *missing)]
+            reasons.setdefault(item.reason, []).append(name)
+    missing = [
+        Note("not-measured", f"{', '.join(names).replace('_', ' ')} not given: {reason}", names)
+        for reason, names in reasons.items()
+    ]
+    return [note.prefixed(f"{trial.name}: ") for note in (*flags, *missing)]
 
 
 class Asked(NamedTuple):

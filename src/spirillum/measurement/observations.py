@@ -14,6 +14,7 @@ from spirillum.files.numbers import number_in
 from spirillum.formats.tables import Table, TableRow, check_known, check_present, read_table
 from spirillum.measurement.rate_checks import RateTriples, check_motor_rates, first_of, rows_in_words, wrong_signs
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.units import Hz
 
@@ -101,13 +102,14 @@ def observation_table(path: str | Path) -> Table:
     return table
 
 
-def unread_columns(table: Table) -> tuple[str, ...]:
-    """A sentence on the columns of an observations file that are not read; none without such columns."""
+def unread_columns(table: Table) -> tuple[Note, ...]:
+    """A note on the columns of an observations file that are not read; none without such columns."""
     names = table.free_columns(COLUMNS)
     if not names:
         return ()
     shown = ", ".join(name[:40] for name in names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
-    return (f"column{'' if len(names) == 1 else 's'} {shown}: not read, taken as notes",)
+    words = f"column{'' if len(names) == 1 else 's'} {shown}: not read, taken as remarks of yours"
+    return (Note("input-unused", words, names),)
 
 
 def _check_header(table: Table) -> None:

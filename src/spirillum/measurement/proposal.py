@@ -15,6 +15,7 @@ from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, new_file, output_target
 from spirillum.measurement.setup_template import KNOWN, setup_text, toml_value
+from spirillum.notes import Note
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
@@ -64,7 +65,7 @@ class Finding:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Proposal(DisplayMixin):
     """A setup as far as a film tells it."""
 
@@ -82,7 +83,7 @@ class Proposal(DisplayMixin):
     """The setup file."""
     file: str | None = None
     """Where it was written; None: nowhere."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
     def found(self, name: str) -> Finding:
         """A finding by its name."""
@@ -354,20 +355,26 @@ def _scale_lines(found: Scouted, robot: Robot, spacing: float | None) -> dict[st
     }
 
 
-def _warnings(video: Video, found: Scouted, findings: tuple[Finding, ...], spacing: float | None) -> Iterator[str]:
-    yield from (flag.sentence for flag in video.flags)
+def _warnings(video: Video, found: Scouted, findings: tuple[Finding, ...], spacing: float | None) -> Iterator[Note]:
+    yield from (flag.note for flag in video.flags)
     unsure = ("robot", "direction", "ruler")
-    yield from (one.sentence for one in findings if one.name in unsure and one.confidence != "clear")
+    yield from (
+        Note("setup-incomplete", one.sentence, (one.name,))
+        for one in findings
+        if one.name in unsure and one.confidence != "clear"
+    )
     if found.known is None:
         return
     lines = found.lines
     if lines is not None and spacing is not None:
         apart = lines.distance * found.optics.length_per_pixel
         if not _SPACING[0] < spacing / apart < _SPACING[1]:
-            yield (
-                f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are {1e3 * apart:.2g} "
-                "mm apart, or a tenth more where the ruler lies below it; check the spacing, or the robot file"
+            words = (
+                f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are "
+                f"{1e3 * apart:.2g} mm apart; "
+                "check the spacing, or the robot file"
             )
+            yield Note("setup-incomplete", words, ("markers.spacing",))
     frames = [frame.small(found.reduction) for frame in found.frames]
     flags = camera_flags(frames, found.known.start, ruled=lines is not None)
-    yield from (flag.sentence for flag in (*flags, *found.known.wire.flags))
+    yield from (flag.note for flag in (*flags, *found.known.wire.flags))

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.notes import Note
 from spirillum.robust import mad_scale
 from spirillum.units import Hz
 
@@ -73,14 +74,15 @@ def check_motor_rates(path: str | Path, rates: RateTriples) -> None:
     _check_contradictions(path, rates)
 
 
-def convention_doubt(rates: RateTriples) -> tuple[str, ...]:
-    """A sentence where motor rates fit tail plus body rate better than tail less body rate, but not decisively."""
+def convention_doubt(rates: RateTriples) -> tuple[Note, ...]:
+    """A note where motor rates fit tail plus body rate better than tail less body rate, but not decisively."""
     if not rates.rows or not math.log(_DOUBTFUL) < convention_evidence(rates) <= math.log(_DECISIVE):
         return ()
-    return (
+    words = (
         f"{rows_in_words(rates.rows)}: motor_rate_Hz is nearer to tail plus body rate than to tail less body rate; "
-        "check that all rates are signed about the same axis",
+        "check the signs of all rates"
     )
+    return (Note("units-doubtful", words, ("motor_rate_Hz", "body_rate_Hz")),)
 
 
 def convention_evidence(rates: RateTriples) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 from spirillum.envelope import envelope, quantity
 from spirillum.files import new_file, output_target
 from spirillum.measurement.depth import depth_shares
+from spirillum.notes import Note
 from spirillum.robot.fields import field_values
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import opened, samples_of
@@ -144,7 +145,8 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     total = sum(share**2 for share in shares.values()) ** 0.5
     warnings = setup_remarks(setup)
     if robot.seal is None or not (setup.robot.stripes or robot.seal.stripes):
-        warnings.append("the robot has no stripes: its body's rotation cannot be seen")
+        words = "the robot has no stripes: its body's rotation cannot be seen; add seal.stripes"
+        warnings.append(Note("setup-incomplete", words, ("seal.stripes",)))
     content = {
         "file": str(path),
         "valid": True,
@@ -155,20 +157,22 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     }
     if film is not None:
         content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
-        warnings += [flag.sentence for flag in flags]
+        warnings += [flag.note for flag in flags]
     return envelope("setup-check", content, warnings)
 
 
-def setup_remarks(setup: Setup) -> list[str]:
-    """What a setup says of its uncertainties that whoever uses its lengths has to know, a sentence each."""
+def setup_remarks(setup: Setup) -> list[Note]:
+    """What a setup says of its uncertainties that whoever uses its lengths has to know."""
     found = []
     if not depth_shares(setup):
-        found.append(
-            "the setup states no uncertainty of its heights or scale: intervals of lengths hold what the picture shows "
-            "alone; set the *_uncertainty fields"
+        words = (
+            "the setup states no uncertainty of heights or scale: intervals of lengths lack it; set *_uncertainty "
+            "fields"
         )
+        found.append(Note("setup-incomplete", words))
     if same := _as_in_example(setup):
-        found.append(f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own")
+        words = f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own"
+        found.append(Note("setup-incomplete", words, same))
     return found
 
 

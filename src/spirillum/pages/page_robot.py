@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.errors import InputError, failure_sentence
+from spirillum.notes import notes_in
 from spirillum.pages.commands import report_fault
 from spirillum.pages.job import BackgroundJob, worker
 from spirillum.pages.knobs import MODELS, Settings
@@ -71,7 +72,7 @@ def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
     """
     velocity = [plane[name].transpose("z", "x").values for name in ("velocity_x", "velocity_z")]
     speed = np.hypot(*velocity)
-    warnings = [line for line in str(plane.attrs.get("warnings", "")).split("\n") if line]
+    warnings = list(notes_in(plane.attrs))
     return {
         "model": plane.attrs["model"],
         "phase": phase,
@@ -149,7 +150,7 @@ def build(settings: Settings, robot: Robot) -> Built:
     if not walled:
         placed = placed.model_copy(update={"flow": None})
     plant = Plant(robot, model=choice.model, placement=placed)
-    caution = choice.caution
+    caution = str(choice.caution or "")
     if settings.run.get("flow") and not walled:
         caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"
     return Built(plant, choice.model, choice.reason, caution, needs)

@@ -20,6 +20,7 @@ from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.files import MARK, check_replaceable, output_folder, protected, results_folder, whole_files
 from spirillum.fitted.posterior_file import write_posterior
+from spirillum.notes import Note
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
@@ -315,7 +316,7 @@ def write_calibration(
         written += _drawn(found, folder, progress)
     files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
-    said = [f"{folder} held an earlier calibration: its {gone} are gone"] if gone else []
+    said = [Note("files", f"{folder} held an earlier calibration: its {gone} are gone")] if gone else []
     return replace(found, folder=folder, files=tuple(files), warnings=(*found.warnings, *said))
 
 

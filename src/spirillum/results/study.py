@@ -16,6 +16,7 @@ import numpy as np
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import output_folder, protected, results_folder, write_dataset, write_text
+from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
 from spirillum.results.page import draw_pictures, page
@@ -245,4 +246,4 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         **({"predictions": third} if foretold else {}),
         "observations": dataset.attrs["observations"],
     }
-    return envelope("study", content, [line for line in dataset.attrs["warnings"].split("\n") if line])
+    return envelope("study", content, notes_in(dataset.attrs))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from spirillum.citations import REFERENCES
 from spirillum.display import counted
 from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.notes import notes_in
 from spirillum.robot.model_options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 from spirillum.studies.ranking import (
     ENDS,
@@ -87,7 +88,7 @@ def content(dataset: xr.Dataset) -> dict[str, Any]:
     models = [str(name) for name in dataset["model"].values]
     readings = [str(name) for name in dataset["friction"].values]
     calibrations = list(_calibrations(robots, models))
-    warnings = [line for line in str(attributes.get("warnings", "")).split("\n") if line]
+    warnings = notes_in(attributes)
     keys = str(attributes.get("references", "")).split()
     return {
         "title": str(attributes.get("title", "Study")),

@@ -7,6 +7,7 @@ from html import escape
 
 import xarray as xr
 
+from spirillum.notes import notes_in
 from spirillum.results.study_content import shown_ranking
 from spirillum.studies.ranking import can_be_ranked, ranking_of
 
@@ -50,7 +51,7 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         return f"{table}{said}{super()._repr_html_()}"
 
     def _warnings(self) -> Iterator[str]:
-        return (f"warning: {line}" for line in str(self.attrs.get("warnings", "")).split("\n") if line)
+        return (f"{note.severity}: {note}" for note in notes_in(self.attrs))
 
 
 def _line(row: list[str], widths: list[int]) -> str:

@@ -24,6 +24,7 @@ from spirillum.files import (
     store_target,
     write_pieces,
 )
+from spirillum.notes import note_attributes, notes_in
 from spirillum.optional_dependencies import import_optional
 from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
@@ -101,7 +102,9 @@ class _Outcome(NamedTuple):
     """What is known once all regions are there."""
 
     warnings: str
-    """One a line."""
+    """Sentences, one a line."""
+    notes: str
+    """The same with their codes, as JSON."""
     unanswered: int
 
 
@@ -137,8 +140,8 @@ def _outcome_of(folder: Path) -> _Outcome | None:
     """What the study was finished with; nothing until then."""
     with suppress(InputError, KeyError, TypeError):
         attributes = read_json(folder / "zarr.json", "a store")["attributes"]
-        found = _Outcome(attributes["warnings"], attributes["unanswered"])
-        if attributes["finished"] == "yes" and type(found.warnings) is str and type(found.unanswered) is int:
+        found = _Outcome(**note_attributes(notes_in(attributes)), unanswered=attributes["unanswered"])
+        if attributes["finished"] == "yes" and type(attributes["warnings"]) is str and type(found.unanswered) is int:
             return found
     return None
 
@@ -195,7 +198,7 @@ def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
     warnings = warnings_of(loaded)
     warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
     warnings += warnings_of_calibrations(loaded)
-    return _Outcome("\n".join(dict.fromkeys(warnings)), sum(note.unanswered for note in notes))
+    return _Outcome(**note_attributes(dict.fromkeys(warnings)), unanswered=sum(note.unanswered for note in notes))
 
 
 def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
@@ -209,5 +212,4 @@ def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
         "unanswered": int(dataset.attrs["unanswered"]),
         "observations": dataset.attrs["observations"],
     }
-    warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
-    return envelope("study-store", json.loads(json.dumps(content)), warnings)
+    return envelope("study-store", json.loads(json.dumps(content)), notes_in(dataset.attrs))

@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Flags, PerRobot
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
-from spirillum.units import show_apart
+from spirillum.units import show, show_apart
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,18 @@ class Limit:
             holds = np.abs(value - limit) <= slack
         return cls(field, value, relation, limit, unit, why, holds, flag)
 
-    def caution(self, index: int = 0) -> str:
-        """The requirement in words where an answer is given although it is broken, for robot number `index`."""
-        return self._said(index, "accurate")
+    def caution(self, index: int = 0) -> Note:
+        """The note where an answer is given although the requirement is broken, for robot number `index`."""
+        return Note(caution_code(self.flag), self._said(index, "accurate"), (self.field,))
 
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
         return self._said(index, "allowed")
+
+    def bound_in_words(self) -> str:
+        """What is allowed, for the first robot; empty where there is no bound."""
+        bound = float(self.bound[0])
+        return f"{self.relation} {show(bound, self.unit)}" if np.isfinite(bound) else ""
 
     def _said(self, index: int, word: str) -> str:
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))
@@ -79,6 +85,11 @@ class Limit:
             return f"{lack}; {word}: a robot with a {name}, because {self.why}"
         said, allowed = show_apart(float(value), float(bound), self.unit)
         return f"{self.field} = {said}; {word}: {self.relation} {allowed}, because {self.why}"
+
+
+def caution_code(flag: str) -> str:
+    """Code of the note on a broken requirement of accuracy, by its flag."""
+    return "inertia" if flag.endswith("reynolds-number") else "outside-validity"
 
 
 def broken(limits: Iterable[Limit]) -> list[Limit]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
+from spirillum.notes import Note
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Derived, Robot
@@ -35,7 +36,9 @@ _DENSEST = 22590.0
 """Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
-PAPER_ROBOTS_TAKEN = f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are taken"
+PAPER_ROBOTS_TAKEN = Note(
+    "model-chosen", f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are used; name your own"
+)
 """Presets of the paper's robot, one for each of its channels."""
 
 
@@ -272,7 +275,7 @@ def _touched(table: Mapping[str, Any]) -> set[str]:
     }
 
 
-def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
+def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[Note, ...]:
     """Warn where a measured mass is older than the geometry that it weighs."""
     body = table.get("body")
     stale: list[str] = []
@@ -281,10 +284,11 @@ def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str,
         stale = [] if "body.mass" in changed else stale + [field for field in newer if field in changed]
     if not stale or not isinstance(body, dict) or "mass" not in body:
         return ()
-    return (f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew",)
+    words = f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew"
+    return (Note("robot-file-doubtful", words, ("body.mass", *stale)),)
 
 
-def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
+def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[Note, ...]:
     """Warn of what is older than the size of the body that it belongs to."""
     found = []
     for field, whose in _SIZED.items():
@@ -294,48 +298,54 @@ def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, 
             scaled = [] if field in changed else scaled + [size for size in _SIZE if size in changed]
         held = table.get(section)
         if scaled and isinstance(held, dict) and held.get(name) is not None:
-            found.append(
+            words = (
                 f"{field} = {held[name]} is {whose} of another body, before {', '.join(scaled)} changed; set it anew"
             )
+            found.append(Note("robot-file-doubtful", words, (field, *scaled)))
     return tuple(found)
 
 
-def _floating(derived: Mapping[str, Derived]) -> tuple[str, ...]:
+def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     """Warn where buoyancy lifts the robot off the floor, which holds its lateral motion and tilt."""
     weight = derived.get("submerged_weight")
     if weight is None or weight.value > 0:
         return ()
-    return (
-        f"the robot floats: its submerged weight is {weight.value:.3g} N; held motions rest on a robot that its "
-        "weight keeps on the channel's floor, and a free one rises",
+    words = (
+        f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on "
+        "the floor; "
+        "check body.mass"
     )
+    return (Note("robot-file-doubtful", words, ("body.mass", "tail.density", "fluid.density")),)
 
 
-def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[str, ...]:
+def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
     if robot.body.mass is None:
         return ()
     density = robot.body.mass / (derived["body_volume"].value + derived["coupling_volume"].value)
     if density <= _DENSEST:
         return ()
-    return (
-        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense on average; the "
-        f"densest metal has {_DENSEST:.4g}",
+    words = (
+        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the "
+        "densest metal "
+        f"has {_DENSEST:.4g}; check its unit"
     )
+    return (Note("robot-file-doubtful", words, ("body.mass",)),)
 
 
-def _too_smooth(robot: Robot) -> tuple[str, ...]:
+def _too_smooth(robot: Robot) -> tuple[Note, ...]:
     """Warn of an effective friction below the rotor's own, which it contains (18)."""
     own, whole = None if robot.motor is None else robot.motor.joint_rotor_friction, robot.friction.effective
     if own is None or whole is None or whole >= own:
         return ()
-    return (
+    words = (
         f"friction.effective = {show(whole, 'N m s/rad')} is less than the rotor's own B_m = {show(own, 'N m s/rad')}, "
-        "which it contains",
+        "which it contains; check both"
     )
+    return (Note("robot-file-doubtful", words, ("friction.effective", "motor.rotor_friction")),)
 
 
-def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> Robot:
+def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> Robot:
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
         derived = problems.derived()  # once: it integrates the solids

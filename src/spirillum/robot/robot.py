@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -10,9 +10,11 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.robot.actuation import Battery, Motor
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.fields import field_values
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
 from spirillum.robot.tables import RobotTables
+from spirillum.units import display_unit, in_unit, show
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901)."""
@@ -51,6 +53,15 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
     )
 
 
+def _in_words(value: Any, unit: str | None) -> str:
+    """A field's value with the unit in which people read it."""
+    if unit is None or not isinstance(value, float):
+        return str(value)
+    si = unit.replace("**", "^")
+    shown = display_unit(value, si)
+    return f"{in_unit(value, si, shown)} {'' if shown == '1' else shown}".rstrip()
+
+
 class Robot(RobotTables):
     """A swimmer with one helical tail, its fluid, channel and drive; SI inside, frozen.
 
@@ -74,10 +85,32 @@ class Robot(RobotTables):
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": problem})
         return self
 
+    def __repr__(self) -> str:
+        """The robot in a line: name, body, tail and channel."""
+        parts = [f"body {show(self.body.diameter, 'mm')}", f"tail {self._tail_size} mm"]
+        parts += [f"channel {show(self.channel.diameter, 'mm')}"] if self.channel is not None else []
+        return f"Robot({self.name}, {', '.join(parts)})"
+
+    def __str__(self) -> str:
+        """The robot for `print`: its fields with units as in its file, what follows from them, and their limits."""
+        fields = [(path, _in_words(value, unit)) for path, value, unit in field_values(self) if value is not None]
+        derived = [(name, _in_words(item.value, item.unit)) for name, item in self.derived().items()]
+        limits = [(limit.field, limit.bound_in_words()) for limit in assembly_limits(RobotBatch.of(self))]
+        known = [(name, words) for name, words in limits if words]
+        lines = [repr(self)]
+        for title, rows in (("fields", fields), ("what follows", derived), ("limits", known)):
+            width = max(len(name) for name, _ in rows)
+            lines += [title, *(f"  {name:<{width}}  {words}" for name, words in rows)]
+        return "\n".join(lines)
+
+    @property
+    def _tail_size(self) -> str:
+        return f"{1e3 * self.tail.wavelength:g} x {1e3 * self.tail.amplitude:g}"
+
     @property
     def with_tail(self) -> str:
         """Its name and its tail, which tell it apart from the others of a study."""
-        return f"{self.name}, tail {1e3 * self.tail.wavelength:g} x {1e3 * self.tail.amplitude:g} mm"
+        return f"{self.name}, tail {self._tail_size} mm"
 
     def derived(self) -> dict[str, Derived]:
         """What follows from the fields: lengths, volumes, weight, centre of mass.

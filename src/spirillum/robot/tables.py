@@ -7,6 +7,7 @@ from typing import Self
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.notes import Note
 from spirillum.robot.actuation import Battery, Drive, Friction, Magnetic, Motor
 from spirillum.robot.fields import Section, Text
 from spirillum.robot.model_options import Calibrations, ModelOptions
@@ -49,11 +50,16 @@ class RobotTables(Section):
     calibration: Calibrations = Field(default_factory=dict)
     """Calibration factors for each model."""
 
-    _warnings: tuple[str, ...] = PrivateAttr(default=())
+    _warnings: tuple[Note, ...] = PrivateAttr(default=())
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What was doubtful in the input, a sentence each."""
+    def warnings(self) -> tuple[Note, ...]:
+        """What was doubtful in the input."""
+        return self._warnings
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What was doubtful in the input, as notes with codes."""
         return self._warnings
 
     @property

@@ -15,6 +15,7 @@ import numpy as np
 from spirillum.arrays import Values
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.tube_pose import GAP_SHARE
@@ -146,7 +147,7 @@ def reference_place(settings: Mapping[str, Any]) -> str:
     return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference place'}, {tilt}"
 
 
-def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[str]:
+def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
     """A sentence for each place at which robots have no answer, though they have one at the reference place."""
     found = []
     for task, part in answers:
@@ -155,7 +156,8 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[str]:
             first = task.robots[int(missing[0])]
             outside = broken(requirements(first, find_swimmer_model(task.model)))
             why = outside[0].sentence() if outside else "they find no steady motion there"
-            found.append(f"{task.model}: the band leaves out {missing.size} robots at {task.where}, the first: {why}")
+            words = f"{task.model}: the band leaves out {missing.size} robots at {task.where}, the first: {why}"
+            found.append(Note("without-answer", words))
     return found
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from spirillum.arrays import Flags
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.robot.limits import broken
+from spirillum.notes import Note
+from spirillum.robot.limits import broken, caution_code
 from spirillum.studies.work import REASONS, ModelTask, Part
 from spirillum.swimming.cautions import accuracy_limits
 from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
@@ -76,13 +77,16 @@ def cautions(task: ModelTask, part: Part) -> list[Caution]:
     return found
 
 
-def summed(found: Iterable[Caution], robots: int) -> list[str]:
-    """A sentence for each kind of caution, over all tasks of a study."""
+def summed(found: Iterable[Caution], robots: int) -> list[Note]:
+    """A note for each kind of caution, over all tasks of a study."""
     groups: dict[tuple[str, str, bool], list[Caution]] = {}
     for caution in found:
         groups.setdefault((caution.model, caution.flag, caution.refused), []).append(caution)
     return [
-        f"{sum(caution.robots for caution in group)} of {robots} robots "
-        f"{'have no answer ' if refused else ''}({model}), the first: {group[0].sentence}"
-        for (model, _, refused), group in groups.items()
+        Note(
+            "without-answer" if refused else caution_code(flag),
+            f"{sum(caution.robots for caution in group)} of {robots} robots "
+            f"{'have no answer ' if refused else ''}({model}), the first: {group[0].sentence}",
+        )
+        for (model, flag, refused), group in groups.items()
     ]

@@ -14,6 +14,7 @@ from spirillum.arrays import Values
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.band import BandTask, placed_at, with_band
 from spirillum.studies.factorial import main_effects
@@ -129,7 +130,7 @@ def assembled(
     let_go: LetGo,
     observed: ObservedArrays | None,
     fingerprint: str,
-    warnings: Sequence[str],
+    warnings: Sequence[Note],
 ) -> xr.Dataset:
     """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots that were let go."""
     dataset = laid_out(loaded, answers, band, let_go, observed)
@@ -139,7 +140,7 @@ def assembled(
 
 
 def described(
-    loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, warnings: Sequence[str]
+    loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, warnings: Sequence[Note]
 ) -> dict[str, str]:
     """Attributes of a dataset: the question, and what is to be known of the answer."""
     study = loaded.study
@@ -152,7 +153,7 @@ def described(
         "observations": observed.source if observed else "none: nothing in this dataset is measured",
         "claims": study.claims,
         "references": " ".join(dict.fromkeys(references)),
-        "warnings": "\n".join(warnings),
+        **note_attributes(warnings),
         "versions": versions(),
         "Conventions": "CF-1.11",
     }

@@ -20,6 +20,7 @@ from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.simulation import simulate
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.studies.factorial import Levels, half_fraction
@@ -202,13 +203,15 @@ def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int
             yield LaidDownTask(number, index, robot, loaded.study.laid_down)
 
 
-def without_answer(parts: Iterable[Part]) -> list[str]:
+def without_answer(parts: Iterable[Part]) -> list[Note]:
     """A sentence on the runs of laid-down robots that tell nothing; none where all tell something."""
     found = [np.isfinite(part["forward_velocity"]).any(axis=-1) for part in parts]
     known = np.concatenate([part.ravel() for part in found]) if found else np.ones(0, dtype=bool)
     if known.all():
         return []
-    return [
-        f"{np.count_nonzero(~known)} of {known.size} runs of laid-down robots have no answer: a robot cannot be laid "
-        "down so, or leaves its table before its tail has made three turns; allowed: other ranges in [laid_down]"
-    ]
+    words = (
+        f"{np.count_nonzero(~known)} of {known.size} runs of released robots have no answer: they leave their "
+        "table; use "
+        "other ranges in [laid_down]"
+    )
+    return [Note("without-answer", words, ("laid_down",))]

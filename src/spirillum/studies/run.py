@@ -15,6 +15,7 @@ from spirillum.files import opened, whole_file
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
@@ -181,15 +182,16 @@ def _worth(missing: Sequence[AnyTask], crew: WorkerPool) -> WorkerPool:
     return WorkerPool() if short and crew.cluster is None else crew
 
 
-def warnings_of(loaded: LoadedStudy) -> list[str]:
-    """What to be careful about in the question, a sentence each."""
+def warnings_of(loaded: LoadedStudy) -> list[Note]:
+    """What to be careful about in the question."""
     warnings = list(loaded.cautions)
     warnings += _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
-        warnings.append(
-            "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
-            "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
+        words = (
+            "friction.effective is unset: robots feel no friction beyond B_m, and rates and speeds are upper "
+            "bounds; set it"
         )
+        warnings.append(Note("friction-unset", words, ("friction.effective",)))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)
     asked = [find_swimmer_model(name) for name in loaded.study.models]
@@ -205,29 +207,30 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
     return warnings + uneven_models(loaded.robots, models, factors)
 
 
-def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:
+def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
     """What answers of robots that are held at places in their tube leave out."""
     walled = [model.name for model in models if model.placed]
     if not walled:
-        return ["band = true, but no model of the study computes walls: there is no band"] if loaded.study.band else []
-    held = (
-        f"model '{walled[0]}' holds the robots at their places: let go, weight and contact move them, they are slower "
-        "and perhaps in another order; --settled follows each of them to its steady motion, in seconds"
+        words = "band = true has no effect: no model of the study includes walls; add model tube"
+        return [Note("input-unused", words, ("band",))] if loaded.study.band else []
+    words = (
+        "robots are held at a pose: in free motion they are slower, perhaps in another order; --settled finds that "
+        "motion"
     )
+    held = Note("settled-basis", words, ("placement",))
     placements = loaded.placements or (loaded.study.placement,)
     found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
     if loaded.study.band or not found:
         return [] if loaded.study.settled else [held]
     are = "are" if len(found) > 1 else "is"
-    one_place = (
-        f"{' and '.join(found)} {are} not given: model '{next(iter(found.values()))}' answers at one place, and others "
-        "change speeds and perhaps their order; --band computes those, too, in seconds with tables, else in many "
-        "minutes"
+    words = (
+        f"{' and '.join(found)} {are} unknown: answers are for one pose, and the order may change; --band adds others"
     )
+    one_place = Note("pose-unknown", words, tuple(found))
     return [one_place] if loaded.study.settled else [one_place, held]
 
 
-def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
+def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
     """What to be careful about in the robots' own calibrations."""
     return _of_robots(
         (robot.name, sentence)
@@ -243,7 +246,7 @@ def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
     return {index: robot for index, robot in every if robot.channel and has_table(RobotBatch.of(robot), "yaw")}
 
 
-def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[str]:
+def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[Note]:
     """A sentence on the robots that are not followed in their tubes for want of a table; none where all are."""
     tails = loaded.count // len(loaded.robots)
     found: dict[str, list[Robot]] = {}
@@ -253,7 +256,10 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
             why = _why_without_table(robot, loaded.placement_of(index // tails))
             found.setdefault(why, []).append(robot)
     return [
-        f"{len(robots)} of {loaded.count} robots {why.format(robots[0].with_tail)}" for why, robots in found.items()
+        Note(
+            "without-answer", f"{len(robots)} of {loaded.count} robots {why.format(robots[0].with_tail)}", ("settled",)
+        )
+        for why, robots in found.items()
     ]
 
 
@@ -270,15 +276,13 @@ _NAMED = 3
 """Robots that a sentence names; more are counted."""
 
 
-def _of_robots(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Names and sentences as warnings; one that holds for more than three robots is said once."""
-    found: dict[str, list[str]] = {}
-    for name, sentence in said:
-        found.setdefault(sentence, []).append(name)
+def _of_robots(said: Iterable[tuple[str, Note]]) -> list[Note]:
+    """Notes with the names of their robots; one that holds for more than three robots is given once."""
+    found: dict[Note, list[str]] = {}
+    for name, note in said:
+        found.setdefault(note, []).append(name)
     return [
-        line
-        for sentence, names in found.items()
-        for line in (
-            [f"{name}: {sentence}" for name in names] if len(names) <= _NAMED else [f"{len(names)} robots: {sentence}"]
-        )
+        note.prefixed(f"{whom}: ")
+        for note, names in found.items()
+        for whom in (names if len(names) <= _NAMED else [f"{len(names)} robots"])
     ]

@@ -14,6 +14,7 @@ import numpy as np
 
 from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
+from spirillum.notes import Note
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -89,38 +90,41 @@ def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) 
             yield SettledTask(number, index, robot, loaded.placement_of(index // tails), loaded.study.contact)
 
 
-def settled_basis(contact: Contact) -> str:
-    """What settled speeds are, and rest on, a sentence."""
+def settled_basis(contact: Contact) -> Note:
+    """What settled speeds are, and rest on."""
     height = "1e-4 of its radius" if contact.roughness is None else show(contact.roughness, "um")
-    return (
-        "a settled speed is that of a robot left to itself until its motion is steady, which may take minutes, on "
-        f"asperities of {height} and with a friction coefficient of {contact.friction_coefficient:g}, both assumed; a "
-        "trial of some turns lies between it and the speed held at a place: `spirillum simulate` follows it, "
-        "`spirillum settle` says how long it takes"
+    words = (
+        f"settled speeds assume asperities of {height} and a friction coefficient of {contact.friction_coefficient:g}; "
+        "a trial of some turns does not reach them"
     )
+    return Note("settled-basis", words, ("contact",))
 
 
-def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:
-    """Sentences on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
+def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
+    """Notes on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
     lost = [task for task, part in answers if not np.isfinite(part["forward_velocity"][0])]
     far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
     near = [task for task, part in answers if part["near"][0] == 1.0 and task not in far]
     found = []
     if far:
-        found.append(
-            f"{len(far)} of {len(answers)} robots yaw further in steady motion than their tables were checked for: "
-            f"their settled speeds have no error estimate; the first: {far[0].robot.with_tail}"
+        words = (
+            f"{len(far)} of {len(answers)} robots yaw further than their tables were checked for: settled speeds "
+            "have no "
+            f"error estimate; the first: {far[0].robot.with_tail}"
         )
+        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if near:
-        found.append(
-            f"{len(near)} of {len(answers)} robots come nearer to the glass in steady motion than where their tables "
-            f"were checked: the error estimates are those of wider gaps; the first: {near[0].robot.with_tail}"
+        words = (
+            f"{len(near)} of {len(answers)} robots come nearer to the wall than their tables were checked for: error "
+            f"estimates are of wider gaps; the first: {near[0].robot.with_tail}"
         )
+        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if lost:
-        found.append(
-            f"{len(lost)} of {len(answers)} robots that were let go have no steady motion, or cannot be followed to "
-            f"it, the first: {lost[0].robot.with_tail}; `spirillum settle` says why"
+        words = (
+            f"{len(lost)} of {len(answers)} robots have no steady motion that could be found, the first: "
+            f"{lost[0].robot.with_tail}; `spirillum settle` says why"
         )
+        found.append(Note("without-answer", words, ("settled_forward_velocity",)))
     return found
 
 

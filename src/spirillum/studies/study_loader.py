@@ -23,6 +23,7 @@ from spirillum.fitted.fit_notes import Fitted, fitted_of
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.replaced import check_kept, set_fields
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
+from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in, refused_table
@@ -52,7 +53,7 @@ class LoadedStudy:
     """B_eff of tails that a calibration knows, and what it rests on."""
     posterior: PosteriorFile | None = None
     """Draws over which answers have intervals."""
-    cautions: tuple[str, ...] = ()
+    cautions: tuple[Note, ...] = ()
     """What to be careful about in the choice of the models, a sentence each."""
     placements: tuple[Placement, ...] = ()
     """Where each of `robots` lies by a calibration; none where the study says it."""
@@ -316,7 +317,6 @@ def _with_models(
             calibration=calibration,
             posterior=posterior,
             tables_only=True,
-            other_way=f"--model {WALLED} answers without one at one place, in some ten seconds of one core a robot",
             among=True,
         )
         for index in range(loaded.count)
@@ -324,7 +324,7 @@ def _with_models(
     choice = _for_all(choices)
     afloat = [robot.name for robot in robots if robot.channel is None]
     if choice.model != WALLED and not (choice.fitted or choice.caution) and len(afloat) < len(robots):
-        why = f"one model answers for all robots, and {afloat[0]} has no channel"
+        why = f"one model answers for all, and {afloat[0]} has no channel"
         choice = replace(choice, caution=walls_left_out(why, among=True))
     models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
     cautions = (choice.caution,) if choice.caution else ()

@@ -25,6 +25,7 @@ from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken
@@ -61,7 +62,7 @@ class Band:
     """The quantities at each place; NaN where it has no answer."""
     reference: Swimming
     """The quantities at the reference place, which belongs to the band."""
-    left_out: tuple[str, ...]
+    left_out: tuple[Note, ...]
     """Places without an answer, a sentence each."""
 
     def limits(self, name: str) -> tuple[float, float]:
@@ -203,7 +204,7 @@ def band_of(
         if not found[-1].valid[0]:
             outside = broken(requirements(there, model))
             why = outside[0].sentence() if outside else "the robot finds no steady motion there"
-            left_out.append(f"the band leaves out {where}: {why}")
+            left_out.append(Note("without-answer", f"the band leaves out {where}: {why}"))
     tell(model.name, len(places) + 1, len(places) + 1)
     return Band(
         left_open(batch.placement, model),

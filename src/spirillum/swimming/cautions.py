@@ -7,6 +7,7 @@ import numpy as np
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
@@ -15,6 +16,13 @@ from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.reynolds import reynolds_limits
 from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
+
+NO_WEIGHT = Note(
+    "no-weight",
+    "body.mass or tail.density is unset: the robot has no weight in the fluid; set both",
+    ("body.mass", "tail.density"),
+)
+"""Said of a free motion of a robot whose masses are unknown."""
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
@@ -25,7 +33,7 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
     ]
 
 
-def calibration_warnings(robot: Robot, model: str) -> list[str]:
+def calibration_warnings(robot: Robot, model: str) -> list[Note]:
     """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
 
     A model that computes the walls takes none.
@@ -37,7 +45,11 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
         if robot.channel is None:  # nothing to stand for
             return []
         return [
-            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
+            Note(
+                "calibration-missing",
+                f"wall effects are not modelled: '{model}' has no calibration here, drag factors are 1; use model tube",
+                ("calibration",),
+            )
         ]
     fitted = entry.fitted_to
     channel = robot.channel.diameter if robot.channel else None
@@ -53,16 +65,24 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
     ]
     if not differing:
         return []
-    return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
+    more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
+    return [
+        Note(
+            "calibration-outside",
+            f"calibration.{model} is used outside its geometry, {differing[0]}{more}: factors may not hold; "
+            "recalibrate",
+            [words.partition(" = ")[0] for words in differing],
+        )
+    ]
 
 
-def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[str]:
+def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     """What an answer at one place of several lacks, and how to get it; nothing where its place is known."""
     over = left_open(batch.placement, model)
     if not over:
         return []
-    more = "a band over them takes minutes (--band)"
+    are = "is" if len(over) == 1 else "are"
+    more = "--band gives the band over them, in minutes"
     if not has_table(batch):
-        more = f"`spirillum prepare` makes its table, once, in {TABLE_TAKES}; with it a band over them takes a second"
-    known = "is not known" if len(over) == 1 else "are not known"
-    return [f"{' and '.join(over)} {known}, and this is the answer at one place: {more}"]
+        more = f"`spirillum prepare --stage straight` ({TABLE_TAKES}) makes the band quick"
+    return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]

@@ -14,6 +14,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
@@ -26,7 +27,7 @@ from spirillum.swimming.steady_quantities import STEADY, headline
 _UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
@@ -69,15 +70,15 @@ class ModelComparison(DisplayMixin):
         return float(value / base - 1.0) if base != 0 else math.nan
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each; one that holds for some models only names them."""
         count = len(self.predictions)
-        said: dict[str, list[str]] = {}
+        said: dict[Note, list[str]] = {}
         for name, answer in self.predictions.items():
-            for sentence in answer.warnings:
-                said.setdefault(sentence, []).append(name)
+            for note in answer.warnings:
+                said.setdefault(note, []).append(name)
         found = [
-            sentence if len(names) == count else f"{', '.join(names)}: {sentence}" for sentence, names in said.items()
+            note if len(names) == count else note.prefixed(f"{', '.join(names)}: ") for note, names in said.items()
         ]
         calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
         return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
@@ -103,7 +104,7 @@ class ModelComparison(DisplayMixin):
 
     def _answered(self, name: str, answer: Prediction) -> dict[str, Any]:
         """One model's prediction, without what stands once for all models."""
-        left_out = ("schema", "robot", "friction", "warnings")
+        left_out = ("schema", "robot", "friction", "notes", "warnings")
         return {
             "model": name,
             "title": answer.model.title,
@@ -113,29 +114,30 @@ class ModelComparison(DisplayMixin):
         }
 
 
-def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[str]:
+def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[Note]:
     """What sets models apart besides their theory, a sentence each."""
     found = []
     walled = [name for name in models if find_swimmer_model(name).placed]
     open_ = [name for name in models if name not in walled]
     if walled and open_ and any(robot.channel is not None for robot in robots):
-        found.append(
-            f"the channel's walls are computed by {', '.join(walled)} and not by {', '.join(open_)}: the differences "
-            "contain them"
+        words = (
+            f"wall effects are modelled by {', '.join(walled)} and not by {', '.join(open_)}: differences include them"
         )
+        found.append(Note("models-differ", words, ("channel",)))
     bare = [name for name in open_ if name not in calibrated]
     if calibrated and bare:
-        found.append(
-            f"calibration factors stand for the walls with {', '.join(calibrated)} and not with {', '.join(bare)}: the "
-            "differences contain them; without calibration only the models differ"
+        words = (
+            f"drag factors are fitted for {', '.join(calibrated)} and not for {', '.join(bare)}: differences include "
+            "them; use --no-calibration"
         )
+        found.append(Note("models-differ", words, ("calibration",)))
     turned = [name for name in models if "coupling" in find_swimmer_model(name).parts]
     without = [name for name in models if name not in turned]
     if turned and without and any(robot.coupling.length > 0 and robot.coupling.diameter > 0 for robot in robots):
-        found.append(
-            f"the coupling turns with the tail in {', '.join(turned)} and is left out by {', '.join(without)}: torques "
-            "and efficiencies differ by it too"
+        words = (
+            f"the coupling is modelled by {', '.join(turned)} and not by {', '.join(without)}: torques differ by it too"
         )
+        found.append(Note("models-differ", words, ("coupling",)))
     return found
 
 

@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.fluid.model import SwimmerModel
+from spirillum.notes import Note
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
 
-CONSTANT_TORQUE = (
-    "drive.kind = 'torque': constant torque is assumed at every rate, so that speed and rates fall as one over the "
-    "viscosity; those of a motor whose torque falls with its rate fall less"
+CONSTANT_TORQUE = Note(
+    "constant-torque",
+    "drive.kind = 'torque' assumes the same torque at every rate: speed and rates fall as one over the viscosity",
+    ("drive.kind",),
 )
 """What a drive of given torque takes for granted."""
 
 
 def drive_warnings(
     robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
-) -> list[str]:
+) -> list[Note]:
     """Warnings about friction, rate and drive of an answer.
 
     Args:
@@ -33,15 +35,23 @@ def drive_warnings(
     step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
     if np.isfinite(step_out) and not follows:
         return [
-            f"the field turns faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips behind it again "
-            "and again, and rates and speed are averages"
+            Note(
+                "field-slips",
+                f"the field is faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips, and rates and "
+                "speed are averages; lower the field's rate",
+                ("magnetic.rotation_rate",),
+            )
         ]
     factors = robot.calibration.get(model.name)
     found = []
     if reading == "paper" and factors is not None and factors.body_rotation < 1:
         found.append(
-            f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already makes up for friction on "
-            "the body; with friction reading 'paper' it is counted twice"
+            Note(
+                "friction-counted-twice",
+                f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already includes friction on the "
+                "body, which 'paper' counts again; use --friction rotor",
+                (f"calibration.{model.name}.body_rotation",),
+            )
         )
     if rate is None and robot.drive is not None and robot.drive.kind == "torque":
         found.append(CONSTANT_TORQUE)
@@ -57,37 +67,42 @@ def _against_the_drive(robot: Robot, result: Swimming) -> bool:
     return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
 
 
-def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]:
+def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
     if reading == "none":
-        return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
+        words = "friction 'none' lets the motor turn faster than any real one: rates are upper bounds; use 'rotor'"
+        return [Note("friction-unset", words, ("friction.reading",))]
     if robot.friction.effective is not None or robot.motor is None:
         return []
     name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
-    own = f"the rotor's own {name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
+    own = f"{name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
+    words = f"friction.effective is unset: only {own} acts, and rates are upper bounds; set it, or calibrate"
     if reading == "body":
-        return [f"friction.effective is unset: no wall friction on the body, {own} in the joint"]
-    return [f"friction.effective is unset: {own} alone is used, which makes the rates upper bounds"]
+        words = f"friction.effective is unset: the body has no wall friction, the joint {own}; set it, or calibrate"
+    return [Note("friction-unset", words, ("friction.effective",))]
 
 
-def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[str]:
+def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[Note]:
     found = []
     if reading in ("rotor", "paper"):
         if robot.friction.effective is not None:
-            found.append("friction.effective is ignored: with a tail rate it is inferred from (17) and (18)")
+            words = "friction.effective is ignored: with a tail rate it is inferred from (17) and (18)"
+            found.append(Note("friction-ignored", words, ("friction.effective",)))
         if _against_the_drive(robot, result):
-            found.append(
-                "the tail turns against the way that its motor drives (motor.polarity, tail.handedness): the inferred "
-                "effective friction has no meaning"
-            )
+            words = "the tail turns against its motor: the inferred friction has no meaning; check the rate's sign"
+            found.append(Note("tail-against-motor", words, ("motor.polarity", "tail.handedness", "effective_friction")))
         elif result.effective_friction[0] < 0:
-            found.append(
-                "the inferred effective friction is negative: at this rate the model's hydrodynamic torque exceeds "
-                "what the motor gives"
+            words = (
+                "the inferred effective friction is negative: the model's torque exceeds the motor's at this rate; "
+                "check rate and motor"
             )
+            found.append(Note("friction-negative", words, ("effective_friction",)))
     else:
-        found.append(
-            f"friction reading '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained"
+        words = (
+            f"friction '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained; "
+            "use --friction rotor"
         )
+        found.append(Note("torque-unexplained", words, ("motor_residual_torque",)))
     if result.electrical_power[0] < 0:
-        found.append("at this rate the tail drives the motor: current and electrical power are negative")
+        words = "the tail drives the motor at this rate: current and electrical power are negative; check the rate"
+        found.append(Note("tail-against-motor", words, ("motor_current", "electrical_power")))
     return found

@@ -14,9 +14,9 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.fluid.tube.stages import StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
@@ -37,8 +37,8 @@ class ModelChoice:
     """Name of the model."""
     reason: str = ""
     """Why it was taken, in half a sentence; empty where it was asked for."""
-    caution: str = ""
-    """What to be careful about: a sentence where the robot has a channel that the model does not know, else empty."""
+    caution: Note | None = None
+    """The note where the robot has a channel that the model does not know; else None."""
     fitted: bool = False
     """Whether it is the model of a calibration or a posterior."""
     outside: bool = False
@@ -74,7 +74,6 @@ def choose_model(
     posterior: PosteriorFile | None = None,
     tables_only: bool = False,
     motion: str = "held",
-    other_way: str = f"so does the first run with --model {WALLED}",
     among: bool = False,
 ) -> ModelChoice:
     """The model that is asked for, or with `auto` the one that knows most about the robot.
@@ -87,7 +86,6 @@ def choose_model(
         posterior: posterior whose values are used; None without one.
         tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
         motion: `held` or `free`, for which a table needs yawed poses.
-        other_way: how else to come to an answer with walls than by `spirillum prepare`, a clause for the caution.
         among: the robot is one of several that are compared.
     """
     if asked != AUTO:
@@ -100,15 +98,16 @@ def choose_model(
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):
-        why = f"model '{WALLED}' has no answer for this robot on the floor of its channel: {outside[0].sentence()}"
+        reason = f"model '{WALLED}' has no answer for this robot on the floor of its channel"
+        caution = walls_left_out(outside[0].sentence(), among=among)
     elif not outside and tables_only and not has_table(batch, "yaw" if motion == "free" else "straight"):
         lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
-        lacks = lacks if among else "the robot has no table for its tube"
-        why = f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
+        reason = f"{lacks if among else 'the robot has no table for its tube'} yet"
+        without = f"{robot.with_tail} has no table" if among else "it has no table for its tube"
+        caution = walls_left_out(f"{without}; run `spirillum prepare`", among=among)
     else:  # a place that was asked for is refused by the model that knows places
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
-    caution = walls_left_out(why, among=among)
-    return ModelChoice(UNBOUNDED, why.partition(":")[0], caution, outside=bool(outside))
+    return ModelChoice(UNBOUNDED, reason, caution, outside=bool(outside))
 
 
 def models_without_answer(robot: Robot) -> list[str]:
@@ -124,10 +123,10 @@ def models_without_answer(robot: Robot) -> list[str]:
     return found
 
 
-def walls_left_out(why: str, *, among: bool) -> str:
+def walls_left_out(why: str, *, among: bool) -> Note:
     """The caution where a robot in a channel is answered for without its walls."""
-    makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
-    return f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
+    effect = "speeds are too high, and their order may change" if among else "the predicted speed is too high"
+    return Note("walls-left-out", f"wall effects are not modelled, {effect}: {why}", ("model", "channel"))
 
 
 def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:

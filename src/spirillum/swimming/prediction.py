@@ -19,6 +19,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import TILTED
+from spirillum.notes import Note
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -48,7 +49,7 @@ from spirillum.units import KINDS, parse_option, show
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prediction(DisplayMixin):
     """Steady swimming of one robot, SI, rates signed about +x.
 
@@ -69,7 +70,7 @@ class Prediction(DisplayMixin):
     """The quantities, as arrays of length one."""
     error_estimate: float
     """Relative error of the forward velocity, the sum of what is known of it; NaN for a model in closed form."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     """What to be careful about, a sentence each."""
     intervals: Intervals | None = field(default=None, repr=False)
     """Intervals of a posterior; None without one."""
@@ -183,17 +184,21 @@ class Prediction(DisplayMixin):
 
 
 _QUANTITIES: dict[str, tuple[str, str]] = {item.name: (item.unit, item.meaning) for item in STEADY}
-_IN_A_FLOW = (
-    "the imposed flow does work on the robot too: efficiencies and cost of transport are of its velocity in the lab, "
-    "and do not compare with those of a robot in fluid at rest"
+_IN_A_FLOW = Note(
+    "imposed-flow",
+    "the imposed flow does work on the robot: efficiencies and cost of transport do not compare with fluid at rest",
+    ("placement.flow", "hydrodynamic_efficiency"),
 )
-_NO_TORQUE = (
-    "torques, B_eff and what follows from them have no intervals: model '{}' leaves the walls out, and no observed "
-    "speed or rate tells what these do to the torque; a fit with model 'tube' gives them"
+_NO_TORQUE = Note(
+    "intervals-incomplete",
+    "torques and B_eff have no intervals: the fitted model has no walls, and no observation states the torque; "
+    "fit tube",
+    ("shaft_torque", "effective_friction"),
 )
-_NO_WEIGHT = (
-    "body.mass or tail.density is unset: nothing tells that its weight keeps the robot on the floor, where it is taken "
-    "to lie; allowed: both of them, or its place (--gap, --eccentricity)"
+_NO_WEIGHT = Note(
+    "no-weight",
+    "body.mass or tail.density is unset: the robot is assumed to rest on the floor; set both, or its pose (--gap)",
+    ("body.mass", "tail.density"),
 )
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
@@ -275,7 +280,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
         )
         if not knows_torque(ready, chosen):
-            intervals, torque = without_torque(intervals), [_NO_TORQUE.format(chosen.name)]
+            intervals, torque = without_torque(intervals), [_NO_TORQUE]
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
@@ -362,7 +367,7 @@ class _Case:
             found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
         return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
 
-    def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
+    def warnings(self, result: Swimming, *, names_friction: bool) -> list[Note]:
         """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
 
         Args:
@@ -385,7 +390,7 @@ class _Case:
         known = self.robot.body.mass is not None and self.robot.tail.density is not None
         return known or place.gap is not None or place.eccentricity is not None
 
-    def fitted_warnings(self) -> list[str]:
+    def fitted_warnings(self) -> list[Note]:
         """What to be careful about in what was fitted."""
         return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
 
@@ -466,17 +471,18 @@ def _check_band(model: str) -> None:
         )
 
 
-def _free_warnings(robot: Robot, motion: str) -> list[str]:
+def _free_warnings(robot: Robot, motion: str) -> list[Note]:
     """What a free motion leaves out."""
     if motion == "held":
         return []
     if robot.channel is not None:
-        return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]
+        words = "wall effects and weight are not modelled in this free motion: the speed is too high; use model tube"
+        return [Note("walls-left-out", words, ("motion", "channel"))]
     weight = robot.derived().get("submerged_weight")
     if weight is None or not weight.value:
         return []
     moves = "sinks" if weight.value > 0 else "rises"
-    return [
-        f"motion 'free': the robot swims without its submerged weight of {show(weight.value, 'N')}, with which it "
-        f"{moves}: `spirillum simulate` lets that act"
-    ]
+    words = (
+        f"the submerged weight of {show(weight.value, 'N')}, with which it {moves}, is left out; `simulate` includes it"
+    )
+    return [Note("no-weight", words, ("body.mass", "tail.density"))]

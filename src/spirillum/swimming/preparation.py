@@ -22,6 +22,7 @@ from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.model_options import ModelOptions
@@ -29,13 +30,13 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.robot_preparation import prepared
 from spirillum.units import show_apart
 
-_NOT_KEPT = (
-    "the table is not kept, for there is no folder to keep it in (SPIRILLUM_CACHE is off, or the folder cannot be "
-    "written to): the next command makes it anew"
+_NOT_KEPT = Note(
+    "table-not-kept",
+    "the table is not kept, and the next command makes it again: SPIRILLUM_CACHE is off or cannot be written to",
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
 
@@ -47,7 +48,7 @@ class Prepared(DisplayMixin):
     """Whether the table is there the next time."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each."""
         worse = [
             _worse(name, self.table.error[name], allowed)
@@ -85,17 +86,17 @@ class Prepared(DisplayMixin):
         }
 
 
-def _worse(name: str, error: float, allowed: float) -> str:
+def _worse(name: str, error: float, allowed: float) -> Note:
     """That a table is further off than one should be; both errors are relative."""
     off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
-    what = f"{name.replace('_', ' ')} is off by up to {off} % at yawed places that were not used"
-    return f"{what}, more than the {most} % that a table should have"
+    what = f"{name.replace('_', ' ')} is off by up to {off} % at yawed poses between the nodes of the table"
+    return Note("table-not-checked", f"{what}; at most {most} % is expected", (name,))
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
     """The answer of `spirillum prepare --json` for several robots: that of each, and what to be careful about."""
-    warnings = {f"{one.robot.name}: {sentence}": None for one in found for sentence in one.warnings}
-    return envelope("preparations", {"robots": [one.content for one in found]}, warnings)
+    notes = dict.fromkeys(note.prefixed(f"{one.robot.name}: ") for one in found for note in one.warnings)
+    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
 
 
 Source = str | Path | Mapping[str, Any] | Robot

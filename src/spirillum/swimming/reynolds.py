@@ -13,6 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Flags, PerRobot, Samples
 from spirillum.errors import InputError
+from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, broken
 from spirillum.robot.robot import Robot
@@ -107,7 +108,7 @@ def stokes_flow_problem(batch: RobotBatch, limits: Iterable[Limit]) -> str:
     return ""
 
 
-def reynolds_warnings(limits: Iterable[Limit]) -> dict[str, str]:
+def reynolds_warnings(limits: Iterable[Limit]) -> dict[str, Note]:
     """Return a warning for each limit that a robot exceeds, of its largest Reynolds number, by the limit's flag."""
     return {
         limit.flag: limit.caution(int(np.nanargmax(limit.value)))
@@ -116,7 +117,7 @@ def reynolds_warnings(limits: Iterable[Limit]) -> dict[str, str]:
     }
 
 
-def check_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> dict[str, str]:
+def check_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> dict[str, Note]:
     """Refuse a motion far outside Stokes flow.
 
     Returns:

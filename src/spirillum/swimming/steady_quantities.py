@@ -17,7 +17,7 @@ LEVEL = 0.95
 """Level of the intervals."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Swimming(DisplayMixin):
     """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`.
 

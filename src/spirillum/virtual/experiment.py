@@ -30,6 +30,7 @@ from spirillum.files import (
     text_cell,
     write_text,
 )
+from spirillum.notes import Note
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
@@ -86,7 +87,7 @@ class Planned:
         return f"{self.folder}/{self.name}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VirtualExperiment(DisplayMixin):
     """A virtual experiment that was written."""
 
@@ -103,7 +104,7 @@ class VirtualExperiment(DisplayMixin):
     """The true rates of all trials as an observations file."""
     rates: Mapping[str, Mapping[str, float]]
     """Rates of each robot without the planted differences, SI."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's facts, as ``virtual-experiment --json`` prints them."""
@@ -170,7 +171,7 @@ def virtual_experiment(
     steady, warnings = {}, list(cautions) if motion.model is None else []
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model, placement)
-        warnings += [f"{name}: {sentence}" for sentence in said]
+        warnings += [note.prefixed(f"{name}: ") for note in said]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,
@@ -222,7 +223,7 @@ class _Filmed(NamedTuple):
     """The study's first."""
     placement: Placement | None
     """Where the study says that robots lie."""
-    cautions: tuple[str, ...]
+    cautions: tuple[Note, ...]
     """What to be careful about in that model, a sentence each."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from spirillum.errors import InputError
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.tank import Tank, tube_height
@@ -87,8 +88,8 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens, start: 
     return trajectory.shifted(shift)
 
 
-def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> tuple[str, ...]:
-    """A sentence if the robot is beyond the left or the right edge of the picture for a part of the film."""
+def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> tuple[Note, ...]:
+    """A note if the robot is beyond the left or the right edge of the picture for a part of the film."""
     times = np.linspace(trajectory.time[0], trajectory.time[-1], _LOOKS)
     x = np.interp(times, trajectory.time, trajectory.position[:, 0])
     low, high = _visible(lens, float(trajectory.position[:, 2].mean()))
@@ -97,7 +98,10 @@ def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens)
     if seen == 1.0:
         return ()
     length = trajectory.duration
-    return (f"the robot is in the picture for {seen * length:.3g} of {length:.3g} s: it swims out of it",)
+    words = (
+        f"the robot is in the picture for {seen * length:.3g} of {length:.3g} s: it swims out of it; shorten the trial"
+    )
+    return (Note("out-of-picture", words, ("duration",)),)
 
 
 def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> None:

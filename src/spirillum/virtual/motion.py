@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.notes import Note
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
@@ -26,8 +27,6 @@ _USUAL = 20.0
 """Length of a film of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
 """Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
-_WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
-"""How else to come to a film with walls than by `spirillum prepare`, a clause."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class TrialMotion:
     trajectory: TrialTrajectory
     model: str
     """Model, `prescribed`, or both; of a run `run` and its model."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
 
 def steady_rates(
@@ -70,9 +69,7 @@ def steady_rates(
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 
-    choice = choose_model(
-        motion.model or default_model, robot, placement=placement, tables_only=True, other_way=_WITHOUT_A_TABLE
-    )
+    choice = choose_model(motion.model or default_model, robot, placement=placement, tables_only=True)
     steady = predict(
         robot,
         model=choice.model,
@@ -88,14 +85,14 @@ def steady_rates(
     return found, source, (*steady.warnings, *walls)
 
 
-def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[str, ...]:
+def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[Note, ...]:
     """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
     if choice.caution:
         return (choice.caution,)
     if robot.channel is None or find_swimmer_model(choice.model).placed:
         return ()
-    named = f"model '{choice.model}' leaves out the channel's walls"
-    return (f"{named}: the film shows a faster robot than with model '{WALLED}'",)
+    words = f"wall effects are not modelled by '{choice.model}': the film shows too fast a robot; use model '{WALLED}'"
+    return (Note("walls-left-out", words, ("model", "channel")),)
 
 
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:

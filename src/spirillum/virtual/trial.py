@@ -28,6 +28,7 @@ from spirillum.files import (
     write_dataset,
 )
 from spirillum.formats.h264 import h264_writer
+from spirillum.notes import Note
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
@@ -130,7 +131,7 @@ _LEAST_DEPTH = 1e-6
 """Least distance of the stated axis from the floor and from the oil's surface, m."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VirtualTrial(DisplayMixin):
     """A virtual trial that was written."""
 
@@ -155,7 +156,7 @@ class VirtualTrial(DisplayMixin):
     """Frames a second."""
     seed: int
     """Of all random numbers."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
@@ -310,15 +311,13 @@ def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles,
     return Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
 
 
-def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[str]:
+def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
     """A sentence on a seed of a film of which nothing is drawn at random; none without a seed."""
     plain = Degradation(crf=degradation.crf)
     if not seed or degradation != plain or troubles.uses_seed:
         return []
-    return [
-        f"seed = {seed} changes nothing: nothing of this film is drawn at random, and films of other seeds are its "
-        "copies; a degradation (noise, bubbles, ...) or a trouble is drawn from it"
-    ]
+    words = f"seed = {seed} has no effect: nothing in this video is random; add a degradation such as noise or bubbles"
+    return [Note("input-unused", words, ("seed",))]
 
 
 def _stated_height(height: float, error: float, surface: float) -> float:

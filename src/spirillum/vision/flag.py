@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from spirillum.notes import Note
+
 
 @dataclass(frozen=True)
 class Flag:
@@ -15,3 +17,8 @@ class Flag:
     """One sentence for people: what was seen, when, and what follows for the numbers."""
     spoils: tuple[str, ...] = ()
     """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
+
+    @property
+    def note(self) -> Note:
+        """The flag as a note of an answer."""
+        return Note(self.name, self.sentence, self.spoils)

@@ -104,8 +104,8 @@ def test_too_few_frames_for_the_tail_are_warned_of(free_robot: Any, run_of: Call
     run, path = run_of(free_robot, duration=0.2, tail=2 * np.pi * 4.0), tmp_path / "run.mp4"
     found = sp.film(run, path, speed=1.0, **SMALL)
     assert found.turn_per_frame == pytest.approx(0.4)
-    assert "turns by up to 0.4 turns from frame to frame" in found.warnings[0]
-    assert "a speed of 0.5 shows it" in found.warnings[0]
+    assert "turns by up to 0.4 turns a frame" in found.warnings[0]
+    assert "use a speed of 0.5" in found.warnings[0]
     slower = sp.film(run, path, speed=0.5, **SMALL)
     assert slower.turn_per_frame == pytest.approx(0.2)
     assert slower.warnings == ()

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
@@ -13,6 +12,17 @@ from spirillum.display import percent, rows_of
 from spirillum.units import display_unit, in_unit
 
 Answer = Mapping[str, Any]
+
+
+class Detail(str):
+    """A line that is printed on request only: how the answer came about, and how far it can be trusted."""
+
+    __slots__ = ()
+
+
+Block = str | Table
+"""A line, a detail or a table of an answer; the first one is its title, or has it."""
+Blocks = Iterator[Block]
 _NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady")
 """Columns of numbers."""
 
@@ -31,52 +41,63 @@ def friendly(value: float | None, unit: str) -> tuple[str, str]:
     return in_unit(value, unit, shown), "" if value is None or shown == "1" else shown
 
 
-def add_quantities(table: Table, items: Mapping[str, Any], only: Iterable[str] | None = None) -> None:
+def in_words(item: Any) -> str:
+    """A quantity with its unit, or a word."""
+    return " ".join(friendly(item["value"], item["unit"])).strip() if isinstance(item, Mapping) else str(item)
+
+
+def quantity_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None = None) -> Table:
     """A row for each quantity that has a value, or of `only` these: name, value, unit, SI."""
+    table = grid(title, "quantity", "value", "unit", "SI")
     for row in rows_of(items, only):
         table.add_row(row.name, row.value, row.unit, row.si)
+    return table
 
 
-def add_bands(table: Table, items: Mapping[str, Any], only: Iterable[str] | None = None) -> None:
+def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None = None, of: str = "quantity") -> Table:
     """A row for each quantity that has a value, or of `only` these: name, value, low and high of its band, unit."""
+    table = grid(title, of, "value", "low", "high", "unit")
     for row in rows_of(items, only):
         table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
+    return table
 
 
-def show_placement(placement: Answer, console: Console, head: str = "placement") -> None:
+def files_of(answer: Answer, **words: str) -> Iterator[str]:
+    """A line for each file of an answer that was written, by its entry."""
+    return (f"{what} in {answer[name]}" for name, what in words.items() if answer.get(name))
+
+
+def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]:
     """Where the model places the robot, unless nothing is around it; `head` begins the line."""
     if len(placement) == 1:
         return
-    said = [escape(str(placement["kind"]))]
+    said = [str(placement["kind"])]
     for name, item in placement.items():
         if isinstance(item, Mapping) and item.get("value") is not None:
-            value, unit = friendly(item["value"], item["unit"])
-            said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip() + _band_words(item))
+            said.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
         elif name != "kind" and isinstance(item, str):
-            said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
-    console.print(f"{head}: {', '.join(said)}", highlight=False, soft_wrap=True)
+            said.append(f"{name.replace('_', ' ')} {item}")
+    yield Detail(f"{head}: {', '.join(said)}")
 
 
-LAID_DOWN = "laid down"
-"""Head of the line on the placement of a robot that is let go there."""
+RELEASED = "laid down"
+"""Head of the line on the placement of a robot that is released there."""
 
 
-def show_unsteady(answer: Answer, console: Console) -> None:
+def unsteady(answer: Answer) -> Iterator[str]:
     """Before all numbers, why a free robot has reached no steady motion; nothing where it has."""
     if "lying" in answer and answer["lying"]["state"] != "steady":
-        console.print(escape(answer["lying"]["statement"]), style="bold", highlight=False, soft_wrap=True)
+        yield answer["lying"]["statement"]
 
 
-def show_lying(lying: Answer, console: Console) -> None:
-    """How a free robot moves in the end; the line before it says where it was laid down."""
+def resting_pose(lying: Answer) -> Iterator[Detail]:
+    """How a free robot moves in the end; the line before it says where it was released."""
     said = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
-            value = " ".join(friendly(item["value"], item["unit"]))
-            said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {value}{_range_words(item)}".rstrip())
-    time = " ".join(friendly(lying["followed_time"]["value"], lying["followed_time"]["unit"]))
-    words = f"{_STATES[lying['state']].format(time=time)}: {', '.join(said)}"
-    console.print(words, highlight=False, soft_wrap=True)
+            said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
+    words = _STATES[lying["state"]].format(time=in_words(lying["followed_time"]))
+    yield Detail(f"{words}: {', '.join(said)}")
 
 
 _WORDS = {
@@ -107,17 +128,15 @@ def _band_words(item: Mapping[str, Any]) -> str:
     return f" (open: band over {low} to {high} {unit})"
 
 
-def show_reason(answer: Answer, console: Console) -> None:
+def reason_of(answer: Answer) -> Iterator[Detail]:
     """Why this model answers, where nobody named one."""
     if "model_reason" in answer:
-        console.print(f"model {answer['model']}: {escape(answer['model_reason'])}", highlight=False, soft_wrap=True)
+        yield Detail(f"model {answer['model']}: {answer['model_reason']}")
 
 
-def show_error(error: Answer, console: Console) -> None:
+def error_of(error: Answer) -> Iterator[Detail]:
     """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
-        share = percent(error["value"])
         against = error.get("against", "another resolution")
-        said = f"error estimate: {share} of the forward velocity, against {against}"
-        console.print(said, highlight=False, soft_wrap=True)
-    console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
+        yield Detail(f"error estimate: {percent(error['value'])} of the forward velocity, against {against}")
+    yield Detail(f"known error: {error['statement']}")

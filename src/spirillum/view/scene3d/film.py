@@ -17,6 +17,7 @@ from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, whole_file
+from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.cross_section import silhouette
 from spirillum.view.figures.scene import FAINT, INK
@@ -99,7 +100,7 @@ _LARGEST_TURN = 0.25
 """Largest part of a turn of the tail between two frames at which its sense can still be seen (aliasing)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Film(DisplayMixin):
     """A film that was written."""
 
@@ -115,7 +116,7 @@ class Film(DisplayMixin):
     """Whether the camera follows the robot."""
     turn_per_frame: float
     """Largest part of a turn of the tail between two frames."""
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
     @property
     def duration(self) -> float:
@@ -322,18 +323,17 @@ def _clear_speed(poses: Poses, fps: int) -> float:
     return max(_round_down(_LARGEST_TURN * fps / rate), _SLOWEST)
 
 
-def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[str, ...]]:
+def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[Note, ...]]:
     """Largest part of a turn between two frames, and a warning where it is too much."""
     angle = np.interp(times, poses.time, poses.tail_angle)
     turn = float(np.abs(np.diff(angle)).max()) / (2.0 * np.pi)
     if turn <= _LARGEST_TURN:
         return turn, ()
     slower = _round_down(speed * _LARGEST_TURN / turn)
-    sentence = (
-        f"the tail turns by up to {turn:.2g} turns from frame to frame, so that it may seem to stand still or turn "
-        f"backwards; a speed of {slower:g} shows it as it turns"
+    words = (
+        f"the tail turns by up to {turn:.2g} turns a frame and may seem to stand or reverse; use a speed of {slower:g}"
     )
-    return turn, (sentence,)
+    return turn, (Note("aliased-film", words, ("speed",)),)
 
 
 def _round_down(value: float) -> float:

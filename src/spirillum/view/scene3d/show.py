@@ -32,7 +32,7 @@ _MOST_FINER = 5_000_000
 """Pixels of a picture above which no finer ones are drawn: they would take gigabytes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Picture3D(DisplayMixin):
     """A picture of a robot."""
 

@@ -1,0 +1,387 @@
+"""Motion: predicted, compared, simulated, swept, settled, controlled, and the flow around it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from spirillum.cli.tables.parts import (
+    RELEASED,
+    Answer,
+    Blocks,
+    Detail,
+    band_grid,
+    error_of,
+    files_of,
+    friendly,
+    grid,
+    in_words,
+    placement_of,
+    quantity_grid,
+    reason_of,
+    resting_pose,
+    unsteady,
+)
+from spirillum.display import fitted_words, percent, rows_of
+from spirillum.dynamics.run_summary import told
+from spirillum.envelope import quantity
+from spirillum.quantities import QUANTITIES
+from spirillum.swimming.steady_quantities import headline
+from spirillum.units import display_unit, in_unit
+
+
+def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
+    """The five quantities of `predict` that matter most, or all of them."""
+    yield from unsteady(answer)
+    calibrated = fitted_words(answer["calibrated"], answer.get("fitted_by", ""))
+    free = ", free motion" if answer["motion"] == "free" else ""
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
+    only = None if all_of_it else headline(answer)
+    banded = "band" in answer or "kind" in answer["forward_velocity"]
+    rows = (band_grid if banded else quantity_grid)(title, answer, only)
+    yield rows
+    more = len(rows_of(answer)) - rows.row_count
+    if more:
+        yield f"and {more} more quantities: --all"
+    yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
+    if "lying" in answer:
+        yield from resting_pose(answer["lying"])
+    yield from reason_of(answer)
+    if "other_models" in answer:
+        yield Detail(answer["other_models"]["statement"])
+    if answer["forward_velocity"].get("kind") == "interval":
+        level = answer["forward_velocity"]["level"]
+        yield Detail(f"low and high: {100 * level:g} % interval of the robot's own motion")
+        yield Detail(f"interval {answer['interval_of']}")
+    if "band" in answer:
+        poses = len(answer["band"]["gap"]["value"]) + 1
+        yield Detail(
+            f"band: low and high are the least and the largest of {poses} poses at which the robot is held, none "
+            "of them "
+            "likelier than another; value: the pose above; in free motion (--motion free) it may swim outside the band"
+        )
+    yield from error_of(answer["error_estimate"])
+
+
+_LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
+"""What follows from other rows, and stands in the JSON only."""
+_SHORT = {
+    "forward_velocity": "speed",
+    "tail_rotation_rate": "tail",
+    "body_rotation_rate": "body",
+    "motor_current": "current",
+    "step_out_rate": "step-out",
+    "hydrodynamic_efficiency": "efficiency",
+    "tail_torque": "torque",
+}
+"""Names for the heads of narrow columns."""
+
+
+def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
+    """The quantities of `compare-models` that matter most, a row for each model, or all of them."""
+    models = [item for item in answer["models"] if item["answered"]]
+    yield from (_all_quantities if all_of_it else _side_by_side)(answer, models)
+    for item in answer["models"]:
+        if item["answered"]:
+            yield Detail(_own_error(item))
+        else:
+            yield f"no answer by {item['model']}: {item['reason']}"
+    yield from files_of(answer, file="picture")
+
+
+def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
+    reference = answer["reference"]
+    names = [name for name in headline(next(m for m in models if m["model"] == reference)) if _known(models, name)]
+    rows = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "model")
+    for name in names:
+        unit = _shown_unit(models, name)
+        rows.add_column(_SHORT[name] + (f"\n{unit}" if unit != "1" else ""), justify="right")
+        if name == names[0]:
+            rows.add_column(f"against\n{reference}", justify="right")
+    for item in models:
+        cells = [in_unit(item[name]["value"], item[name]["unit"], _shown_unit(models, name)) for name in names]
+        against = "" if item["model"] == reference else _difference(item["relative_difference"][names[0]]["value"])
+        name = f"{item['model']}*" if item["calibrated"] else str(item["model"])
+        rows.add_row(name, cells[0], against, *cells[1:])
+    yield rows
+    if any(item["calibrated"] for item in models):
+        yield "*: with calibration factors"
+    yield "all quantities: --all"
+
+
+def _all_quantities(answer: Answer, models: Sequence[Answer]) -> Blocks:
+    """A row for each quantity: first the values, then how far they are from the reference model's."""
+    reference, names = answer["reference"], models[0]["relative_difference"]
+    known = [name for name in names if name not in _LEFT_OUT and _known(models, name)]
+    values = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "quantity")
+    others = grid(f"against {reference}", "quantity")
+    for item in models:
+        values.add_column(item["model"], justify="right", no_wrap=True)
+        if item["model"] != reference:
+            others.add_column(item["model"], justify="right", no_wrap=True)
+    for name in known:
+        unit = _shown_unit(models, name)
+        cells = [in_unit(item[name]["value"], item[name]["unit"], unit) for item in models]
+        words = name.replace("_", " ")
+        values.add_row(words + (f", {unit}" if unit != "1" else ""), *cells)
+        apart = [item["relative_difference"][name]["value"] for item in models if item["model"] != reference]
+        others.add_row(words, *map(_difference, apart))
+    values.add_row("calibrated", *("yes" if item["calibrated"] else "no" for item in models))
+    yield values
+    if len(models) > 1:
+        yield others
+
+
+def _known(models: Sequence[Answer], name: str) -> bool:
+    return any(item[name]["value"] is not None for item in models)
+
+
+def _shown_unit(models: Sequence[Answer], name: str) -> str:
+    """The unit of a quantity for all models: that of the largest value."""
+    sizes = [abs(item[name]["value"]) for item in models if item[name]["value"]]
+    return display_unit(max(sizes, default=None), models[0][name]["unit"])
+
+
+def _own_error(item: Answer) -> str:
+    """A model's error in words, with its own estimate where it has one."""
+    error = item["error_estimate"]
+    estimate = ""
+    if error["value"] is not None:
+        against = error.get("against", "another resolution")
+        estimate = f"{percent(error['value'])} of the forward velocity, against {against}; "
+    return f"known error of {item['model']}: {estimate}{error['statement']}"
+
+
+def _difference(share: float | None) -> str:
+    if share is None:
+        return "-"
+    text = f"{100.0 * share:+.1f}" if abs(100.0 * share) < 99.95 else f"{100.0 * share:+.0f}"
+    return "0.0%" if float(text) == 0 else f"{text}%"
+
+
+def simulation(answer: Answer) -> Blocks:
+    """Means and final values of `simulate`, and what happened in the run."""
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
+    yield _averages(title, answer)
+    yield quantity_grid("", dict(_final_values(answer)))
+    if "draws" in answer:
+        intervals = {name: item for name, item in answer.items() if isinstance(item, Mapping) and "low" in item}
+        yield band_grid("", intervals, of="mean")
+        yield Detail(
+            f"low and high: 95 % interval over {answer['draws']} draws, of a tail like those that were fitted, which "
+            "the model may miss by as much as these"
+        )
+    yield from _events(answer["events"])
+    yield from reason_of(answer)
+    if "placement" in answer:
+        yield from placement_of(answer["placement"])
+    if "in_tube" in answer:
+        yield _in_tube(answer["in_tube"])
+    yield from error_of(answer["error_estimate"])
+    whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
+    yield Detail(f"last 2/3: over the last two thirds of {whole}, on or off")
+    yield Detail(f"steady: {answer['steady']}")
+    yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
+
+
+def _in_tube(pose: Answer) -> Detail:
+    """Under what a free run in the tube was made."""
+    shown = {name: in_words(pose[name]) for name in pose if name != "ends"}
+    if pose["wait"]["value"]:
+        shown["gap"] += " after the wait, where the run begins"
+    said = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
+    return Detail(f"in the tube: ends {pose['ends']}, {', '.join(said)}")
+
+
+def _averages(title: str, answer: Answer) -> Table:
+    """Means over the last two thirds, while the drive is on, and while the motion is steady."""
+    table = grid(title, "mean", "last 2/3", "while on", "while steady", "unit")
+    for name in (name.removesuffix("_on") for name in answer if name.endswith("_on")):
+        items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
+        most = max((abs(item["value"]) for item in items if item["value"] is not None), default=None)
+        unit = display_unit(most, items[1]["unit"])
+        values = [in_unit(_rounded(item["value"], most), items[1]["unit"], unit) for item in items]
+        table.add_row(name.removeprefix("mean_").replace("_", " "), *values, unit)
+    return table
+
+
+def _rounded(value: float | None, most: float | None) -> float | None:
+    """A value without what is rounding error beside the largest one: a robot at rest has no speed of 1e-19 m/s."""
+    return 0.0 if value is not None and most is not None and abs(value) <= _ROUNDING * most else value
+
+
+_ROUNDING = 1e-12
+_NONE: Answer = {"value": None}
+"""Of the time, which has no mean."""
+
+
+def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """What happened, a line each."""
+    for event in told([(event["time"], event["what"]) for event in events]):
+        again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
+        yield f"{event.time:.4g} s: {event.what}{again}"
+
+
+def _final_values(answer: Answer) -> Iterator[tuple[str, Any]]:
+    """Quantities of a run that have no averages, vectors by their parts."""
+    for name, item in answer.items():
+        averaged = name.endswith(("_on", "_steady")) or f"{name}_on" in answer
+        if name == "error_estimate" or averaged or not isinstance(item, Mapping) or "unit" not in item:
+            continue
+        if isinstance(item["value"], list):
+            for part, value in zip("xyz", item["value"], strict=True):
+                yield f"{name} {part}", quantity(value, item["unit"])
+        else:
+            yield name, item
+
+
+_SWEPT = {
+    "field_rate": "field",
+    "tail_rotation_rate": "tail",
+    "forward_velocity": "speed",
+    "wobble_angle": "wobble",
+    "phase_lag": "lag",
+}
+"""Quantities of a sweep and the heads of their columns."""
+
+
+def magnetic_sweep(answer: Answer) -> Blocks:
+    """Motion over the rates of a rotating field."""
+    title = f"{answer['robot']}: rotating field, model {answer['model']}, free motion"
+    rows = grid(title, *(f"{word}, {QUANTITIES[name].display_unit}" for name, word in _SWEPT.items()))
+    columns = [(answer[name], QUANTITIES[name].display_unit) for name in _SWEPT]
+    for index in range(len(answer["field_rate"]["value"])):
+        rows.add_row(*(in_unit(item["value"][index], item["unit"], unit) for item, unit in columns))
+    yield rows
+    step_out = in_unit(answer["step_out_rate"]["value"], "rad/s", "Hz")
+    yield f"step-out of the held robot at {step_out} Hz; no lag where the robot slips"
+    yield from files_of(answer, plot="plot", file="sweep")
+
+
+_FILM = ("gap", "normal_resistance", "over_lubrication", "sideways_force")
+"""Quantities of the lubrication film under the level robot."""
+
+
+def settling(answer: Answer) -> Blocks:
+    """The steady motion of `settle`, the resting pose, and the lubrication film in transit."""
+    yield from unsteady(answer)
+    steady = {name: item for name, item in answer.items() if name != "error_estimate"}
+    yield quantity_grid(f"{answer['robot']}: settling in its tube", steady)
+    drainage = answer["drainage_time"]
+    if drainage["value"] is not None:
+        gap = in_unit(drainage["until"]["value"], "m", "mm")
+        yield quantity_grid(f"on the way, as the gap first falls to {gap} mm", answer["passing"])
+    if answer["film"]["gap"]["value"]:
+        film = grid("film under it, level")
+        for name in _FILM:
+            shown = QUANTITIES[name].display_unit
+            film.add_column(f"{name.replace('_', ' ')}{f' ({shown})' if shown != '1' else ''}", justify="right")
+        columns = [(answer["film"][name]["value"], QUANTITIES[name]) for name in _FILM]
+        for index in range(len(answer["film"]["gap"]["value"])):
+            film.add_row(*(in_unit(values[index], item.unit, item.display_unit) for values, item in columns))
+        yield film
+    yield from placement_of(answer["placement"], RELEASED)
+    yield from resting_pose(answer["lying"])
+    yield from error_of(answer["error_estimate"])
+    yield from files_of(answer, file="picture")
+
+
+def flow(answer: Answer) -> Blocks:
+    """The motion of `flow`, then what each file holds."""
+    title = f"{answer['robot']}: flow, model {answer['model']}, {answer['frame']} frame"
+    yield quantity_grid(title, {**answer, **answer["placement"]})
+    yield from reason_of(answer)
+    if answer["placement"].get("ends"):
+        yield Detail(f"ends of the channel: {answer['placement']['ends']}")
+    for item in answer["files"]:
+        points = item["grid"]["points"]
+        shape = f"plane {''.join(points)}" if len(points) == 2 else "box"
+        size = " x ".join(str(count) for count in points.values())
+        found = {"spacing": item["grid"]["spacing"], **item}
+        yield quantity_grid(f"{item['file']}: {shape}, {size} points", found)
+
+
+def remote(answer: Answer) -> Blocks:
+    """Text of `remote`."""
+    told_it = f"duty {answer['duty']['value']:g} for {answer['time_on']['value']:g} s, now off"
+    yield f"{answer['port']}: {answer['name']}, {told_it}"
+
+
+def control(answer: Answer) -> Blocks:
+    """The run of `control`, and the scores of all controllers."""
+    task = answer["task"]
+    asked = ", ".join(
+        f"{name.replace('_', ' ')} {in_words(item)}"
+        for name, item in task.items()
+        if name != "kind" and item is not None
+    )
+    title = f"{answer['robot']}: {task['kind']}, {asked}; controller {answer['controller']}, seed {answer['seed']}"
+    quantities = {answer["error"]["meaning"]: answer["error"]}
+    quantities |= {name: answer[name] for name in ("final_position_x", "duration", "time_on", "electrical_energy")}
+    yield quantity_grid(title, quantities)
+    yield f"{'good' if answer['good'] else 'not good'} enough; {_drawn(answer['drawn'])}"
+    frames, commands = answer["frames"], answer["commands"]
+    yield (
+        f"camera: {frames['taken']} frames, {frames['lost']} lost; remote: {commands['sent']} commands, "
+        f"{commands['lost']} lost; the drive is off at the end"
+    )
+    if answer["late"] is not None:
+        yield f"live: at the end {' '.join(friendly(answer['late']['value'], 's'))} behind the clock"
+    if answer["learnt"] is not None:
+        yield f"learnt: {_learnt(answer['learnt'], answer['drawn'])}"
+    if answer["scores"] is not None:
+        yield from _scores(answer["scores"], answer["error"]["unit"])
+    yield from files_of(answer, plot="plot", movie="movie", file="run")
+
+
+def _drawn(drawn: Answer) -> str:
+    """What the controller did not know."""
+    said = [f"drawn: friction times {drawn['friction_factor']:.3g}"]
+    if drawn["gap_factor"] != 1.0:
+        said.append(f"gap times {drawn['gap_factor']:.3g}")
+    pulse = drawn["pulse"]
+    if pulse is None:
+        said.append("no pulse of flow")
+    else:
+        velocity = in_words(pulse["velocity"])
+        said.append(f"flow of {velocity} from {pulse['start']['value']:.3g} s to {pulse['end']['value']:.3g} s")
+    return ", ".join(said)
+
+
+def _learnt(learnt: Answer, drawn: Answer) -> str:
+    """Factors with their intervals beside the truth."""
+    said = []
+    for name, item in learnt.items():
+        words = f"times {item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not told"
+        said.append(f"{name.replace('_factor', '')} {words}, in truth {drawn[name]:.3g}")
+    return "; ".join(said)
+
+
+def _scores(scores: Answer, unit: str) -> Blocks:
+    """Every controller with its intervals."""
+    rows = grid("", "controller", "runs", "good", "mean error", "beyond feedback", "energy")
+    for column in rows.columns[1:]:
+        column.justify = "right"
+    for name, one in scores["controllers"].items():
+        share = one["good"]
+        good = f"{100 * share['value']:.0f} % ({100 * share['low']:.0f} to {100 * share['high']:.0f})"
+        beyond = "" if name == "feedback" else _interval(one["error_beyond_feedback"], unit)
+        rows.add_row(name, str(one["runs"]), good, _interval(one["error"], unit), beyond, _interval(one["energy"], "J"))
+    yield rows
+    yield f"error: {scores['error']}, its size; in brackets 95 % intervals; 'beyond feedback': run by run"
+    failed = scores["failed_seeds"]
+    if failed:
+        shown = ", ".join(str(seed) for seed in failed[:12]) + (", ..." if len(failed) > 12 else "")
+        yield f"feedback was not good enough with the seeds {shown}: --seed does one again"
+
+
+def _interval(item: Answer, unit: str) -> str:
+    shown = display_unit(item["value"], unit)
+    value = in_unit(item["value"], unit, shown)
+    words = "" if shown == "1" else f" {shown}"
+    if item["low"] is None:
+        return f"{value}{words}"
+    low, high = (in_unit(item[key], unit, shown) for key in ("low", "high"))
+    return f"{value} ({low} to {high}){words}"

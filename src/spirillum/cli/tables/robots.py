@@ -1,0 +1,124 @@
+"""Robots, their files, resistances and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid
+from spirillum.units import in_unit
+
+
+def robot(answer: Answer) -> Blocks:
+    """Fields of `robot show`, and what follows from them."""
+    fields = answer["fields"]
+    yield f"{fields['name']}  {fields['description']}"
+    rows = grid("fields", "field", "value", "unit")
+    for name, item in fields.items():
+        word = "none" if name in ("tail.taper", "channel", "seal") and item is None else _word(item)
+        value, unit = friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (word, "")
+        if name not in ("name", "description", "reference"):
+            rows.add_row(name, value, unit)
+    yield rows
+    found = grid("what follows", "quantity", "value", "unit", "meaning")
+    for name, item in answer["derived"].items():
+        value, unit = friendly(item["value"], item["unit"])
+        found.add_row(name.replace("_", " "), value, unit, item["meaning"])
+    yield found
+
+
+def _word(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, tuple):
+        return escape(", ".join(str(item) for item in value)) or "-"
+    return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
+
+
+def check(answer: Answer) -> Blocks:
+    """Text of `robot check`."""
+    yield f"{answer['robot']}: {'valid' if answer['valid'] else 'not valid'}"
+    yield from (f"problem: {problem}" for problem in answer["problems"])
+
+
+def export(answer: Answer) -> Blocks:
+    """Files of `export`, then the numbers of the geometry."""
+    first, *others = (Path(item["file"]) for item in answer["files"])
+    meshes = [path for path in others if path.parent != first.parent]
+    lines = [f"{item['file']}: {item['holds']}" for item in answer["files"] if Path(item["file"]) not in meshes]
+    if meshes:
+        lines.insert(1, f"{meshes[0].parent}: {len(meshes)} mesh files, in mm")
+    yield from lines
+    if "solid" in answer:
+        solid = answer["solid"]
+        state = "watertight" if solid["watertight"] else "not watertight"
+        bodies = "one body" if solid["bodies"] == 1 else f"{solid['bodies']} bodies"
+        yield f"{bodies}, {state}, {solid['triangles']} triangles"
+        size = " x ".join(f"{1e3 * value:.4g}" for value in solid["size"]["value"])
+        yield f"{size} mm, {1e6 * solid['volume']['value']:.4g} ml"
+    elif "parameters" in answer:
+        title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}"
+        rows = grid(title, "parameter", "value", "unit")
+        for name, item in answer["parameters"].items():
+            rows.add_row(name, f"{item['value']:.6g}", item["unit"])
+        yield rows
+    else:
+        links = answer["links"].items()
+        masses = {f"{name} {key}": link[key] for name, link in links for key in ("mass", "displaced_volume")}
+        yield quantity_grid(f"{answer['robot']}: links", masses)
+
+
+def resistance(answer: Answer) -> Blocks:
+    """Blocks of the matrix of `resistance`; each 6x6 stands once."""
+    title = f"{answer['robot']}: resistance of {answer['part']}, model {answer['model']}, about {answer['about']}"
+    if "links" in answer:
+        yield title
+    matrix, links = answer["matrix"]["value"], answer.get("links", [answer["part"]])
+    for number, on in enumerate(links):
+        for other in range(number, len(links)):
+            block = [row[6 * other : 6 * other + 6] for row in matrix[6 * number : 6 * number + 6]]
+            yield _six_by_six(title if len(links) == 1 else f"on the {on}, by motion of the {links[other]}", block)
+    yield "N s/m (upper left), N s, N m s (lower right); F = -B V"
+    yield from placement_of(answer["placement"])
+
+
+def _six_by_six(title: str, block: Sequence[Sequence[float | None]]) -> Table:
+    rows = grid(title, "")
+    rows.padding = (0, 0, 0, 0)
+    for name in ("U_x", "U_y", "U_z", "Omega_x", "Omega_y", "Omega_z"):
+        rows.add_column(name, justify="right", no_wrap=True, min_width=10)
+    for name, row in zip(("F_x", "F_y", "F_z", "T_x", "T_y", "T_z"), block, strict=True):
+        rows.add_row(name, *("-" if entry is None else f"{entry:.4g}" for entry in row))
+    return rows
+
+
+def preparation(answer: Answer) -> Blocks:
+    """Errors of a table at poses between its nodes, and where it holds."""
+    rows = grid(f"{answer['robot']}: error of its table", "quantity", "largest error without yaw, %", "with yaw, %")
+    for name, item in answer["error"].items():
+        level = answer["error_without_yaw"][name]
+        rows.add_row(name.replace("_", " "), f"{100.0 * level['value']:.2g}", f"{100.0 * item['value']:.2g}")
+    yield rows
+    valid = answer["valid"]
+    ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")
+    units = (("gap", "mm"), ("pitch_up", "deg"), ("pitch_down", "deg"), ("yaw", "deg"))
+    columns = [(valid[name]["value"], unit) for name, unit in units]
+    for index in range(len(valid["gap"]["value"])):
+        ranges.add_row(*(in_unit(values[index], "m" if unit == "mm" else "rad", unit) for values, unit in columns))
+    yield ranges
+    yield f"{answer['places']} places in {answer['seconds']['value']:.0f} s"
+
+
+def preparations(answer: Answer) -> Blocks:
+    """The error of each robot's table."""
+    names = {"forward_velocity": "speed", "body_rotation_rate": "body rate", "sideways_force": "side force"}
+    rows = grid("largest errors of the tables, %", "robot", "tail, mm", "tube, mm", *names.values())
+    for one in answer["robots"]:
+        tail = " x ".join(in_unit(one[name]["value"], "m", "mm") for name in ("wavelength", "amplitude"))
+        errors = (f"{100.0 * one['error'][name]['value']:.2g}" for name in names)
+        rows.add_row(one["robot"], tail, in_unit(one["channel_diameter"]["value"], "m", "mm"), *errors)
+    yield rows

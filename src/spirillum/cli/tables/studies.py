@@ -1,0 +1,197 @@
+"""Studies of many robots, and designs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from rich.markup import escape
+from rich.table import Table
+
+from spirillum.cli.tables.parts import (
+    Answer,
+    Blocks,
+    Detail,
+    band_grid,
+    files_of,
+    grid,
+    in_words,
+    quantity_grid,
+    reason_of,
+)
+from spirillum.designs.improvement import ALTERNATIVES
+from spirillum.display import counted, percent
+from spirillum.studies.ranking import ENDS, LET_GO, RANKED, best_in_words
+from spirillum.units import display_unit, in_unit
+
+
+def study(answer: Answer, *, rows: int = 10) -> Blocks:
+    """The ranking of `study` first, verdicts on a paper's statements last."""
+    sizes = answer["dimensions"]
+    robots = sizes["robot"] if "robot" in sizes else sizes["channel"] * sizes["wavelength"] * sizes["amplitude"]
+    sizes_in_words = ((robots, "robot"), (sizes["model"], "model"), (sizes["friction"], "reading"))
+    extent = ", ".join(counted(number, word) for number, word in sizes_in_words)
+    yield f"{answer['title']}: {extent} of the friction"
+    yield from _ranking(answer["ranking"], rows)
+    yield from _empty_results(answer)
+    yield f"observations: {answer['observations']}"
+    if answer.get("predictions"):
+        counts = ", ".join(f"{count} {verdict.replace('-', ': ')}" for verdict, count in answer["predictions"].items())
+        yield f"statements of the paper, laid down and let go, nothing fitted: {counts}"
+    if any(answer["claims"].values()):
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
+        yield f"statements of the paper: {counts}"
+    yield f"open {answer['folder']}/report.html"
+
+
+def study_store(answer: Answer) -> Blocks:
+    """Text of `study --store`."""
+    sizes = " x ".join(f"{size} {name}" for name, size in answer["dimensions"].items())
+    yield f"{answer['title']}: {sizes}"
+    yield from _empty_results(answer)
+    yield f"observations: {answer['observations']}"
+    yield f"{answer['results']} results in {answer['folder']}"
+
+
+def _empty_results(answer: Answer) -> Iterator[str]:
+    """How many results are empty, and where the reasons stand."""
+    if answer["unanswered"]:
+        yield f"{answer['unanswered']} of {answer['results']} results are empty: notes and variable `outside` say why"
+
+
+def _ranking(ranking: Answer, rows: int) -> Blocks:
+    """The robots, the fastest first, and which of them is the best by what."""
+    robots = ranking["robots"]
+    if not robots:
+        yield "no robot has an answer"
+        return
+    columns = [column for name in robots[0] if name != "robot" for column in _columns(robots, name)]
+    found = grid(_basis(ranking), "", "robot")
+    for title, _ in columns:
+        found.add_column(title, justify="right", no_wrap=True)
+    for rank, item in enumerate(robots[:rows]):
+        found.add_row(str(rank + 1), escape(item["robot"]), *(cells[rank] for _, cells in columns))
+    yield found
+    if len(robots) > rows:
+        yield f"and {len(robots) - rows} more: --rows, ranking.csv"
+    yield from map(best_in_words, ranking["best"])
+    if "settled" in ranking:
+        yield Detail(ranking["settled"])
+    if ranking["low_and_high"] in ENDS:
+        where = ", of robots that are not let go: in ranking.csv" if "settled" in ranking else ""
+        yield Detail(f"low, high: {ENDS[ranking['low_and_high']]}{where}")
+
+
+def _basis(ranking: Answer) -> str:
+    walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
+    first = "fastest once settled first" if "settled" in ranking else "fastest first"
+    return f"{first}: model {ranking['model']}, friction {ranking['friction']}{walls}"
+
+
+def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:
+    """Titles and cells of a quantity: its values, of the speed also the ends of its band."""
+    own = robots[0][name]["unit"]
+    sizes = [abs(item[name]["value"]) for item in robots if item[name]["value"]]
+    if not sizes:
+        return []
+    shown = display_unit(max(sizes), own)
+    with_ends = name == "forward_velocity" and LET_GO not in robots[0]  # else the table is wider than a terminal
+    ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
+    return [
+        (
+            RANKED[name].heading(shown) if end == "value" else end,
+            [in_unit(item[name].get(end), own, shown) for item in robots],
+        )
+        for end in ("value", *ends)
+    ]
+
+
+_SHOWN = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_current",
+    "shaft_power",
+    "hydrodynamic_efficiency",
+)
+"""Quantities of a design that stand in the table; all are in the JSON."""
+
+
+def design(answer: Answer) -> Blocks:
+    """The best values of `design`, what they give, what they are compared with."""
+    model = f"model {answer['model']}{', calibrated' if answer['calibrated'] else ''}"
+    yield f"{answer['robot']}, {model}: {answer['objective']['words']} {in_words(answer['objective'])}"
+    yield _best_values(answer)
+    shown = {name: answer["quantities"][name] for name in _SHOWN}
+    if "uncertainty" in answer:
+        yield band_grid("what it gives: means, and 95 % intervals", shown)
+    else:
+        yield quantity_grid("what it gives", shown)
+    if "probability" in answer.get("uncertainty", {}):
+        yield f"probability that the target is met: {_share(answer['uncertainty']['probability'])}"
+    yield from _basis_of_design(answer)
+    if "front" in answer:
+        yield _front(answer["front"])
+    yield from files_of(answer, file="robot file", picture="picture", stl="body for a printer")
+
+
+def _best_values(answer: Answer) -> Table:
+    fields = grid("", "field", "best", "within 1 %", "unit", "today")
+    today = next(item for item in answer["alternatives"] if item["name"] == "today")
+    for path, item in answer["design"].items():
+        unit = display_unit(item["value"], item["unit"])
+        ends = answer["sensitivity"][path]["within_one_per_cent"]["value"]
+        low, high = (in_unit(end, item["unit"], unit) for end in ends)
+        now = today["design"][path]["value"]
+        value, was = (in_unit(number, item["unit"], unit) for number in (item["value"], now))
+        fields.add_row(escape(path), value, f"{low} to {high}", "" if unit == "1" else unit, was)
+    return fields
+
+
+def _basis_of_design(answer: Answer) -> Iterator[Detail]:
+    """What the best design is compared with, how certain it is, and how it was found."""
+    yield from reason_of(answer)
+    yield from _compared(answer)
+    if (deciding := answer.get("uncertainty", {}).get("deciding")) is not None and deciding:
+        shares = [f"{name} {100 * share:.0f} %" for name, share in deciding.items()]
+        yield Detail(f"the spread goes with: {', '.join(shares)}")
+    wound = [f"{name.replace('_', ' ')} {in_words(item)}" for name, item in answer["winding"].items()]
+    yield Detail(f"to wind: {', '.join(wound)}")
+    if answer["bound_by"]:
+        yield Detail(f"bound by: {'; '.join(answer['bound_by'])}")
+    if "learned" in answer:
+        known = answer["learned"]
+        best, rest = (percent(known[name]["value"]) for name in ("error_of_the_best", "error_left_out"))
+        yield Detail(
+            f"learned from {known['solves']} designs that were solved for: the objective of the best was missed by "
+            f"{best}, those of the better half, each left out, by {rest}"
+        )
+    counts = answer["designs"]
+    yield Detail(
+        f"{counts['swum']} designs: {counts['refused']} cannot be built or swum, "
+        f"{counts['breaking_a_condition']} break a condition"
+    )
+
+
+def _compared(answer: Answer) -> Iterator[Detail]:
+    for other in answer["alternatives"]:
+        fields = ", ".join(f"{path} {in_words(item)}" for path, item in other["design"].items())
+        words = f"{ALTERNATIVES[other['name']]} ({fields}): {in_words(other['objective'])}"
+        if not other["keeps_conditions"]:
+            words += ", does not keep all conditions"
+        if "uncertainty" in answer:
+            words += f"; the best is better with probability {_share(other['probability_that_the_design_is_better'])}"
+        yield Detail(words)
+
+
+def _share(item: Answer) -> str:
+    return f"{item['value']:.2f} ({item['low']:.2f} to {item['high']:.2f})"
+
+
+def _front(front: Mapping[str, Answer]) -> Table:
+    units = {name: display_unit(max(map(abs, item["value"])), item["unit"]) for name, item in front.items()}
+    names = [f"{name.replace('_', ' ')}{'' if units[name] == '1' else f' ({units[name]})'}" for name in front]
+    rows = grid("designs of which none is better in both", *names)
+    for row in zip(*(item["value"] for item in front.values()), strict=True):
+        cells = zip(row, front, strict=True)
+        rows.add_row(*(in_unit(value, front[name]["unit"], units[name]) for value, name in cells))
+    return rows

@@ -1,0 +1,130 @@
+"""Measured videos and setups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.markup import escape
+
+from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid
+from spirillum.display import percent
+from spirillum.measurement.shown import ShownNumber, shown
+from spirillum.measurement.trials import MEASURED, RATE_NAMES
+from spirillum.units import for_people, in_unit, shown_in
+
+
+def measurement(answer: Answer) -> Blocks:
+    """Each trial of `measure`, and the means over them; one trial has one table."""
+    trials, summary = answer["trials"], answer["summary"]
+    several = len(trials) > 1
+    if several:
+        table = grid(f"{answer['robot']}: {len(trials)} trials", "trial", "quantity", "value", "low", "high", "unit")
+        for trial in trials:
+            for row, name in enumerate(RATE_NAMES):
+                whose = escape(trial["name"]) if row == 0 else ""
+                table.add_row(whose, name.replace("_", " "), *_numbers(trial[name]))
+        yield table
+    title = "means over trials" if several else f"{answer['robot']}: {trials[0]['name']}"
+    rows = grid(title, "quantity", "value", "low", "high", "unit", *(["trials"] if several else []))
+    for name, item in summary.items():
+        if isinstance(item, dict) and (item["value"] is not None or name in RATE_NAMES):
+            rows.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
+    yield rows
+    yield from _intervals(answer, several=several)
+    if answer["files"]:
+        listed = [name for name in answer["files"] if not name.startswith("figures/")]
+        yield f"{len(answer['files'])} files, among them {', '.join(listed[-3:])}"
+
+
+def _intervals(answer: Answer, *, several: bool) -> Iterator[Detail]:
+    """What the intervals are, and why there is none where there is none."""
+    scale = 100 * answer["summary"]["scale_uncertainty"]
+    known = [
+        (name.replace("_", " "), item)
+        for items in (answer["summary"], *answer["trials"])
+        for name, item in items.items()
+        if name in MEASURED and item["value"] is not None
+    ]
+    if any("low" in item for _, item in known):
+        words = "Student's t over trials" if several else "from the trial's own residuals"
+        share = f"; the scale's standard uncertainty of {scale:.2g} % is in lengths whole" if scale else ""
+        yield Detail(f"low and high: 95 % interval, {words}{share}")
+    for reason in sorted({item["reason"] for _, item in known if "low" not in item}):
+        names = dict.fromkeys(name for name, item in known if item.get("reason") == reason)
+        yield Detail(f"no interval of {', '.join(names)}: {reason}")
+
+
+def _numbers(item: Answer) -> ShownNumber:
+    return shown(item["value"], item.get("low"), item.get("high"), item["unit"])
+
+
+def feasibility(answer: Answer) -> Blocks:
+    """Expected rates, checks and intervals of `measure --feasibility`."""
+    expected = grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from")
+    for name, item in answer["expected"].items():
+        unit = for_people(item["unit"])
+        expected.add_row(name.replace("_", " "), in_unit(item["value"], item["unit"], unit), unit, item["source"])
+    yield expected
+    yield from (f"{'yes' if check['passed'] else 'NO':<4} {check['sentence']}" for check in answer["checks"])
+    if answer["intervals"]:
+        span = f"{answer['time_measured']['value']:.4g} s"
+        rows = grid(f"expected 95 % interval of one trial, {span} long", "quantity", "half width", "unit", "share")
+        for name, item in answer["intervals"].items():
+            reach = item["half_width"]
+            unit = for_people(reach["unit"])
+            share = "-" if item["share"] is None else percent(item["share"])
+            rows.add_row(name.replace("_", " "), f"{shown_in(reach['value'], unit):.2g}", unit, share)
+        yield rows
+        yield Detail(f"basis: {answer['basis']}")
+    words = _scale_sources(answer)
+    yield f"standard uncertainty of lengths: {percent(answer['scale_uncertainty'])}{f' ({words})' if words else ''}"
+    yield f"verdict: {'all rates can be resolved' if answer['feasible'] else 'not all rates can be resolved'}"
+
+
+def _scale_sources(answer: Answer) -> str:
+    """Shares of the uncertainty of lengths, the largest first."""
+    parts = sorted(answer["scale_sources"].items(), key=lambda item: -item[1])
+    return ", ".join(f"{name} {percent(share)}" for name, share in parts)
+
+
+def setup_check(answer: Answer) -> Blocks:
+    """Text of `setup check`."""
+    yield f"{answer['file']}: valid, robot {answer['robot']}"
+    words, total = _scale_sources(answer), percent(answer["scale_uncertainty"])
+    yield f"standard uncertainty of lengths from heights and scale: {total}{': ' + words if words else ''}"
+    if (video := answer.get("film")) is not None:
+        pixel, size = video["length_per_pixel"]["value"], video["apparent_body_size"]
+        ruler = f"{video['markers']} lines of the ruler" if video["markers"] else "no ruler"
+        stripes = "its stripes fit" if video["stripes_fit"] else "its stripes do not fit"
+        yield (
+            f"{video['name']}: robot on {video['frames_with_robot']} of {video['frames']} frames looked at, "
+            f"{size:.3f} times as large as its file says; {stripes}, tail read on "
+            f"{100 * video['tail_readable']:.0f} %; "
+            f"{ruler}, {1e3 * pixel:.4g} mm a pixel"
+        )
+
+
+def setup_proposal(answer: Answer) -> Blocks:
+    """What `setup propose` found and how sure it is, then what is left to be filled in."""
+    rows = grid(f"{answer['film']}: what it shows", "what", "sure", "seen")
+    for finding in answer["findings"]:
+        rows.add_row(finding["name"].replace("_", " "), finding["confidence"], finding["sentence"])
+    yield rows
+    if answer["file"] is not None:
+        fields = ", ".join(item["field"] for item in answer["to_fill"])
+        yield f"{answer['file']}: fill in what you know: {fields}"
+
+
+def track(answer: Answer) -> Blocks:
+    """Speed and rates over all frames of `track`, and its latency."""
+    if "forward_velocity" in answer:
+        rows = grid(f"{answer['source']}: all frames", "quantity", "value", "low", "high", "unit")
+        for name in RATE_NAMES:
+            rows.add_row(name.replace("_", " "), *_numbers(answer[name]))
+        yield rows
+    seen = f"robot seen on {answer['frames_tracked']} of {answer['frames']} frames, {answer['frames_dropped']} dropped"
+    latency = answer["latency"]
+    if latency["median"]["value"] is not None:
+        median, high = (1e3 * latency[name]["value"] for name in ("median", "percentile_95"))
+        seen += f"; latency {median:.1f} ms, 95th percentile {high:.1f} ms"
+    yield seen

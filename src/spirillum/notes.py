@@ -1,0 +1,133 @@
+"""Notes of an answer: what is assumed or violated, what that does to the result, and what to do, each with a code.
+
+A note is its sentence, so that it can be printed, compared and counted as text; its code, severity and fields are for
+programs. The code's longer explanation is in `KINDS` and, written from there, in `docs/notes.md`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, NamedTuple
+
+from spirillum.note_kinds import CAUTIONS, INFORMATION, TRACKING
+
+LONGEST = 160
+"""Characters of a sentence, without the names of robots and files that stand in it."""
+
+
+class NoteKind(NamedTuple):
+    """What all notes of one code have in common."""
+
+    severity: Literal["caution", "info"]
+    """`caution`: it changes what the numbers mean; `info`: it explains them."""
+    explanation: str
+    """What is assumed or violated, what follows, what to do."""
+
+
+KINDS: dict[str, NoteKind] = {
+    **{code: NoteKind("caution", words) for code, words in CAUTIONS.items()},
+    **{code: NoteKind("caution", words) for code, words in TRACKING.items()},
+    **{code: NoteKind("info", words) for code, words in INFORMATION.items()},
+}
+"""Kinds of notes by code; cautions in the order in which a terminal shows them."""
+_FALLBACK = "remark"
+_RATES = ("-forward-velocity", "-body-rotation-rate", "-tail-rotation-rate")
+
+
+class Note(str):
+    """A sentence about an answer, with its code; it cannot be changed."""
+
+    __slots__ = ("code", "fields")
+    code: str
+    """What the note is about, such as `walls-left-out`; a key of `KINDS`."""
+    fields: tuple[str, ...]
+    """Fields or quantities that it concerns, by their dotted names."""
+
+    def __new__(cls, code: str, sentence: str, fields: Iterable[str] = ()) -> Note:
+        """A note of a known code."""
+        note = super().__new__(cls, sentence)
+        note.code, note.fields = _known(code), tuple(fields)
+        return note
+
+    def __getnewargs__(self) -> tuple[str, str, tuple[str, ...]]:  # type: ignore[override]
+        """What another process makes it anew from."""
+        return self.code, str(self), self.fields
+
+    @property
+    def severity(self) -> Literal["caution", "info"]:
+        """Whether it changes what the numbers mean."""
+        return KINDS[self.code].severity
+
+    @property
+    def sentence(self) -> str:
+        """The sentence."""
+        return str(self)
+
+    @property
+    def explanation(self) -> str:
+        """What all notes of its code mean."""
+        return KINDS[self.code].explanation
+
+    def prefixed(self, words: str) -> Note:
+        """The note with words before its sentence, such as the name of the robot that it is about."""
+        return Note(self.code, f"{words}{self}", self.fields)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The note as data."""
+        return {"code": self.code, "severity": self.severity, "sentence": str(self), "fields": list(self.fields)}
+
+
+def _known(code: str) -> str:
+    """A code of `KINDS`; names of flags that end in a rate are of one kind for all rates."""
+    for rate in _RATES:
+        code = code.removesuffix(rate)
+    if code not in KINDS:
+        raise KeyError(f"notes have no code {code!r}; add it to note_kinds.py")
+    return code
+
+
+def notes_of(sentences: Iterable[str]) -> tuple[Note, ...]:
+    """Notes; a sentence without a code, as in files of earlier versions, becomes a remark."""
+    return tuple(item if isinstance(item, Note) else Note(_FALLBACK, item) for item in sentences)
+
+
+def note_attributes(notes: Iterable[str]) -> dict[str, str]:
+    """Notes as attributes of a dataset: `warnings` for people, a sentence each line, and `notes` as JSON."""
+    found = notes_of(notes)
+    return {"warnings": "\n".join(found), "notes": json.dumps([note.to_dict() for note in found])}
+
+
+def notes_in(attributes: Mapping[Any, Any]) -> tuple[Note, ...]:
+    """Notes of a dataset, from its attributes; one of an earlier version has sentences alone."""
+    if "notes" not in attributes:
+        return notes_of(line for line in str(attributes.get("warnings", "")).split("\n") if line)
+    return notes_in_answer({"notes": json.loads(attributes["notes"])})
+
+
+def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
+    """Notes of an answer that is data."""
+    return tuple(Note(item["code"], item["sentence"], item["fields"]) for item in answer.get("notes", ()))
+
+
+def shown_cautions(notes: Iterable[Note], most: int = 3, width: int = 80) -> list[Note]:
+    """The weightiest cautions, one of a code, as many as fit into three rows of a terminal.
+
+    Args:
+        notes: all notes of an answer.
+        most: rows, and most notes.
+        width: characters in a row.
+    """
+    order = list(KINDS)
+    first: dict[str, Note] = {}
+    for note in notes:
+        if note.severity == "caution":
+            first.setdefault(note.code, note)
+    shown: list[Note] = []
+    rows = 0
+    for note in sorted(first.values(), key=lambda note: order.index(note.code)):
+        rows += -(-len(f"{note.severity}: {note}") // width)
+        if shown and rows > most:
+            break
+        shown.append(note)
+    return shown

@@ -1,0 +1,69 @@
+"""Notes have known codes, fit into few rows, and survive files and processes."""
+
+import ast
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from spirillum.note_kinds import TRACKING
+from spirillum.notes import KINDS, LONGEST, Note, note_attributes, notes_in, shown_cautions
+
+ROOT = Path(__file__).parent.parent
+
+
+def literals(name: str) -> Iterator[tuple[str, str]]:
+    """Codes, and sentences where they are literal, of all calls of a class in the package."""
+    for path in (ROOT / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == name and len(node.args) > 1:
+                code, sentence = (item.value if isinstance(item, ast.Constant) else "" for item in node.args[:2])
+                if code:
+                    yield code, sentence
+
+
+def test_every_code_is_explained_and_every_explained_code_is_used() -> None:
+    used = {code for code, _ in literals("Note")}
+    assert used <= set(KINDS)
+    own = set(KINDS) - set(TRACKING)
+    computed = {"inertia", "outside-validity", "remark", "misfit", "intervals-incomplete"}
+    assert own - computed <= used | {"outlier"}
+    assert {code for code, _ in literals("Flag")} <= set(TRACKING)
+
+
+def test_sentences_are_short() -> None:
+    assert [sentence for _, sentence in literals("Note") if len(sentence) > LONGEST] == []
+
+
+def test_every_code_has_an_anchor_in_the_documentation() -> None:
+    page = (ROOT / "docs" / "notes.md").read_text(encoding="utf-8")
+    assert [code for code in KINDS if f"(note-{code})=\n" not in page] == []
+
+
+def test_unknown_codes_are_refused_and_rates_share_a_code() -> None:
+    with pytest.raises(KeyError, match="no code 'unheard-of'"):
+        Note("unheard-of", "x")
+    assert Note("not-steady-body-rotation-rate", "x").code == "not-steady"
+
+
+def test_notes_survive_processes_prefixes_and_datasets() -> None:
+    note = Note("misfit", "one misses", ("advance",))
+    again = pickle.loads(pickle.dumps(note.prefixed("two: ")))
+    assert (again, again.code, again.fields) == ("two: one misses", "misfit", ("advance",))
+    dataset = xr.Dataset(attrs=note_attributes([note, again]))
+    assert dataset.attrs["warnings"] == "one misses\ntwo: one misses"
+    assert [found.to_dict() for found in notes_in(dataset.attrs)] == [note.to_dict(), again.to_dict()]
+    assert [found.code for found in notes_in({"warnings": "of an earlier version"})] == ["remark"]
+
+
+def test_the_weightiest_cautions_take_three_rows() -> None:
+    notes = [
+        Note("misfit", "m" * 60),
+        Note("interpolated", "i"),
+        Note("walls-left-out", "w" * 150),
+        Note("misfit", "n"),
+    ]
+    assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "misfit"]
+    assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
