@@ -175,6 +175,11 @@ class BodyFinder:
         pixels, normals, _, _ = self.contour.places(pose, self.optics)
         return pixels[self._on_seal], normals[self._on_seal]
 
+    def profiles(self, image: np.ndarray, pose: BodyPose) -> Samples:
+        """Brightness across each edge of a body at a pose, of 255, (n, m); NaN out of view."""
+        pixels, normals, _, _ = self.contour.places(pose, self.optics)
+        return self._profiles(self._part(image, pose), pixels, normals)
+
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
         """Squared gradient of each edge's template along its normal, and weights of the edges.
 

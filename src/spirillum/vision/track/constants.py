@@ -171,23 +171,6 @@ class SealConstants:
 
 
 @dataclass(frozen=True)
-class CueConstants:
-    """Agreement of the cues to where the body is (`cues`)."""
-
-    fewest: int = 5
-    """Fewest edges of a cue on a frame."""
-    frames: int = 8
-    """Fewest frames with outline and seal from which is told whether they move alike."""
-    apart: float = 0.4
-    """Standard error of the way from the first frame to the last by cues that disagree that is flagged, pixels."""
-    colour_drift: float = 0.1
-    """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
-    of this way.
-
-    Compression lets colours lag by this much: of nine path traced films, at most 0.22 pixels were seen."""
-
-
-@dataclass(frozen=True)
 class FirstLookConstants:
     """Whether the robot is in the video, and where (`first_look`)."""
 
@@ -348,36 +331,6 @@ class SteadinessConstants:
     """Shift of the picture alone from which on the camera has moved, pixels.
 
     At rest within 1 on rendered films, also under a drifting lamp."""
-
-
-@dataclass(frozen=True)
-class AppearanceConstants:
-    """Whether the body's cover is opaque or glass (`appearance`)."""
-
-    places: int = 60
-    """Places along the axis between the seal and the nose."""
-    lines: int = 61
-    """Lines along the axis, from one side to the other."""
-    reach: float = 1.45
-    """Outermost line, over the body's radius."""
-    core: float = 0.35
-    """Outermost line of the middle of the cover, over the body's radius."""
-    beyond: float = 1.25
-    """Innermost line of the background, over the body's radius."""
-    rim: float = 0.22
-    """Distance from the outline within which a rim is looked for, over the body's radius."""
-    fewest: int = 3
-    """Fewest pictures with all of the cover in view."""
-    least: float = 20.0
-    """Least difference of brightness that tells anything, of 255."""
-    uneven: float = 0.5
-    """Change of the brightness along the axis over that from the middle to the background from which on contents show.
-
-    On path-traced videos it was 0.1 and less on paint and a liner, more than 1 where a battery lies inside."""
-    bright_rim: float = 0.12
-    """Brightness of the rim beyond that of middle and background, over their difference, of glass before a liner.
-
-    It was 0.15 and more on path-traced videos of glass, below 0.02 on paint."""
 
 
 @dataclass(frozen=True)
@@ -846,54 +799,10 @@ class FollowingConstants:
     """Share of the edges that fit at another place, over that where it was followed, from which on it is there."""
 
 
-@dataclass(frozen=True)
-class GlareConstants:
-    """Glare that stands still on the robot's way (`glare`)."""
-
-    share: float = 0.9
-    """Share of the frames on which a spot has to be white."""
-    covered: float = 0.95
-    """Share of the body's diameter that surely hides what is behind it."""
-    least: float = 0.005
-    """Least size of its part on the way, over what body and coupling cover."""
-    most: float = 1.0
-    """Largest size of it all, over that: what is larger is an overexposed background."""
-    rim: float = 0.4
-    """Width of its rim, over the radius of a disk as large as the spot."""
-    across: float = 0.5
-    """Least sine of the angle between an edge and the way of the robot, of edges that tell how far it has moved."""
-    passes: float = 2.0
-    """Least change of the distance of such an edge from a spot, within its rim, pixels."""
-    fewest: int = 3
-    """Fewest edge points of which this is true."""
-    drift: float = 0.08
-    """Standard error of the way from the first frame to the last, pixels."""
-    beside: tuple[float, float] = (0.6, 0.85)
-    """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
-    lines: int = 5
-    """Lines along the way between these distances."""
-    veil_width: float = 0.3
-    """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
-    veil_step: float = 30.0
-    """Least step of the brightness at the edge of a mirrored lamp, of 255.
-
-    On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
-    sharp: float = 0.4
-    """Least share of the step within four pixels on either side of it."""
-    slant: int = 8
-    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
-    in_view: float = 0.5
-    """Least share of the way that has to be in the picture."""
-    veil_drift: float = 0.5
-    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
-
-
-APPEARANCE = AppearanceConstants()
 SEARCH = SearchConstants()
 CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()
 SEAL = SealConstants()
-CUES = CueConstants()
 FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
@@ -915,4 +824,3 @@ DIRECTION = DirectionConstants()
 SWAY = SwayConstants()
 VISIBILITY = VisibilityConstants()
 FOLLOWING = FollowingConstants()
-GLARE = GlareConstants()

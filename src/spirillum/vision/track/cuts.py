@@ -79,7 +79,7 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
         + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
         "without it (start and end of the setup)"
     )
-    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else ())
+    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else (), frame)
     place, body, phase = (abs(hop.size) if hop else 0.0 for hop in hops)
     return Hops(place, body, phase, (flag,))
 
