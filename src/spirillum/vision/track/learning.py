@@ -271,7 +271,7 @@ class InitialDetection(NamedTuple):
     def flags(self) -> tuple[Flag, ...]:
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
-        doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0]
+        doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0] or not known.robot
         wire = known.wire.flags_beside(doubtful=doubtful)
         return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 
