@@ -287,6 +287,14 @@ class ScoutingConstants:
     """Step at a wall over the usual one."""
     off_axis: float = 0.35
     """Largest distance of the robot from the middle between two walls, twice, over the body's diameter."""
+    changing_width: int = 640
+    """Largest width of the reduced pictures in which is looked whether anything moves, pixels."""
+    changing: float = 6.0
+    """Difference from the static background over its noise from which on a pixel changes."""
+    changing_least: float = 6.0
+    """Least such difference, of 255."""
+    changing_share: float = 1e-4
+    """Least share of the pixels of all frames that change where something moves."""
 
 
 @dataclass(frozen=True)

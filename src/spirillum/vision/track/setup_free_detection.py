@@ -8,6 +8,7 @@ that the search for the robot corrects. Finding and learning are those of every 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from itertools import permutations
 from typing import NamedTuple
 
@@ -15,7 +16,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
 from spirillum.vision.camera.ruler import Lines
@@ -110,7 +113,7 @@ def scouted(
     _check_no_noise(stills.at(1), video)
     tell("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
-    guesses = _guesses(robot, video.size, lines, spacing)
+    guesses = _guesses(robot, video.size, lines, spacing)[: None if stills.changes else 1]
     looks = 2 * len(guesses) * len(directions)
     tell("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
@@ -145,6 +148,17 @@ class _Stills:
     def __init__(self, frames: list[Frame]) -> None:
         self.frames = frames
         self._at: dict[int, Samples] = {}
+
+    @cached_property
+    def changes(self) -> bool:
+        """Whether anything moves, in pictures at most 640 pixels wide: an empty tube shows noise alone."""
+        cv2 = import_optional("cv2", "measuring a video", "video")
+        factor = -(-max(self.frames[0].image.shape) // SCOUTING.changing_width)
+        stack = np.array([frame.reduced(factor).mean(axis=2, dtype=np.float32) for frame in self.frames])
+        stack = np.array([cv2.GaussianBlur(grey, (0, 0), 1.0) for grey in stack])
+        off = np.abs(stack - np.median(stack, axis=0))
+        least = max(SCOUTING.changing * float(mad_scale(off)), SCOUTING.changing_least)
+        return bool(np.mean(off > least) > SCOUTING.changing_share)
 
     def at(self, factor: int) -> Samples:
         """The background reduced by a factor."""
@@ -205,7 +219,7 @@ def _found_at(
     guess: tuple[float, Lines | None, tuple[str, ...]],
     stills: _Stills,
 ) -> Iterator[tuple[str, Identified | None]]:
-    """Looks for the robot near a guessed scale, in each direction of its nose; then at half to twice of it."""
+    """Look for the robot near a guessed scale, in each direction; then at half to twice of it, if anything moves."""
     finders = {}
     pixel, lines, directions = guess
     for direction in directions:
@@ -215,7 +229,7 @@ def _found_at(
             optics = optics.moved({"rotation": first_rotation(optics, lines)})
         finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
     most = reduction(video.size)
-    for sized in (False, True):
+    for sized in (False, True) if stills.changes else (False,):
         for direction, (setup, finder) in finders.items():
             factor = searched_at(finder.shape().width, most)
             images, still = [frame.reduced(factor) for frame in stills.frames], stills.at(factor)
