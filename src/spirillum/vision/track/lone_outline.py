@@ -44,6 +44,10 @@ class AppearanceConstants:
     """Fewest pictures with all of the cover in view."""
     least: float = 20.0
     """Least difference of brightness that tells anything, of 255."""
+    white: float = 228.0
+    """Brightness of glare, of 255."""
+    glare: float = 0.005
+    """Share of the cover under glare from which on nothing is said."""
     uneven: float = 0.5
     """Change of the brightness along the axis over that from the middle to the background from which on contents show.
 
@@ -78,9 +82,10 @@ def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarr
     if len(grey) < APPEARANCE.fewest:
         return "unknown"
     straight = along < half - radius
-    if not straight.any():
-        return "unknown"
     share = np.abs(across) / radius
+    glare = np.mean(grey[:, :, share < 1.0] > APPEARANCE.white)  # a highlight looks like contents
+    if not straight.any() or glare > APPEARANCE.glare:
+        return "unknown"
     across_it = np.median(grey[:, straight], axis=(0, 1))
     along_it = np.median(grey[:, :, share < APPEARANCE.core], axis=(0, 2))
     core, outside = np.median(across_it[share < APPEARANCE.core]), np.median(across_it[share > APPEARANCE.beyond])
