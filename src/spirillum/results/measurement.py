@@ -25,8 +25,7 @@ from spirillum.measurement.measure import (
     measured_trial,
     measurement_of,
 )
-from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_of, series_of
+from spirillum.measurement.series import movement_of, observation_rows, series_of
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page

@@ -8,6 +8,7 @@ while and then find it. Neither stripes nor tail can be read meanwhile, as they 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,25 +22,57 @@ from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import ELSEWHERE, IDENTITY, LOST_FRAMES, STRIPES, SWAY
+from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cues import CUES, Agreement, agreement_of
-from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
+from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection
 from spirillum.vision.track.lone_outline import OutlineCheck
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import picture_steps
 from spirillum.vision.track.size import LENGTHS, checked_scale
-from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
-from spirillum.vision.track.track import Track
+from spirillum.vision.track.track import RobotMotion, Track
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Video
+
+
+@dataclass(frozen=True)
+class SwayConstants:
+    """A camera that swayed."""
+
+    window: int = 7
+    """Frames before and after a moment whose medians are compared."""
+    jump: float = 1.5
+    """Step of the robot against the background from which on pictures were not moved back well, pixels.
+
+    A ruler's lines are at least three pixels apart, by which a wrong registration is off."""
+    lateral: tuple[str, ...] = ("lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
+    """Quantities that are not given then either."""
+
+
+SWAY = SwayConstants()
+
+
+@dataclass(frozen=True)
+class ElsewhereConstants:
+    """Frames on which something else than the robot was followed."""
+
+    fewest: int = 12
+    """Fewest frames on which stripes or tail are read."""
+    shortest: int = 3
+    """Fewest frames in a row without them."""
+    beside: int = 5
+    """Frames to both sides of a jump whose medians are compared."""
+    jump: float = 0.15
+    """Jump of the place over the body's length."""
+
+
+ELSEWHERE = ElsewhereConstants()
 
 
 class Swayed(NamedTuple):

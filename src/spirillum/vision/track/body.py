@@ -17,7 +17,7 @@ from spirillum.vision.track.constants import OUTLINE, SEAL
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
 from spirillum.vision.track.cues import cue_shifts
 from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
-from spirillum.vision.track.shape import Shape
+from spirillum.vision.track.search import Shape
 
 
 class Placed(NamedTuple):
