@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 
 import spirillum as sp
-from spirillum.vision.track import constants
+from spirillum.vision.track import colours, constants, contour, cuts, search, steadiness, steps
 
 QUANTITIES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+MODULES = (constants, search, contour, steps, colours, steadiness, cuts)
+"""Of the tracker, each with the constants of its stages."""
 STAGES = ("SEARCH", "CONTOUR", "OUTLINE", "FIRST_LOOK", "FOLLOWING", "COLOURS", "STRIPES", "TAIL", "UNWRAPPING")
 WARNINGS = ("SIZE", "IDENTITY", "STEADINESS", "CUTS", "VISIBILITY")
 """Stages whose constants decide on warnings, not on numbers."""
@@ -126,7 +128,7 @@ def main() -> None:
         print(f"| all as they are | | | {cells(usual)} |", flush=True)
         unchanged, skipped = [], []
         for stage_name in stages:
-            stage = getattr(constants, stage_name)
+            stage = next(getattr(module, stage_name) for module in MODULES if hasattr(module, stage_name))
             for field in fields(stage):
                 name, value, listed = f"`{stage_name}.{field.name}`", getattr(stage, field.name), False
                 for factor, shown in ((0.5, "½"), (2.0, "2")):

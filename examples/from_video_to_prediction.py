@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import spirillum as sp
-from spirillum.measurement.joining import join_observations
+from spirillum.measurement.observations import join_observations
 
 TRUE_DRAG, TRUE_ROTATION = 2.4, 0.8
 TAILS = ((15, 2.0), (25, 2.5))

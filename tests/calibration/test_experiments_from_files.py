@@ -103,7 +103,7 @@ def test_a_byte_order_mark_does_not_make_synthetic_data_measured(made: Callable[
 
 
 def test_what_was_derived_is_not_counted_as_measured(tmp_path: Path) -> None:
-    from spirillum.measurement.template import observations_answer
+    from spirillum.measurement.observations import observations_answer
 
     path = tmp_path / "o.csv"
     lines = ["channel_diameter_mm,wavelength_mm,amplitude_mm,trial,tail_rate_Hz,body_rate_Hz,motor_rate_Hz"]

@@ -10,9 +10,7 @@ from spirillum.dynamics.timing import read_duty
 from spirillum.dynamics.tube_options import read_flow
 from spirillum.files import csv_rows
 from spirillum.files.numbers import number_in
-from spirillum.measurement.joining import join_observations
-from spirillum.measurement.observations import read_observations
-from spirillum.measurement.template import observations_answer
+from spirillum.measurement.observations import join_observations, observations_answer, read_observations
 from spirillum.robot.load import load
 
 PLAIN = """\

@@ -15,8 +15,7 @@ from spirillum.measurement.clicks import (
     stripe_names,
     stripes_in_order,
 )
-from spirillum.measurement.setup_fields import setup_fields, setup_file, setup_problems
-from spirillum.measurement.setup_template import setup_text, toml_value
+from spirillum.measurement.setup_template import setup_fields, setup_file, setup_problems, setup_text, toml_value
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.vision.camera.ruler import lines_in
 

@@ -15,8 +15,7 @@ from spirillum.files import write_dataset
 from spirillum.formats.labelled import Labelled
 from spirillum.measurement.measure import Measurement
 from spirillum.measurement.observations import read_observations
-from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_of, series_of
+from spirillum.measurement.series import movement_of, observation_rows, series_of
 from spirillum.measurement.trials import trial_of
 from spirillum.results.measurement import measure
 from spirillum.vision.flag import Flag

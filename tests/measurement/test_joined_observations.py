@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.measurement.joining import join_observations
-from spirillum.measurement.observations import read_observations
+from spirillum.measurement.observations import join_observations, read_observations
 
 HEADER = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz"
 

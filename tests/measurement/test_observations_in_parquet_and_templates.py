@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from spirillum import InputError
-from spirillum.measurement.observations import COLUMNS, read_observations
-from spirillum.measurement.template import new_observations_file, observations_answer
+from spirillum.measurement.observations import COLUMNS, new_observations_file, observations_answer, read_observations
 
 ROWS: list[dict[str, Any]] = [
     {"channel_diameter_mm": 40, "wavelength_mm": 25.0, "amplitude_mm": 2.5, "trial": 1, "tail_rate_Hz": 1.2},

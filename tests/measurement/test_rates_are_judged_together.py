@@ -7,8 +7,7 @@ import pytest
 
 from spirillum import InputError
 from spirillum.calibration.experiment import read_experiment
-from spirillum.measurement.observations import read_observations
-from spirillum.measurement.template import observations_answer
+from spirillum.measurement.observations import observations_answer, read_observations
 from spirillum.robot.load import load
 
 HEADER = "channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,body_rate_Hz,motor_rate_Hz"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.measurement.lead import without_lead
+from spirillum.measurement.outliers import without_lead
 from spirillum.measurement.trials import trial_of
 from spirillum.view.figures.measurement import trial_figure
 from spirillum.vision.track.track import Track

@@ -66,7 +66,7 @@ def test_a_track_that_cannot_be_compared_is_flagged(scene: Scene, monkeypatch: p
     def none(*_: object) -> None:
         raise InputError("no robot")
 
-    monkeypatch.setattr("spirillum.measurement.track_check.learnt_from", none)
+    monkeypatch.setattr("spirillum.measurement.imported.learnt_from", none)
     (trial,) = measure(scene.film, scene.setup, track=scene.table(lambda places: 0.2 * places)).trials
     assert "track-not-checked" in [flag.name for flag in trial.flags]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from spirillum.measurement.lead import without_lead
 from spirillum.measurement.measure import compared, summary_of
-from spirillum.measurement.rows import observation_rows
+from spirillum.measurement.outliers import without_lead
+from spirillum.measurement.series import observation_rows
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, Trial, trial_of
 from spirillum.units import Hz
 from spirillum.vision.flag import Flag

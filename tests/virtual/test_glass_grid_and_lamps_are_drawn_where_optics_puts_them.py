@@ -155,7 +155,7 @@ def test_the_truth_is_that_of_the_same_robot(tmp_path) -> None:
     stated = told[1].pop("troubles")
     assert stated == told[0].pop("troubles") | {"glass_cover": True, "grid_paper": True, "mirrored_lamps": 2}
     assert told[0] == told[1]
-    assert setups[0] == setups[1]
+    assert setups[0] == setups[1].replace('appearance = "glass"', 'appearance = "opaque"')
     assert len(pictures[0]) == len(pictures[1]) == 3
     assert all(one != other for one, other in zip(*pictures, strict=True))
 

@@ -9,7 +9,7 @@ from spirillum.errors import InputError
 from spirillum.measurement.setup_template import setup_text
 from spirillum.vision.camera.optics import BodyPose, optics_of
 from spirillum.vision.setup import Setup, load_setup
-from spirillum.vision.track.setup_free_detection import appearance_of
+from spirillum.vision.track.lone_outline import appearance_of
 
 
 def test_unset_it_is_unknown_and_the_template_offers_it(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.vision.camera.checkerboard import lens_of
+from spirillum.vision.camera.scale import lens_of
 from spirillum.vision.setup import Checkerboard
 
 cv2 = pytest.importorskip("cv2")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
-from spirillum.vision.track.motion import RobotMotion
+from spirillum.vision.track.track import RobotMotion
 
 PIXEL = 2.5e-4
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.vision.camera.checkerboard import lens_of
+from spirillum.vision.camera.scale import lens_of
 from spirillum.vision.setup import Checkerboard
 from spirillum.vision.video.frames import FILMS, open_video
 from spirillum.vision.video.pictures import IMAGES

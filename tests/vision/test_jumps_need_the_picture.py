@@ -5,8 +5,8 @@ import pytest
 
 from spirillum.vision.track.cuts import cuts_in, hops_in
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import PictureChange, PictureSteps, picture_steps
+from spirillum.vision.track.track import RobotMotion
 
 pytest.importorskip("cv2")
 PIXEL = 2.5e-4

@@ -6,8 +6,8 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.vision.track import identity
-from spirillum.vision.track.motion import RobotMotion
-from spirillum.vision.track.standing import stands_flag
+from spirillum.vision.track.cuts import stands_flag
+from spirillum.vision.track.track import RobotMotion
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

@@ -7,7 +7,7 @@ from spirillum.fluid.resistance import resistance
 from spirillum.robot.load import load
 from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.track.motion import RobotMotion
+from spirillum.vision.track.track import RobotMotion
 from spirillum.vision.track.unwrapping import _largest_advance, contradictions, no_stripe_passes, unwrapped
 
 FPS = 30.0

@@ -21,7 +21,7 @@ def new(
 
     Example: `spirillum observations new observations.csv`
     """
-    from spirillum.measurement.template import new_observations_file
+    from spirillum.measurement.observations import new_observations_file
 
     new_observations_file(file, overwrite=force)
     typer.echo(f"{file}: columns and their units are explained in its comments")
@@ -37,7 +37,7 @@ def check(
     Example: `spirillum observations check observations.csv`
     """
     from spirillum.cli import renderer
-    from spirillum.measurement.template import observations_answer
+    from spirillum.measurement.observations import observations_answer
 
     renderer.show(observations_answer(file), json=json)
 
@@ -51,7 +51,7 @@ def join(
 
     Example: `spirillum observations join measured/*/observations.csv -o all.csv`
     """
-    from spirillum.measurement.joining import join_observations
+    from spirillum.measurement.observations import join_observations
 
     rows = join_observations(files, output)
     typer.echo(f"{output}: {rows} rows of {len(files)} files")

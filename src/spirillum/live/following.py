@@ -13,13 +13,13 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.live.observation import Observation
-from spirillum.live.windows import Window, periodic_error
+from spirillum.live.windows import CausalAngle, Window, periodic_error
 from spirillum.measurement.flags import SYNTHETIC, says_synthetic
-from spirillum.measurement.statistics import NORMAL
-from spirillum.measurement.systematic import (
+from spirillum.measurement.statistics import (
     DRIFT_ANGLE,
     DRIFT_BARE,
     DRIFT_PIXELS,
+    NORMAL,
     PHASE_ERROR,
     PIXEL_ERROR,
     STRIPE_ERROR,
@@ -31,15 +31,14 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
 from spirillum.vision.track.body import Placed
-from spirillum.vision.track.causal_angle import CausalAngle
 from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.direction import along_its_way
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.track.learning import InitialDetection
-from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
 from spirillum.vision.track.steps import FrameTracker
+from spirillum.vision.track.track import RobotMotion
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened

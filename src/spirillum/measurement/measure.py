@@ -14,7 +14,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import checked_path, file_name
-from spirillum.measurement.imported import read_track
+from spirillum.measurement.imported import check_track, read_track
 from spirillum.measurement.marks import (
     Marks,
     check_pixels,
@@ -27,7 +27,6 @@ from spirillum.measurement.marks import (
 from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
 from spirillum.measurement.setup_template import setup_remarks
 from spirillum.measurement.statistics import NORMAL, mean_with_interval
-from spirillum.measurement.track_check import check_track
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
 from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.notes import Note

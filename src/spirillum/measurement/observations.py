@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from spirillum.envelope import envelope
 from spirillum.errors import InputError
+from spirillum.files import MARK, new_file, output_target, protected, whole_file
 from spirillum.files.numbers import number_in
 from spirillum.formats.tables import Table, TableRow, check_known, check_present, read_table
-from spirillum.measurement.rate_checks import RateTriples, check_motor_rates, first_of, rows_in_words, wrong_signs
+from spirillum.measurement.rate_checks import (
+    RateTriples,
+    check_motor_rates,
+    convention_doubt,
+    first_of,
+    rows_in_words,
+    wrong_signs,
+)
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
@@ -254,3 +266,81 @@ def _observed(items: Sequence[ObservationRow]) -> RobotObservations:
             *(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True))
         )
     return RobotObservations(*(mean_with_interval(column) for column in columns))
+
+
+_TABLES = {".csv": "an observations file"}
+
+
+def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
+    """Write the rows of several observation files to one, with all their comments.
+
+    Returns:
+        Number of rows.
+    """
+    paths = [Path(file) for file in files]
+    if len(paths) < 2:
+        raise InputError(f"{len(paths)} file of observations; allowed: two or more to join")
+    with protected(*paths):
+        target = output_target(output, _TABLES, "observations.csv")
+    rows: list[dict[str, str]] = []
+    comments: list[str] = []
+    for path in paths:
+        read_observations(path)
+        table = observation_table(path)
+        comments += [line for line in table.comments if line not in comments]
+        rows += [dict(zip(row.header, row.cells, strict=True)) for row in table.rows()]
+    names = dict.fromkeys([*COLUMNS, *(name for row in rows for name in row if name)])
+    used = [name for name in names if any(row.get(name) for row in rows)]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with protected(*paths), whole_file(target) as temporary:
+        own = [] if any(MARK in line for line in comments) else [f"# joined, {MARK}"]
+        temporary.write_text("".join(f"{line}\n" for line in (*comments, *own)) + text.getvalue(), encoding="utf-8")
+        try:
+            read_observations(temporary)
+        except InputError as error:
+            raise InputError(str(error).replace(str(temporary), "the joined file")) from error
+    return len(rows)
+
+
+_TEMPLATE = """\
+# Observed speeds and rates, one row for each trial. Lines that start with # are comments.
+# robot: its name, for people. The channel, wavelength and amplitude of the tail say which robot a row belongs to.
+# channel_diameter_mm, wavelength_mm, amplitude_mm: needed. amplitude is the radius of the wire's centreline.
+# trial: its number; a trial of a tail stands once.
+# forward_velocity_mm_s, tail_rate_Hz, body_rate_Hz, motor_rate_Hz: what was measured; leave empty what was not.
+#   All are signed about the swimming direction, in the lab; 1 Hz is one turn a second. A right-handed tail drives
+#   with a positive rate, the body turns against it, and the motor's rate is the tail's less the body's.
+# trials: only for a row that is a mean over that many trials.
+# the columns *_ci95: half widths of 95 % intervals, where known: the error of this trial, or of the mean.
+# Further columns, such as note, are yours; they are not read.
+"""
+
+
+def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
+    """Write an empty observations file: comments and the header."""
+    target = output_target(path, {".csv": "an observations file"}, "observations.csv", replace="none")
+    new_file(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n", overwrite=overwrite)
+
+
+def observations_answer(path: str | Path) -> dict[str, Any]:
+    """The answer of `spirillum observations check`."""
+    items = read_observations(path)
+    names = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
+    content = {
+        "file": str(path),
+        "valid": True,
+        "rows": len(items),
+        "tails": len({item.tail for item in items}),
+        "channels": len({item.tail[0] for item in items}),
+        "measured": {name: sum(_measured(item, name) for item in items) for name in names},
+    }
+    doubts = convention_doubt(all_rates(items))
+    return envelope("observations", content, (*unread_columns(observation_table(path)), *doubts))
+
+
+def _measured(item: ObservationRow, name: str) -> bool:
+    """Whether a row holds a quantity itself: a motor rate may be tail less body rate."""
+    return math.isfinite(getattr(item, name)) and not (name == "motor_rate" and item.motor_derived)

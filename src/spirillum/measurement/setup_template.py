@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.envelope import envelope, quantity
-from spirillum.files import new_file, output_target
+from spirillum.files import new_file, output_target, parse_toml
 from spirillum.measurement.depth import depth_shares
 from spirillum.notes import Note
 from spirillum.robot.fields import field_values
+from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import opened, samples_of
 from spirillum.vision.flag import Flag
-from spirillum.vision.setup import Setup, load_setup
+from spirillum.vision.setup import WHAT, Setup, load_setup
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
@@ -216,3 +217,42 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
         "tail_readable": known.wire.readable,
     }
     return seen, (*video.flags, *learnt.sight.flags, *size_flags, *learnt.flags, *moved)
+
+
+Fields = Mapping[str, Any]
+"""Texts with their unit, numbers and lists of names by dotted field."""
+
+
+def setup_file(fields: Fields) -> str:
+    """The text of a setup file."""
+    return setup_text({name: (toml_value(value), "") for name, value in fields.items()})
+
+
+def setup_problems(fields: Fields) -> list[str]:
+    """What is missing in a setup or wrong, each in a sentence that names its field; empty where nothing is."""
+    tables: dict[str, Any] = {}
+    for path, value in fields.items():
+        *above, name = path.split(".")
+        table = tables
+        for part in above:
+            table = table.setdefault(part, {})
+        table[name] = value
+    for name in ("camera", "markers", "robot"):
+        tables.setdefault(name, {})
+    found = problems_in(Setup, tables)
+    return found if isinstance(found, list) else []
+
+
+def setup_fields(text: str, source: str) -> dict[str, Any]:
+    """The fields that the text of a setup file gives, as it gives them."""
+    found: dict[str, Any] = {}
+
+    def walk(table: Mapping[str, Any], above: str) -> None:
+        for name, value in table.items():
+            if isinstance(value, Mapping):
+                walk(value, f"{above}{name}.")
+            else:
+                found[above + name] = value
+
+    walk(parse_toml(text, source, WHAT), "")
+    return found

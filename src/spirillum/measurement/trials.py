@@ -11,19 +11,17 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.envelope import quantity
-from spirillum.measurement.elongation import elongation_of
-from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
-from spirillum.measurement.lead import without_lead
-from spirillum.measurement.outliers import outlying_frames
+from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, elongation_of, flags_of
+from spirillum.measurement.outliers import outlying_frames, without_lead
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
-from spirillum.measurement.statistics import NORMAL
-from spirillum.measurement.systematic import (
+from spirillum.measurement.statistics import (
     AMPLITUDE_ERROR,
     DRIFT_ANGLE,
     DRIFT_BARE,
     DRIFT_PIXELS,
     HEADING_ERROR,
     LONG,
+    NORMAL,
     PHASE_ERROR,
     PIXEL_ERROR,
     POSITION_ERROR,

@@ -54,7 +54,7 @@ class SetupEditor:
     def add_text(self, text: str) -> None:
         """Take a setup file, or a robot file."""
         from spirillum.files import parse_toml
-        from spirillum.measurement.setup_fields import setup_fields
+        from spirillum.measurement.setup_template import setup_fields
 
         table = parse_toml(text, "the file", "a setup file or a robot file (TOML)")
         if "camera" in table or "markers" in table:
@@ -85,7 +85,7 @@ class SetupEditor:
 
     def setup_text(self) -> str:
         """The setup file as it stands."""
-        from spirillum.measurement.setup_fields import setup_file
+        from spirillum.measurement.setup_template import setup_file
 
         with self._lock:
             return setup_file(self._fields)
@@ -105,8 +105,7 @@ class SetupEditor:
 
     def checked(self) -> dict[str, Any]:
         """What is wrong in the setup, or what its uncertain heights do to lengths."""
-        from spirillum.measurement.setup_fields import setup_problems
-        from spirillum.measurement.setup_template import setup_answer
+        from spirillum.measurement.setup_template import setup_answer, setup_problems
 
         problems = setup_problems(self._fields)
         if problems:

@@ -25,15 +25,15 @@ from spirillum.measurement.measure import (
     measured_trial,
     measurement_of,
 )
-from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_of, series_of
+from spirillum.measurement.series import movement_of, observation_rows, series_of
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
 from spirillum.version import versions
-from spirillum.view.annotate import annotated_film
+from spirillum.view.annotate import annotated_film, frame_of_film
 from spirillum.view.figures.measurement import measurement_figures
 from spirillum.vision.camera.camera import opened
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 
@@ -98,8 +98,14 @@ def _trial_section(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Ma
         "rows": _rows(trial.quantities),
         "flags": trial.flags,
         "thumbnail": data_uri(data, "jpeg") if data else "",
+        "shown": "A frame" if (flag := _flag_with_frame(trial)) is None else f"Frame {flag.frame} ({flag.name})",
         "pictures": [picture for picture in pictures if picture.name == f"series-{trial.name}"],
     }
+
+
+def _flag_with_frame(trial: Trial) -> Flag | None:
+    """The first flag that names a frame; the report shows that one."""
+    return next((flag for flag in trial.flags if flag.frame is not None), None)
 
 
 def _aliasing(measurement: Measurement) -> str:
@@ -270,6 +276,8 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
     film = partial(annotated_film, robot=asked.robot, words=words, period=period, waiting=video.waiting)
     with whole_file(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
         trial = measured_trial(asked, number, video, progress=tell, on_frame=on_frame)
+    if (flag := _flag_with_frame(trial)) is not None and flag.frame is not None:
+        folder.thumbnails[name] = frame_of_film(target, flag.frame) or folder.thumbnails.get(name, b"")
     folder.files.append(target.name)
     return trial
 

@@ -275,6 +275,16 @@ def annotated_film(
         thumbnail(_jpeg(kept[0]))
 
 
+def frame_of_film(path: Path, place: int) -> bytes:
+    """A frame of an annotated film as JPEG, by its order from 0; empty where there is none."""
+    av = import_optional("av", "an annotated video", "video")
+    with av.open(str(path)) as film:
+        for number, frame in enumerate(film.decode(video=0)):
+            if number == place:
+                return _jpeg(frame.to_ndarray(format="rgb24"))
+    return b""
+
+
 def _jpeg(picture: np.ndarray) -> bytes:
     cv2 = import_optional("cv2", "an annotated video", "video")
     good, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])

@@ -279,8 +279,9 @@ def render(
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
     attributes = {"title": tags["title"], "synthetic": "yes", "robot": robot.name}
     truth = truth_dataset(trajectory, kept / camera.fps, kept, attributes)
+    timed, glass = target.suffix == ".mp4", troubles.glass_cover
     texts = {
-        "setup": setup_text(robot_file, camera, lens, tank.spacing, axis, timed=target.suffix == ".mp4"),
+        "setup": setup_text(robot_file, camera, lens, tank.spacing, axis, timed=timed, glass=glass),
         "json": truth_text(written.rates, _facts(written, camera, degradation, troubles, lens)),
     }
     if robot_file != robot.name:

@@ -33,7 +33,14 @@ def _mm(value: float) -> str:
 
 
 def setup_text(
-    robot_file: str, camera: CameraOptions, lens: VirtualLens, spacing: float, axis: tuple[float, float], *, timed: bool
+    robot_file: str,
+    camera: CameraOptions,
+    lens: VirtualLens,
+    spacing: float,
+    axis: tuple[float, float],
+    *,
+    timed: bool,
+    glass: bool = False,
 ) -> str:
     """A setup file.
 
@@ -44,6 +51,7 @@ def setup_text(
         spacing: of the ruler's lines, m.
         axis: stated height of the robot's axis and its standard uncertainty, m.
         timed: whether the video has times of its own; the pictures of a folder have none.
+        glass: whether the body's cover is of glass.
     """
     height, uncertainty = axis
     lines = [
@@ -66,6 +74,7 @@ def setup_text(
         f"axis_height = {_mm(height)}",
         *([f"axis_height_uncertainty = {_mm(uncertainty)}"] if uncertainty > 0 else []),
         f'direction = "{camera.direction}"',
+        f'appearance = "{"glass" if glass else "opaque"}"',
     ]
     return "\n".join(lines) + "\n"
 

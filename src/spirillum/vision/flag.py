@@ -17,6 +17,8 @@ class Flag:
     """One sentence for people: what was seen, when, and what follows for the numbers."""
     spoils: tuple[str, ...] = ()
     """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
+    frame: int | None = None
+    """Order among the measured frames, from 0, of the one that shows it best; None where no single one does."""
 
     @property
     def note(self) -> Note:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
-from spirillum.measurement.lead import LEADING
+from spirillum.measurement.outliers import LEADING
 from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.quantities import unit_of

@@ -19,7 +19,7 @@ from spirillum.view.scene3d.camera import SceneCamera, View
 from spirillum.view.scene3d.glass import add_glass, ruler_steps
 from spirillum.view.scene3d.window import new_plotter
 
-_ALONG, _ACROSS = 160, 49
+_ALONG, _AROUND = 160, 49
 _HALF_ANGLE = 0.9
 _DARKEST = 0.5
 _REACH = 0.30
@@ -69,13 +69,13 @@ def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: flo
     radius = 0.5 * robot.channel.diameter
     reach = 0.5 * robot.body.length + 0.5 * radius
     x = np.linspace(-reach - robot.coupling.length, reach, _ALONG)
-    angle = np.linspace(-_HALF_ANGLE, _HALF_ANGLE, _ACROSS)
+    angle = np.linspace(-_HALF_ANGLE, _HALF_ANGLE, _AROUND)
     along, around = np.meshgrid(x, angle, indexing="ij")
     near = 0.9985 * radius
     points = np.stack([along, near * np.sin(around), -near * np.cos(around)], axis=-1).reshape(-1, 3) / unit
-    i, j = (index.ravel() for index in np.meshgrid(np.arange(_ALONG - 1), np.arange(_ACROSS - 1), indexing="ij"))
-    corner = i * _ACROSS + j
-    faces = np.stack([np.full(i.size, 4), corner, corner + 1, corner + _ACROSS + 1, corner + _ACROSS], axis=-1)
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(_ALONG - 1), np.arange(_AROUND - 1), indexing="ij"))
+    corner = i * _AROUND + j
+    faces = np.stack([np.full(i.size, 4), corner, corner + 1, corner + _AROUND + 1, corner + _AROUND], axis=-1)
     mesh = pyvista.PolyData(points, faces.ravel())
     colour = np.zeros((len(points), 4), dtype=np.uint8)
     colour[:, :3] = (28, 48, 62)

@@ -9,10 +9,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.vision.camera.checkerboard import lens_of
 from spirillum.vision.camera.optics import DIRECTIONS
 from spirillum.vision.camera.ruler import Lines, resolved, ruler_in, still_picture
-from spirillum.vision.camera.scale import CalibratedCamera, fitted_camera, given_camera
+from spirillum.vision.camera.scale import CalibratedCamera, fitted_camera, given_camera, lens_of
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Frame, Video, open_video
 from spirillum.vision.video.pictures import reduction

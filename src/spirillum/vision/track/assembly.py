@@ -8,6 +8,7 @@ while and then find it. Neither stripes nor tail can be read meanwhile, as they 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,24 +22,57 @@ from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import CUES, ELSEWHERE, IDENTITY, LOST_FRAMES, STRIPES, SWAY
+from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.cues import Agreement, agreement_of
-from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_still
+from spirillum.vision.track.cues import CUES, Agreement, agreement_of
+from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection
+from spirillum.vision.track.lone_outline import OutlineCheck
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.motion import RobotMotion
 from spirillum.vision.track.picture_change import picture_steps
 from spirillum.vision.track.size import LENGTHS, checked_scale
-from spirillum.vision.track.standing import stands_flag
 from spirillum.vision.track.steps import Record
-from spirillum.vision.track.track import Track
+from spirillum.vision.track.track import RobotMotion, Track
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Video
+
+
+@dataclass(frozen=True)
+class SwayConstants:
+    """A camera that swayed."""
+
+    window: int = 7
+    """Frames before and after a moment whose medians are compared."""
+    jump: float = 1.5
+    """Step of the robot against the background from which on pictures were not moved back well, pixels.
+
+    A ruler's lines are at least three pixels apart, by which a wrong registration is off."""
+    lateral: tuple[str, ...] = ("lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
+    """Quantities that are not given then either."""
+
+
+SWAY = SwayConstants()
+
+
+@dataclass(frozen=True)
+class ElsewhereConstants:
+    """Frames on which something else than the robot was followed."""
+
+    fewest: int = 12
+    """Fewest frames on which stripes or tail are read."""
+    shortest: int = 3
+    """Fewest frames in a row without them."""
+    beside: int = 5
+    """Frames to both sides of a jump whose medians are compared."""
+    jump: float = 0.15
+    """Jump of the place over the body's length."""
+
+
+ELSEWHERE = ElsewhereConstants()
 
 
 class Swayed(NamedTuple):
@@ -168,6 +202,7 @@ def track_of(
     record: Record,
     flags: tuple[Flag, ...],
     still: Steadied | None = None,
+    outline: OutlineCheck = OutlineCheck(),  # noqa: B008 - a constant
 ) -> Track:
     """The track of a film, with all flags."""
     sight, known = learnt.sight, learnt.known
@@ -211,7 +246,7 @@ def track_of(
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
-    agreement = _agreement(time, record, cut | other, pixel)
+    agreement = _agreement(time, record, cut | other, pixel, outline.suspect)
     glare, hops = learnt.glare.drift * pixel, hops_in(motion, pixel, picture)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
@@ -247,19 +282,19 @@ def track_of(
         body_angle_drift=math.hypot(
             even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
         ),
-        tail_phase_drift=hops.phase,
+        tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * outline.drift * pixel / body.robot.tail.wavelength),
         cues=agreement.cues,
-        cue_drift=math.hypot(agreement.drift, _colour_lag(position[:, 0], body)),
-        flags=(*swayed.flags, *early, *agreement.flags, *cuts, *roll_flags, *tail_flags, *odd),
+        cue_drift=math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel),
+        flags=(*swayed.flags, *early, *agreement.flags, *outline.flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
 
 
-def _agreement(time: Samples, record: Record, left_out: np.ndarray, pixel: float) -> Agreement:
+def _agreement(time: Samples, record: Record, left_out: np.ndarray, pixel: float, suspect: str) -> Agreement:
     """Cues of a video, without the frames that are left out."""
     lost = np.full((len(EDGE_CUES), 2), np.nan)
     placed = zip(record.placed, left_out.tolist(), strict=True)
     shifts = [lost if without or one.cues is None else one.cues for one, without in placed]
-    return agreement_of(time, shifts, np.array(record.tail)[:, 0], pixel)
+    return agreement_of(time, shifts, np.array(record.tail)[:, 0], pixel, suspect)
 
 
 def _colour_lag(x: Samples, body: BodyFinder) -> float:

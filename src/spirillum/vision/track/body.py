@@ -17,7 +17,7 @@ from spirillum.vision.track.constants import OUTLINE, SEAL
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
 from spirillum.vision.track.cues import cue_shifts
 from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
-from spirillum.vision.track.shape import Shape
+from spirillum.vision.track.search import Shape
 
 
 class Placed(NamedTuple):
@@ -174,6 +174,11 @@ class BodyFinder:
         """Pixels and normals of the seal's edges."""
         pixels, normals, _, _ = self.contour.places(pose, self.optics)
         return pixels[self._on_seal], normals[self._on_seal]
+
+    def profiles(self, image: np.ndarray, pose: BodyPose) -> Samples:
+        """Brightness across each edge of a body at a pose, of 255, (n, m); NaN out of view."""
+        pixels, normals, _, _ = self.contour.places(pose, self.optics)
+        return self._profiles(self._part(image, pose), pixels, normals)
 
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
         """Squared gradient of each edge's template along its normal, and weights of the edges.

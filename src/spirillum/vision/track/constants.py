@@ -1,4 +1,4 @@
-"""Tuned numbers of the tracker: one frozen set of constants for each stage.
+"""Tuned numbers of the tracker that more than one module uses: one frozen set for each stage; others stand beside it.
 
 Where a field names no source, its value was set by hand while the tracker was developed on rendered films; nothing else
 stands behind it. What halving and doubling them does to measured rates is in `docs/measuring.md`, found by
@@ -9,63 +9,7 @@ compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, beca
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians, sqrt
-
-
-@dataclass(frozen=True)
-class SearchConstants:
-    """Search for the body in a whole picture (`search`)."""
-
-    body_width: float = 16.0
-    """Apparent width of the body in the reduced picture that is searched first, pixels."""
-    reduced_width: float = 48.0
-    """Least apparent width of the body in a large picture that was reduced before, pixels."""
-    headings: tuple[float, ...] = (-8.0, -4.0, 0.0, 4.0, 8.0)
-    """Headings that are tried, degrees."""
-    background_share: float = 0.8
-    """Share of the background that is subtracted; less than 1, or a robot that hardly moves would vanish too."""
-    edge_stride: int = 2
-    """Every how many edge points one is used."""
-    column_step: int = 6
-    """Columns of the reduced picture that share one computed outline, pixels."""
-    peaks: int = 3
-    """Best places that are kept of each block of columns and heading."""
-    candidates: int = 5
-    """Candidates that are kept of a picture."""
-    coarse_blur: float = 1.0
-    """Standard deviation of the blur of the reduced picture, pixels."""
-    fine_blur: float = 1.2
-    """Standard deviation of the blur of the full picture, pixels."""
-    reach: int = 6
-    """Largest distance by which a candidate is moved in a round of refinement, pixels."""
-    margin: int = 24
-    """Width of the surroundings of a candidate that are looked at in refinement, pixels."""
-    travel_penalty: float = 0.5
-    """Relative score that a way of one body length between two frames costs."""
-
-
-@dataclass(frozen=True)
-class ContourConstants:
-    """Apparent edges of the body (`contour`): which are used, and the least standard error of each, pixels."""
-
-    front: float = 0.04
-    """Error of the front end."""
-    rear: float = 0.06
-    """Error of the rear end of a striped body."""
-    bare_rear: float = 0.5
-    """Error of the rear end of a body without stripes."""
-    side: float = 0.04
-    """Error of the sides."""
-    striped_side: float = 0.3
-    """Error of the sides of the seal, where stripes pass."""
-    coupling: float = 0.15
-    """Error of the coupling's edges."""
-    seal: float = 0.03
-    """Error of the front edge of the seal."""
-    end_width: float = 0.9
-    """Half width of the ends that is used, over the body's radius."""
-    seal_arc: float = 1.0
-    """Angle from the top up to which the seal's edge is used, rad."""
+from math import radians
 
 
 @dataclass(frozen=True)
@@ -168,23 +112,6 @@ class SealConstants:
     """Relative difference of the sizes by outline and by seal up to which they agree."""
     rough_steps: int = 3
     """Steps towards a seal from several pixels away."""
-
-
-@dataclass(frozen=True)
-class CueConstants:
-    """Agreement of the cues to where the body is (`cues`)."""
-
-    fewest: int = 5
-    """Fewest edges of a cue on a frame."""
-    frames: int = 8
-    """Fewest frames with outline and seal from which is told whether they move alike."""
-    apart: float = 0.4
-    """Standard error of the way from the first frame to the last by cues that disagree that is flagged, pixels."""
-    colour_drift: float = 0.1
-    """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
-    of this way.
-
-    Compression lets colours lag by this much: of nine path traced films, at most 0.22 pixels were seen."""
 
 
 @dataclass(frozen=True)
@@ -304,6 +231,14 @@ class ScoutingConstants:
     """Step at a wall over the usual one."""
     off_axis: float = 0.35
     """Largest distance of the robot from the middle between two walls, twice, over the body's diameter."""
+    changing_width: int = 640
+    """Largest width of the reduced pictures in which is looked whether anything moves, pixels."""
+    changing: float = 6.0
+    """Difference from the static background over its noise from which on a pixel changes."""
+    changing_least: float = 6.0
+    """Least such difference, of 255."""
+    changing_share: float = 1e-4
+    """Least share of the pixels of all frames that change where something moves."""
 
 
 @dataclass(frozen=True)
@@ -320,86 +255,6 @@ class StandingConstants:
     """Largest displacement along the channel of a robot that stands, pixels."""
     turned: float = radians(1.0)
     """Largest rotation of its body and of its tail, rad."""
-
-
-@dataclass(frozen=True)
-class SteadinessConstants:
-    """Whether camera and ruler stayed where they were (`steadiness`)."""
-
-    parts: int = 4
-    """Stretches of the film whose backgrounds are compared."""
-    fewest_frames: int = 3
-    """Fewest frames of a stretch."""
-    reach: int = 12
-    """Largest shift that is searched, pixels."""
-    peak_range: float = 0.25
-    """Range of correlations below the largest one whose peaks are refined: a ruler correlates at many shifts."""
-    smooth_share: float = 0.8
-    """Share of the picture with the smallest gradients, which is not used."""
-    most_peaks: int = 6
-    """Most peaks of the correlation that are refined, beside zero shift."""
-    clearly_better: float = 0.7
-    """Residual at a shift over that near zero, below which the shift is accepted."""
-    rows_beside: int = 6
-    """Rows beside the robot that its edges change, pixels."""
-    moved: float = 0.2
-    """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered films."""
-    moved_roughly: float = 2.0
-    """Shift of the picture alone from which on the camera has moved, pixels.
-
-    At rest within 1 on rendered films, also under a drifting lamp."""
-
-
-@dataclass(frozen=True)
-class AppearanceConstants:
-    """Whether the body's cover is opaque or glass (`appearance`)."""
-
-    places: int = 60
-    """Places along the axis between the seal and the nose."""
-    lines: int = 61
-    """Lines along the axis, from one side to the other."""
-    reach: float = 1.45
-    """Outermost line, over the body's radius."""
-    core: float = 0.35
-    """Outermost line of the middle of the cover, over the body's radius."""
-    beyond: float = 1.25
-    """Innermost line of the background, over the body's radius."""
-    rim: float = 0.22
-    """Distance from the outline within which a rim is looked for, over the body's radius."""
-    fewest: int = 3
-    """Fewest pictures with all of the cover in view."""
-    least: float = 20.0
-    """Least difference of brightness that tells anything, of 255."""
-    uneven: float = 0.5
-    """Change of the brightness along the axis over that from the middle to the background from which on contents show.
-
-    On path-traced videos it was 0.1 and less on paint and a liner, more than 1 where a battery lies inside."""
-    bright_rim: float = 0.12
-    """Brightness of the rim beyond that of middle and background, over their difference, of glass before a liner.
-
-    It was 0.15 and more on path-traced videos of glass, below 0.02 on paint."""
-
-
-@dataclass(frozen=True)
-class ColourConstants:
-    """Classes of colour of the stripes (`colours`)."""
-
-    pairs: int = 3
-    """Kinds of neighbouring stripes that have to be seen before their order is judged."""
-    whole_samples: int = 4
-    """Fewest angles of a stripe, and of those beside it, when its width is taken."""
-    blurred_width: float = 0.3
-    """Width over that of a stripe below which a colour between two others is their blurred edge."""
-    glare: float = 240.0
-    """Brightness of glare to begin with, of 255."""
-    pale: float = 0.7
-    """Ratio of the weakest to the strongest channel from which on a bright colour is glare."""
-    seen: float = 0.03
-    """Share of the samples from which on a class is seen."""
-    contrast: float = 0.25
-    """Least difference of two learnt colours over that of their names."""
-    fits: float = 0.7
-    """Share of neighbouring stripes that have to stand in a given order."""
 
 
 @dataclass(frozen=True)
@@ -471,54 +326,6 @@ class StripeConstants:
     degrees from end to end, root mean square, where the intervals expected 6."""
     ambiguous: float = 1.15
     """Least ratio of the second smallest loss to the smallest one."""
-
-
-@dataclass(frozen=True)
-class WidthConstants:
-    """Uneven stripes (`widths`)."""
-
-    reach: float = radians(14.0)
-    """Largest shift of an edge that is tried, rad: a third of a stripe of eight."""
-    step: float = radians(0.5)
-    """Steps between the shifts that are tried, rad."""
-    steepest: float = radians(52.0)
-    """Largest angle from the direction towards the camera at which an edge is located, rad."""
-    around: float = 0.42
-    """Half width over that of a stripe of the surroundings through which an edge is located."""
-    contrast: float = 40.0
-    """Least difference of the colours on either side, of 255."""
-    fewest: int = 8
-    """Fewest samples along the angle."""
-    frames: int = 20
-    """Fewest frames with two edges in view."""
-    rounds: int = 4
-    """Rounds in which stray edges are left out."""
-    stray: float = 4.0
-    """Residual over the usual one from which on an edge of a frame is left out."""
-    seen: int = 10
-    """Fewest frames of an edge."""
-    linked: int = 4
-    """Fewest frames on which two edges are seen together from which on they say how these lie to each other."""
-    uneven: float = radians(2.0)
-    """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
-    clear: float = 10.0
-    """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
-
-    On six degraded films even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
-    left: float = 0.05
-    """Share of that range that is left as an error of each angle. Assumed."""
-    widest: float = 0.24
-    """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
-    painted: float = 0.2 / sqrt(3.0)
-    """Standard deviation of the widths of stripes by hand, over an even one: evenly spread up to a fifth."""
-    other_size: float = 0.015
-    """Standard deviation of what wrong scale, diameter and heights add to all widths alike. Assumed."""
-    size: float = 0.005
-    """Standard uncertainty of what wrong sizes and heights add to widths learnt from a part of a turn. Assumed."""
-    printed: float = 0.01
-    """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
-    together: float = 2.5
-    """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
 
 
 @dataclass(frozen=True)
@@ -625,76 +432,6 @@ class UnwrappingConstants:
 
 
 @dataclass(frozen=True)
-class CutConstants:
-    """Films whose times do not fit what they show (`cuts`)."""
-
-    window: int = 8
-    """Frames before and after a moment through which straight lines are fitted."""
-    clear: float = 8.0
-    """Jump over the standard deviation of jumps elsewhere."""
-    place: float = 1.0
-    """Least jump of the place, pixels."""
-    angle: float = 0.12
-    """Least jump of an angle, rad."""
-    gap: float = 3.0
-    """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
-    long_window: int = 30
-    """Readings before and after a gap through which the lines go that tell whether time has passed."""
-    clock_place: float = 0.3
-    """Distance of these lines below which they meet, pixels."""
-    clock_angle: float = 0.05
-    """Distance of these lines below which they meet, rad."""
-    clock_errors: float = 5.0
-    """Distance over its standard error below which they meet; errors of readings are not independent."""
-    unseen: int = 20
-    """Frames without the robot over which lines go on: it may be lost where it jumps."""
-    advance: float = 0.5
-    """Least advance of a robot that turns, pixels."""
-    tail_turns: float = 1.0
-    """Turns of the tail in which it has to advance by that."""
-    body_turns: float = 0.25
-    """Turns of the body in which it has to."""
-    misread: float = 0.5
-    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
-
-
-@dataclass(frozen=True)
-class PictureChangeConstants:
-    """Change of the picture from frame to frame (`picture_change`)."""
-
-    width: float = 320.0
-    """Longer side to which the pictures are reduced, pixels."""
-    blur: float = 1.0
-    """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
-    fewest: int = 20
-    """Fewest frames that tell the usual change."""
-    around: int = 15
-    """Steps of the running median."""
-    least: float = 1.1
-    """Least change by two steps over that by one; with less, noise hides the motion."""
-    scatter: float = 0.4
-    """Largest scatter of the change over the rise by two steps."""
-    share: float = 0.5
-    """Share of the rise by two steps from which on a frame is missing."""
-    rest: float = 0.6
-    """Change over the usual one below which a frame repeats the one before."""
-
-
-@dataclass(frozen=True)
-class ElsewhereConstants:
-    """Frames on which something else than the robot was followed (`elsewhere`)."""
-
-    fewest: int = 12
-    """Fewest frames on which stripes or tail are read."""
-    shortest: int = 3
-    """Fewest frames in a row without them."""
-    beside: int = 5
-    """Frames to both sides of a jump whose medians are compared."""
-    jump: float = 0.15
-    """Jump of the place over the body's length."""
-
-
-@dataclass(frozen=True)
 class LostFramesConstants:
     """Frames lost while the times go on evenly (`lost_frames`)."""
 
@@ -773,32 +510,6 @@ class MultiplesConstants:
 
 
 @dataclass(frozen=True)
-class DirectionConstants:
-    """Direction of the channel where no ruler tells it (`direction`)."""
-
-    frames: int = 10
-    """Fewest frames with a place."""
-    way: float = 20.0
-    """Least way of a robot over the scatter of its places, to tell the direction."""
-    least: float = 0.026
-    """Least angle to the rows of the picture, rad: below it lengths are wrong by less than the lens's 0.03 %."""
-
-
-@dataclass(frozen=True)
-class SwayConstants:
-    """A camera that swayed (`sway`)."""
-
-    window: int = 7
-    """Frames before and after a moment whose medians are compared."""
-    jump: float = 1.5
-    """Step of the robot against the background from which on pictures were not moved back well, pixels.
-
-    A ruler's lines are at least three pixels apart, by which a wrong registration is off."""
-    lateral: tuple[str, ...] = ("lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
-    """Quantities that are not given then either."""
-
-
-@dataclass(frozen=True)
 class VisibilityConstants:
     """Second robots, wrong directions, gaps, robots that leave, and glare (`warnings`)."""
 
@@ -824,95 +535,17 @@ class VisibilityConstants:
     """Share of the edges that fit below which glare, shadows or bubbles are said."""
 
 
-@dataclass(frozen=True)
-class FollowingConstants:
-    """From frame to frame (`follow`)."""
-
-    search_interval: int = 15
-    """Frames between two searches of the whole picture for a robot that was lost."""
-    memory: int = 12
-    """Frames from which the next place is predicted."""
-    largest_jump: float = 4.0
-    """Largest accepted distance from the predicted position, pixels."""
-    gap: float = 3.0
-    """Time between two frames over the usual one from which on the robot may have left its predicted way."""
-    sure_step: float = 1.0
-    """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
-    usual_edges: int = 200
-    """Frames with the body in view whose median is the usual share of the edges that fit."""
-    few_edges: float = 0.75
-    """Share of the edges that fit, over the usual one, below which the robot may be elsewhere: a shadow takes some."""
-    more_edges: float = 1.2
-    """Share of the edges that fit at another place, over that where it was followed, from which on it is there."""
-
-
-@dataclass(frozen=True)
-class GlareConstants:
-    """Glare that stands still on the robot's way (`glare`)."""
-
-    share: float = 0.9
-    """Share of the frames on which a spot has to be white."""
-    covered: float = 0.95
-    """Share of the body's diameter that surely hides what is behind it."""
-    least: float = 0.005
-    """Least size of its part on the way, over what body and coupling cover."""
-    most: float = 1.0
-    """Largest size of it all, over that: what is larger is an overexposed background."""
-    rim: float = 0.4
-    """Width of its rim, over the radius of a disk as large as the spot."""
-    across: float = 0.5
-    """Least sine of the angle between an edge and the way of the robot, of edges that tell how far it has moved."""
-    passes: float = 2.0
-    """Least change of the distance of such an edge from a spot, within its rim, pixels."""
-    fewest: int = 3
-    """Fewest edge points of which this is true."""
-    drift: float = 0.08
-    """Standard error of the way from the first frame to the last, pixels."""
-    beside: tuple[float, float] = (0.6, 0.85)
-    """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
-    lines: int = 5
-    """Lines along the way between these distances."""
-    veil_width: float = 0.3
-    """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
-    veil_step: float = 30.0
-    """Least step of the brightness at the edge of a mirrored lamp, of 255.
-
-    On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
-    sharp: float = 0.4
-    """Least share of the step within four pixels on either side of it."""
-    slant: int = 8
-    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
-    in_view: float = 0.5
-    """Least share of the way that has to be in the picture."""
-    veil_drift: float = 0.5
-    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
-
-
-APPEARANCE = AppearanceConstants()
-SEARCH = SearchConstants()
-CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()
 SEAL = SealConstants()
-CUES = CueConstants()
 FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
 SCOUTING = ScoutingConstants()
 STANDING = StandingConstants()
-STEADINESS = SteadinessConstants()
-COLOURS = ColourConstants()
 STRIPES = StripeConstants()
-WIDTHS = WidthConstants()
 SINGLE_LINE = SingleLineConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
-CUTS = CutConstants()
-PICTURE_CHANGE = PictureChangeConstants()
-ELSEWHERE = ElsewhereConstants()
 LOST_FRAMES = LostFramesConstants()
 MULTIPLES = MultiplesConstants()
-DIRECTION = DirectionConstants()
-SWAY = SwayConstants()
 VISIBILITY = VisibilityConstants()
-FOLLOWING = FollowingConstants()
-GLARE = GlareConstants()

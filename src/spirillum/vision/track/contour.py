@@ -19,7 +19,34 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline, Segment
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, placed
-from spirillum.vision.track.constants import CONTOUR
+
+
+@dataclass(frozen=True)
+class ContourConstants:
+    """Apparent edges of the body: which are used, and the least standard error of each, pixels."""
+
+    front: float = 0.04
+    """Error of the front end."""
+    rear: float = 0.06
+    """Error of the rear end of a striped body."""
+    bare_rear: float = 0.5
+    """Error of the rear end of a body without stripes."""
+    side: float = 0.04
+    """Error of the sides."""
+    striped_side: float = 0.3
+    """Error of the sides of the seal, where stripes pass."""
+    coupling: float = 0.15
+    """Error of the coupling's edges."""
+    seal: float = 0.03
+    """Error of the front edge of the seal."""
+    end_width: float = 0.9
+    """Half width of the ends that is used, over the body's radius."""
+    seal_arc: float = 1.0
+    """Angle from the top up to which the seal's edge is used, rad."""
+
+
+CONTOUR = ContourConstants()
+
 
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""

@@ -8,6 +8,7 @@ repeats the edges of the body, or something that stands still is taken for them,
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,11 +18,48 @@ from numpy.lib.stride_tricks import sliding_window_view
 from spirillum.arrays import Samples
 from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.constants import CUTS
-from spirillum.vision.track.motion import RobotMotion
+from spirillum.vision.track.constants import STANDING
 from spirillum.vision.track.picture_change import PictureSteps
 from spirillum.vision.track.size import LENGTHS
+from spirillum.vision.track.track import RobotMotion
 from spirillum.vision.track.visibility import EVERYTHING
+
+
+@dataclass(frozen=True)
+class CutConstants:
+    """Films whose times do not fit what they show."""
+
+    window: int = 8
+    """Frames before and after a moment through which straight lines are fitted."""
+    clear: float = 8.0
+    """Jump over the standard deviation of jumps elsewhere."""
+    place: float = 1.0
+    """Least jump of the place, pixels."""
+    angle: float = 0.12
+    """Least jump of an angle, rad."""
+    gap: float = 3.0
+    """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
+    long_window: int = 30
+    """Readings before and after a gap through which the lines go that tell whether time has passed."""
+    clock_place: float = 0.3
+    """Distance of these lines below which they meet, pixels."""
+    clock_angle: float = 0.05
+    """Distance of these lines below which they meet, rad."""
+    clock_errors: float = 5.0
+    """Distance over its standard error below which they meet; errors of readings are not independent."""
+    unseen: int = 20
+    """Frames without the robot over which lines go on: it may be lost where it jumps."""
+    advance: float = 0.5
+    """Least advance of a robot that turns, pixels."""
+    tail_turns: float = 1.0
+    """Turns of the tail in which it has to advance by that."""
+    body_turns: float = 0.25
+    """Turns of the body in which it has to."""
+    misread: float = 0.5
+    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
+
+
+CUTS = CutConstants()
 
 
 def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
@@ -79,7 +117,7 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
         + "the intervals are wider for it: look at that frame of the annotated video, and choose a part of the video "
         "without it (start and end of the setup)"
     )
-    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else ())
+    flag = Flag("outline-hops", sentence, ("tail_rotation_rate",) if miscounted else (), frame)
     place, body, phase = (abs(hop.size) if hop else 0.0 for hop in hops)
     return Hops(place, body, phase, (flag,))
 
@@ -268,3 +306,24 @@ def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:
     gaps = np.concatenate([[0], np.cumsum(np.diff(time) > CUTS.gap * usual)])
     place = np.searchsorted(time, t)
     return np.asarray(gaps[place[2 * CUTS.window - 1 : -1]] == gaps[place[: -2 * CUTS.window]])
+
+
+def stands_flag(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
+    """Flag a robot that neither advances nor turns, whose stripes or tail were read."""
+    time, x, body_angle, tail_phase = motion
+    limits = [(x, STANDING.moved * length_per_pixel), *((angle, STANDING.turned) for angle in (body_angle, tail_phase))]
+    read = [(values[known], limit) for values, limit in limits if (known := np.isfinite(values)).any()]
+    if len(read) < 2 or not np.isfinite(x).any() or any(_total_change(values) > limit for values, limit in read):
+        return ()
+    sentence = (
+        f"the robot is in view and stands still: in {np.ptp(time):.3g} s it advances by less than {STANDING.moved:g} "
+        f"pixels and turns by less than {np.degrees(STANDING.turned):.0f} degree; if it should move, check its motor, "
+        "or film for longer"
+    )
+    return (Flag("robot-stands-still", sentence),)
+
+
+def _total_change(values: Samples) -> float:
+    """Change of a series from its first to its last fifth, by medians."""
+    few = max(1, len(values) // 5)
+    return float(abs(np.median(values[-few:]) - np.median(values[:few])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,21 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, repeated_median_line
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.constants import DIRECTION
+
+
+@dataclass(frozen=True)
+class DirectionConstants:
+    """Direction of the channel where no ruler tells it."""
+
+    frames: int = 10
+    """Fewest frames with a place."""
+    way: float = 20.0
+    """Least way of a robot over the scatter of its places, to tell the direction."""
+    least: float = 0.026
+    """Least angle to the rows of the picture, rad: below it lengths are wrong by less than the lens's 0.03 %."""
+
+
+DIRECTION = DirectionConstants()
 
 
 class Along(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,11 +13,12 @@ from spirillum.vision.camera.anchor import steadied, sways
 from spirillum.vision.camera.camera import opened, samples_of, scale_of
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
-from spirillum.vision.track.learning import learnt_from
+from spirillum.vision.track.learning import InitialDetection, learnt_from
+from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
 from spirillum.vision.track.steadiness import camera_flags
-from spirillum.vision.track.steps import FrameDetection, FrameTracker
+from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
 from spirillum.vision.track.track import Track
-from spirillum.vision.video.frames import Video
+from spirillum.vision.video.frames import Frame, Video
 
 __all__ = ["FrameDetection", "Watcher", "follow", "scale_of"]
 
@@ -65,4 +66,24 @@ def follow(
         if progress is not None:
             progress(count, total)
     flags = (*video.flags, *learnt.sight.flags, *moved.result(), *learnt.flags)
-    return track_of(video, setup, learnt, follower.record, flags, still)
+    outline = _outline_check(frames, learnt, follower.record, setup)
+    return track_of(video, setup, learnt, follower.record, flags, still, outline)
+
+
+_SAME_TIME = 1e-3
+"""Largest difference between two times of one frame, s."""
+
+
+def _outline_check(frames: Sequence[Frame], learnt: InitialDetection, record: Record, setup: Setup) -> OutlineCheck:
+    """What cover and background leave open of the outline; nothing of what is not the robot."""
+    start, times = learnt.known.start, np.array(record.time)
+    if not learnt.known.robot:
+        return OutlineCheck()
+    nearest = [int(np.argmin(np.abs(times - frame.time))) for frame in frames]
+    seen = [
+        (Frame(at, frame.time, frame.image), record.placed[at].pose)
+        for frame, at in zip(frames, nearest, strict=True)
+        if record.placed[at].known and abs(times[at] - frame.time) < _SAME_TIME
+    ]
+    some, poses = [frame for frame, _ in seen], [pose for _, pose in seen]
+    return check_outline(some, poses, start.body, setup.robot.appearance, alone=start.search is None)

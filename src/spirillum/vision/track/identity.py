@@ -11,14 +11,14 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.vision.camera.optics import BodyPose, Optics, opposite
+from spirillum.vision.camera.optics import BodyPose, Optics, opposite, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE, STANDING
 from spirillum.vision.track.initial_detection import Start, first_look
+from spirillum.vision.track.search import close_places
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
-from spirillum.vision.track.standing import standing_bodies
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.visibility import EVERYTHING, nose_on_the_other_side
@@ -159,7 +159,7 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
     if not stripes_of(setup, stated.robot):
         return None  # a tail alone may be chance: all frames show the same background
     nothing, striped = np.zeros_like(still), None
-    for body in standing_bodies(stated, still):
+    for body in _standing_bodies(stated, still):
         with suppress(InputError):
             for some in (frames[:: STANDING.stride], frames):  # what is no robot is found out sooner by few
                 found = identified_at(name, setup, body, some, nothing, 1.0)
@@ -171,6 +171,42 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
             if striped is None and found.stripes.fits and found.stripes_read > IDENTITY.sure_share:
                 striped = found._replace(robot=False, stands=True)
     return striped
+
+
+def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
+    """Untrained finders of a body at the places of a background where one may stand, most likely first.
+
+    A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
+    the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
+    an empty tube shows neither.
+
+    Args:
+        stated: the robot's body at the stated scale.
+        still: static background of the frames, (h, w, 3), or reduced by a whole factor.
+    """
+    shape = stated.shape(stated.optics.size[0] // still.shape[1])
+    picture = np.clip(np.round(still), 0.0, 255.0).astype(np.uint8)
+    found = []
+    for place in close_places(picture, np.zeros_like(still), shape):
+        bounds = _surroundings(stated, place.pose)
+        if min(bounds[2] - bounds[0], bounds[3] - bounds[1]) >= shape.width:
+            found.append(BodyFinder(stated.robot, stated.optics, bounds, stated.contour))
+    return found
+
+
+def _surroundings(body: BodyFinder, pose: BodyPose) -> tuple[int, int, int, int]:
+    """Part of the picture about a robot, and about the way of one that hardly moves: left, top, right, bottom."""
+    robot = body.robot
+    beside = STANDING.beside * robot.body.diameter
+    ahead = (0.5 + STANDING.ahead) * robot.body.length
+    behind = ahead + robot.coupling.length + robot.tail.length
+    corners = [[x, y, 0.0] for x in (-behind, ahead) for y in (-beside, beside)]
+    pixels = seen(np.array(corners), pose, body.optics)
+    if not np.isfinite(pixels).all():
+        return 0, 0, 0, 0
+    low = np.maximum(np.floor(pixels.min(axis=0)), body.bounds[:2]).astype(int).tolist()
+    high = np.minimum(np.ceil(pixels.max(axis=0)), body.bounds[2:]).astype(int).tolist()
+    return low[0], low[1], high[0], high[1]
 
 
 def _with_nose(

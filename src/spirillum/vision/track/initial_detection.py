@@ -18,8 +18,7 @@ from spirillum.vision.camera.optics import BodyPose, Optics, opposite, places_se
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, SEAL, VISIBILITY
-from spirillum.vision.track.search import PoseCandidate, close_places, most_likely, refined
-from spirillum.vision.track.shape import Shape
+from spirillum.vision.track.search import PoseCandidate, Shape, close_places, most_likely, refined
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
 from spirillum.vision.track.visibility import rivals_in, turned_flags
 from spirillum.vision.video.frames import Frame

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,11 +18,56 @@ from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import GLARE, OUTLINE, SIZE, STRIPES
+from spirillum.vision.track.constants import OUTLINE, SIZE, STRIPES
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.search import searched_at
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
+
+
+@dataclass(frozen=True)
+class GlareConstants:
+    """Glare that stands still on the robot's way."""
+
+    share: float = 0.9
+    """Share of the frames on which a spot has to be white."""
+    covered: float = 0.95
+    """Share of the body's diameter that surely hides what is behind it."""
+    least: float = 0.005
+    """Least size of its part on the way, over what body and coupling cover."""
+    most: float = 1.0
+    """Largest size of it all, over that: what is larger is an overexposed background."""
+    rim: float = 0.4
+    """Width of its rim, over the radius of a disk as large as the spot."""
+    across: float = 0.5
+    """Least sine of the angle between an edge and the way of the robot, of edges that tell how far it has moved."""
+    passes: float = 2.0
+    """Least change of the distance of such an edge from a spot, within its rim, pixels."""
+    fewest: int = 3
+    """Fewest edge points of which this is true."""
+    drift: float = 0.08
+    """Standard error of the way from the first frame to the last, pixels."""
+    beside: tuple[float, float] = (0.6, 0.85)
+    """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
+    lines: int = 5
+    """Lines along the way between these distances."""
+    veil_width: float = 0.3
+    """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
+    veil_step: float = 30.0
+    """Least step of the brightness at the edge of a mirrored lamp, of 255.
+
+    On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
+    sharp: float = 0.4
+    """Least share of the step within four pixels on either side of it."""
+    slant: int = 8
+    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
+    in_view: float = 0.5
+    """Least share of the way that has to be in the picture."""
+    veil_drift: float = 0.5
+    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
+
+
+GLARE = GlareConstants()
 
 
 class Glare(NamedTuple):
@@ -226,7 +271,7 @@ class InitialDetection(NamedTuple):
     def flags(self) -> tuple[Flag, ...]:
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
-        doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0]
+        doubtful = bool(self.glare.flags) or abs(known.size - 1.0) > SIZE.tolerance[0] or not known.robot
         wire = known.wire.flags_beside(doubtful=doubtful)
         return (*known.start.flags, *known.flags, *known.stripes.flags, *wire, *self.glare.flags)
 

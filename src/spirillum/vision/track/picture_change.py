@@ -7,6 +7,7 @@ evenly. How much two steps at once change the picture tells what one lost frame 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,31 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.optional_dependencies import import_optional
 from spirillum.robust import mad_scale, running_median
-from spirillum.vision.track.constants import PICTURE_CHANGE
+
+
+@dataclass(frozen=True)
+class PictureChangeConstants:
+    """Change of the picture from frame to frame."""
+
+    width: float = 320.0
+    """Longer side to which the pictures are reduced, pixels."""
+    blur: float = 1.0
+    """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
+    fewest: int = 20
+    """Fewest frames that tell the usual change."""
+    around: int = 15
+    """Steps of the running median."""
+    least: float = 1.1
+    """Least change by two steps over that by one; with less, noise hides the motion."""
+    scatter: float = 0.4
+    """Largest scatter of the change over the rise by two steps."""
+    share: float = 0.5
+    """Share of the rise by two steps from which on a frame is missing."""
+    rest: float = 0.6
+    """Change over the usual one below which a frame repeats the one before."""
+
+
+PICTURE_CHANGE = PictureChangeConstants()
 
 
 class PictureChange:

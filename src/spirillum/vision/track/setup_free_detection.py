@@ -3,93 +3,36 @@
 A provisional camera stands in for the unknown one: its lens is as far away as a usual one, and its scale is a guess
 that the search for the robot corrects. Finding and learning are those of every film
 (`spirillum.vision.track.identity`).
-
-Appearance of the body's cover on a video: opaque, or glass through which contents and background show.
-Across the cover, an opaque one is of one brightness from rim to rim. Glass has a bright rim beside its contents, or
-contents whose brightness changes along the axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from itertools import permutations
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
-from spirillum.vision.camera.optics import DIRECTIONS, BodyPose, Optics, opposite, seen
+from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import APPEARANCE, IDENTITY, SCOUTING
+from spirillum.vision.track.constants import IDENTITY, SCOUTING
 from spirillum.vision.track.identity import Identified, identified_at
+from spirillum.vision.track.lone_outline import Appearance, appearance_of
 from spirillum.vision.track.search import searched_at
 from spirillum.vision.track.size import best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
-
-Appearance = Literal["opaque", "glass", "unknown"]
-"""As `robot.appearance` of a setup."""
-
-
-def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> Appearance:
-    """Return whether the cover before the seal looks opaque or like glass, `unknown` where it is not clear.
-
-    Args:
-        robot: the robot.
-        optics: a camera that shows it as large as it looks.
-        samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body on each.
-    """
-    half, radius = 0.5 * robot.body.length, 0.5 * robot.body.diameter
-    rear = -half + (robot.seal.length if robot.seal is not None else 0.0)
-    along = np.linspace(rear + 0.15 * radius, half - 0.15 * radius, APPEARANCE.places)
-    across = radius * np.linspace(-APPEARANCE.reach, APPEARANCE.reach, APPEARANCE.lines)
-    pictures = [_brightness(image, pose, optics, along, across) for image, pose in samples]
-    grey = np.array([picture for picture in pictures if picture is not None])
-    if len(grey) < APPEARANCE.fewest:
-        return "unknown"
-    straight = along < half - radius
-    if not straight.any():
-        return "unknown"
-    share = np.abs(across) / radius
-    across_it = np.median(grey[:, straight], axis=(0, 1))
-    along_it = np.median(grey[:, :, share < APPEARANCE.core], axis=(0, 2))
-    core, outside = np.median(across_it[share < APPEARANCE.core]), np.median(across_it[share > APPEARANCE.beyond])
-    step = float(abs(outside - core))
-    low, high = np.quantile(along_it, [0.1, 0.9])
-    rims = [_rim(across_it, share, side * across > 0.0, float(core), float(outside)) for side in (1.0, -1.0)]
-    uneven = float(high - low)
-    if uneven > max(APPEARANCE.least, APPEARANCE.uneven * step):
-        return "glass"
-    if step < APPEARANCE.least:
-        return "unknown"
-    if min(rims) > APPEARANCE.bright_rim * step:
-        return "glass"
-    even = max(rims) < 0.5 * APPEARANCE.bright_rim * step and uneven < 0.5 * APPEARANCE.uneven * step
-    return "opaque" if even else "unknown"
-
-
-def _rim(profile: Samples, share: Samples, side: np.ndarray, core: float, outside: float) -> float:
-    """By how much the rim on one side is brighter than core and outside, of 255."""
-    near = side & (np.abs(share - 1.0) < APPEARANCE.rim)
-    return float(profile[near].max()) - max(core, outside)
-
-
-def _brightness(image: np.ndarray, pose: BodyPose, optics: Optics, along: Samples, across: Samples) -> Samples | None:
-    """Brightness on a grid in the plane through the body's axis, of 255, (n, k); None where it is not all in view."""
-    grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
-    pixels = np.nan_to_num(seen(grid, pose, optics), nan=-1.0).round().astype(int)
-    if np.any(pixels < 0) or np.any(pixels >= (image.shape[1], image.shape[0])):
-        return None
-    grey = image[pixels[:, 1], pixels[:, 0]].mean(axis=1)
-    return np.asarray(grey.reshape(along.size, across.size))
-
 
 _WRONG = 4.0
 """Ratio beyond the usual lengths per pixel at which a stated spacing is wrong."""
@@ -170,7 +113,7 @@ def scouted(
     _check_no_noise(stills.at(1), video)
     tell("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
-    guesses = _guesses(robot, video.size, lines, spacing)
+    guesses = _guesses(robot, video.size, lines, spacing)[: None if stills.changes else 1]
     looks = 2 * len(guesses) * len(directions)
     tell("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
@@ -205,6 +148,17 @@ class _Stills:
     def __init__(self, frames: list[Frame]) -> None:
         self.frames = frames
         self._at: dict[int, Samples] = {}
+
+    @cached_property
+    def changes(self) -> bool:
+        """Whether anything moves, in pictures at most 640 pixels wide: an empty tube shows noise alone."""
+        cv2 = import_optional("cv2", "measuring a video", "video")
+        factor = -(-max(self.frames[0].image.shape) // SCOUTING.changing_width)
+        stack = np.array([frame.reduced(factor).mean(axis=2, dtype=np.float32) for frame in self.frames])
+        stack = np.array([cv2.GaussianBlur(grey, (0, 0), 1.0) for grey in stack])
+        off = np.abs(stack - np.median(stack, axis=0))
+        least = max(SCOUTING.changing * float(mad_scale(off)), SCOUTING.changing_least)
+        return bool(np.mean(off > least) > SCOUTING.changing_share)
 
     def at(self, factor: int) -> Samples:
         """The background reduced by a factor."""
@@ -265,7 +219,7 @@ def _found_at(
     guess: tuple[float, Lines | None, tuple[str, ...]],
     stills: _Stills,
 ) -> Iterator[tuple[str, Identified | None]]:
-    """Looks for the robot near a guessed scale, in each direction of its nose; then at half to twice of it."""
+    """Look for the robot near a guessed scale, in each direction; then at half to twice of it, if anything moves."""
     finders = {}
     pixel, lines, directions = guess
     for direction in directions:
@@ -275,7 +229,7 @@ def _found_at(
             optics = optics.moved({"rotation": first_rotation(optics, lines)})
         finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
     most = reduction(video.size)
-    for sized in (False, True):
+    for sized in (False, True) if stills.changes else (False,):
         for direction, (setup, finder) in finders.items():
             factor = searched_at(finder.shape().width, most)
             images, still = [frame.reduced(factor) for frame in stills.frames], stills.at(factor)

@@ -23,8 +23,7 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SIZE
 from spirillum.vision.track.contour import contour_of
-from spirillum.vision.track.search import PoseCandidate, close_places
-from spirillum.vision.track.shape import Shape
+from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)

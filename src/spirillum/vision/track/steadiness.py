@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,9 +16,40 @@ from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.constants import STEADINESS
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.video.frames import Frame
+
+
+@dataclass(frozen=True)
+class SteadinessConstants:
+    """Whether camera and ruler stayed where they were."""
+
+    parts: int = 4
+    """Stretches of the film whose backgrounds are compared."""
+    fewest_frames: int = 3
+    """Fewest frames of a stretch."""
+    reach: int = 12
+    """Largest shift that is searched, pixels."""
+    peak_range: float = 0.25
+    """Range of correlations below the largest one whose peaks are refined: a ruler correlates at many shifts."""
+    smooth_share: float = 0.8
+    """Share of the picture with the smallest gradients, which is not used."""
+    most_peaks: int = 6
+    """Most peaks of the correlation that are refined, beside zero shift."""
+    clearly_better: float = 0.7
+    """Residual at a shift over that near zero, below which the shift is accepted."""
+    rows_beside: int = 6
+    """Rows beside the robot that its edges change, pixels."""
+    moved: float = 0.2
+    """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered films."""
+    moved_roughly: float = 2.0
+    """Shift of the picture alone from which on the camera has moved, pixels.
+
+    At rest within 1 on rendered films, also under a drifting lamp."""
+
+
+STEADINESS = SteadinessConstants()
+
 
 _STEPS, _STILL = 8, 0.01
 """Most Gauss-Newton steps, and the step below which they end, pixels."""

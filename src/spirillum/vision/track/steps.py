@@ -14,12 +14,37 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import Placed
-from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.initial_detection import close_place, on_the_way
 from spirillum.vision.track.picture_change import PictureChange
 from spirillum.vision.track.search import PoseCandidate, candidates
 from spirillum.vision.video.frames import Frame
+
+
+@dataclass(frozen=True)
+class FollowingConstants:
+    """From frame to frame."""
+
+    search_interval: int = 15
+    """Frames between two searches of the whole picture for a robot that was lost."""
+    memory: int = 12
+    """Frames from which the next place is predicted."""
+    largest_jump: float = 4.0
+    """Largest accepted distance from the predicted position, pixels."""
+    gap: float = 3.0
+    """Time between two frames over the usual one from which on the robot may have left its predicted way."""
+    sure_step: float = 1.0
+    """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
+    usual_edges: int = 200
+    """Frames with the body in view whose median is the usual share of the edges that fit."""
+    few_edges: float = 0.75
+    """Share of the edges that fit, over the usual one, below which the robot may be elsewhere: a shadow takes some."""
+    more_edges: float = 1.2
+    """Share of the edges that fit at another place, over that where it was followed, from which on it is there."""
+
+
+FOLLOWING = FollowingConstants()
+
 
 _UNREAD = (np.nan, np.nan)
 

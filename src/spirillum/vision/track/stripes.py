@@ -17,16 +17,17 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.colours import (
     colour_classes,
+    is_single,
     named_rightly,
     order_seen,
     pattern_period,
     runs_of,
+    seen_line,
     told_apart,
     width_seen,
     without_glare,
 )
 from spirillum.vision.track.constants import SINGLE_LINE, STRIPES
-from spirillum.vision.track.single_line import is_single, seen_line
 from spirillum.vision.track.widths import edge_shifts
 
 _ROWS = 16

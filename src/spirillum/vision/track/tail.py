@@ -343,12 +343,17 @@ class TailWave:
         tail = self.robot.tail
         if len(fits):
             share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
-            if abs(share) > 0.2:
+            if abs(share) > 0.2 and self._fits_better(ridges, 1.0 + share, own):
                 sentence = (
                     f"the tail's amplitude looks like {(1.0 + share) * tail.amplitude * 1e3:.1f} mm or further from "
                     f"that of the file, {tail.amplitude * 1e3:.3g} mm: check it; its rotation is read all the same"
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence))
+
+    def _fits_better(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float, own: float) -> bool:
+        """Whether a wave of another amplitude over that of the file, at its wavelength, lies more on the wire."""
+        scores = self.scores_by_wavelength(ridges, amplitude)
+        return scores is not None and float(np.interp(1.0, _FACTORS, scores)) > own
 
     def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
         """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen.

@@ -1,9 +1,10 @@
-"""What was seen of a robot on every frame of a video."""
+"""What was seen of a robot on every frame of a video, and its motion as time series."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,19 @@ from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.cues import Cue
+
+
+class RobotMotion(NamedTuple):
+    """Position and unwrapped angles of a robot on every frame; NaN where unknown."""
+
+    time: Samples
+    """Time of each frame, s, (n,)."""
+    x: Samples
+    """Position along the channel, m, (n,)."""
+    body_angle: Samples
+    """Rotation angle of the body, unwrapped, rad, (n,)."""
+    tail_phase: Samples
+    """Phase of the tail, unwrapped, rad, (n,)."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from spirillum.robust import least_squares_line, running_median
 from spirillum.units import show
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import UNWRAPPING
-from spirillum.vision.track.motion import RobotMotion
+from spirillum.vision.track.track import RobotMotion
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}

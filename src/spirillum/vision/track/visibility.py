@@ -14,8 +14,7 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.constants import VISIBILITY
-from spirillum.vision.track.search import PoseCandidate, close_places
-from spirillum.vision.track.shape import Shape
+from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
 _THREADS = 2
 EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")

@@ -7,6 +7,8 @@ least squares. A whole turn is exact whatever the widths are.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +17,57 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import edge_misfits
 from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.constants import WIDTHS
+
+
+@dataclass(frozen=True)
+class WidthConstants:
+    """Uneven stripes."""
+
+    reach: float = radians(14.0)
+    """Largest shift of an edge that is tried, rad: a third of a stripe of eight."""
+    step: float = radians(0.5)
+    """Steps between the shifts that are tried, rad."""
+    steepest: float = radians(52.0)
+    """Largest angle from the direction towards the camera at which an edge is located, rad."""
+    around: float = 0.42
+    """Half width over that of a stripe of the surroundings through which an edge is located."""
+    contrast: float = 40.0
+    """Least difference of the colours on either side, of 255."""
+    fewest: int = 8
+    """Fewest samples along the angle."""
+    frames: int = 20
+    """Fewest frames with two edges in view."""
+    rounds: int = 4
+    """Rounds in which stray edges are left out."""
+    stray: float = 4.0
+    """Residual over the usual one from which on an edge of a frame is left out."""
+    seen: int = 10
+    """Fewest frames of an edge."""
+    linked: int = 4
+    """Fewest frames on which two edges are seen together from which on they say how these lie to each other."""
+    uneven: float = radians(2.0)
+    """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
+    clear: float = 10.0
+    """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
+
+    On six degraded films even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
+    left: float = 0.05
+    """Share of that range that is left as an error of each angle. Assumed."""
+    widest: float = 0.24
+    """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
+    painted: float = 0.2 / sqrt(3.0)
+    """Standard deviation of the widths of stripes by hand, over an even one: evenly spread up to a fifth."""
+    other_size: float = 0.015
+    """Standard deviation of what wrong scale, diameter and heights add to all widths alike. Assumed."""
+    size: float = 0.005
+    """Standard uncertainty of what wrong sizes and heights add to widths learnt from a part of a turn. Assumed."""
+    printed: float = 0.01
+    """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
+    together: float = 2.5
+    """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
+
+
+WIDTHS = WidthConstants()
 
 
 class Evened(NamedTuple):

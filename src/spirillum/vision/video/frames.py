@@ -22,16 +22,17 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.video.display import AS_STORED, Display, converter, display_flags, frame_display, stated_aspect
 from spirillum.vision.video.image_sequence import ImageSequence, image_folder, image_stack
 from spirillum.vision.video.pictures import STACKS, reduced
-from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.streams import (
     UNSTATED,
     VIDEO,
     Stated,
     film_stream,
     frame_clock,
+    one_line,
     open_container,
     short_reason,
     stated_length,
+    words_of_images,
 )
 
 T = TypeVar("T")

@@ -16,8 +16,7 @@ from spirillum.files.limits import MOST_IMAGES
 from spirillum.vision.flag import Flag
 from spirillum.vision.video.display import Display, display_flags, stated_aspect
 from spirillum.vision.video.pictures import IMAGES, Header, bits_of, eight_bit, read_header, read_image, read_pages
-from spirillum.vision.video.provenance import stated_size
-from spirillum.vision.video.streams import VIDEO
+from spirillum.vision.video.streams import VIDEO, stated_size
 
 _FEW = 10
 """First images, whose usual size is that of all; and images spread over all, whose brightest value is."""
