@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
+from spirillum.fields.fluid_field import flow_field
 from spirillum.fields.in_tube import TubeFlowField, tube_flow_field
-from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.placement import Placement
 

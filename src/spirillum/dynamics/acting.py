@@ -9,10 +9,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels import rigid_links
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import friction_torques
 
 _KINDS = {

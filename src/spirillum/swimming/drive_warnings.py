@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.fluid.model import SwimmerModel
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
 

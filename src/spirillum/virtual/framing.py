@@ -8,8 +8,7 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.tank import Tank, tube_height
+from spirillum.virtual.optics import Tank, VirtualLens, tube_height
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
 
