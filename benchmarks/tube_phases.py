@@ -2,11 +2,11 @@
 
 The flow is solved for at fifteen phases of tails of several wavelengths, at one place. From fewer phases, evenly spread
 over the Fourier sum that all of them give, the resistance is found back as a table does it: printed are the largest
-errors over a turn, in percent of what `spirillum.fluid.tube.responses` says.
+errors over a turn, in percent of what `spirillum.fluid.tube.table_errors` says.
 
     OMP_NUM_THREADS=1 python benchmarks/tube_phases.py [--t 0.065] [--f -0.5] [--yaw 0.95] [--wavelength 25 ...] ROBOT
 
-The place is given as in `spirillum.fluid.tube.places`: the way from floor to axis, the share of the largest pitch, and
+The place is given as in `spirillum.fluid.tube.nodes`: the way from floor to axis, the share of the largest pitch, and
 that of the largest yaw there. It takes a minute of the processor.
 """
 
@@ -20,6 +20,7 @@ import spirillum as sp
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.film import FilmTable
+from spirillum.fluid.tube.nodes import LARGEST_YAW, STEEPEST, Places
 from spirillum.fluid.tube.outer_resistance import (
     NodeSolution,
     even_phases,
@@ -29,9 +30,8 @@ from spirillum.fluid.tube.outer_resistance import (
     rest_at,
     solutions,
 )
-from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, Places
-from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.film_table import film_at
 from spirillum.kernels.tube_table import cut_of_film

@@ -29,7 +29,7 @@ import mpmath as mp  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
-from spirillum.fluid.wire.revolution import Panels, panels_of
+from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.robot.outline import Outline, Segment, body_outline, cylinder_outline
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """What does the form of the wire cost the forward velocity in a tube: `standard` wires against `high` ones?
 
 The paper's tails in its tubes at a prescribed rate, from the same coarse resolution of waves and modes with both forms
-of the wire, averaged over three phases. `spirillum.fluid.tube.wire_error` states these numbers.
+of the wire, averaged over three phases. `spirillum.fluid.tube.table_errors` states these numbers.
 
     OMP_NUM_THREADS=1 python benchmarks/tube_wires.py
 """

@@ -22,8 +22,7 @@ from typing import Any, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from spirillum.robot.fields import Section
-from spirillum.robot.meanings import meanings
+from spirillum.robot.fields import Section, meanings
 from spirillum.units import Kind, for_people, show
 
 DOCS = Path(__file__).parent

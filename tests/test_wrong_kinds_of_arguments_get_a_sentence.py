@@ -20,7 +20,7 @@ from spirillum.robot.arguments import Options
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.steady import swim
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
 WIDE = "biorob2012-wide"

@@ -7,7 +7,7 @@ from typing import Any
 import av
 
 import spirillum as sp
-from spirillum.papers.biorob2012.frenet_figure import frenet_figure
+from spirillum.papers.biorob2012.figures import frenet_figure
 from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure

@@ -261,8 +261,8 @@ _FAMILIES = {
         "speeds are less certain or not given. Check the robot file, the heights in the setup, and the ruler."
     ),
     "outline-alone": (
-        "The coloured seal was not found, and over a grid or through glass the outline of the body may follow what is not"
-        " the body's. Speed and tail rate are less certain or not given. Look at the named frame; a seal in a saturated"
+        "The coloured seal was not found, and over a grid or through glass the outline of the body may follow what is"
+        " not the body's. Speed and tail rate are less certain or not given. Look at the named frame; a seal in a saturated"
         " colour, or plain paper under the tube, helps."
     ),
     "two-robots not-the-robot something-else-followed robot-stands-still nothing-moves does-not-advance one-picture": (

@@ -13,8 +13,7 @@ from spirillum.errors import InputError, did_you_mean
 def schema_of(name: str) -> dict[str, Any]:
     """JSON schema of a file."""
     from spirillum.fitted.calibration_file import CalibrationFile
-    from spirillum.robot.fields import Section
-    from spirillum.robot.meanings import meanings
+    from spirillum.robot.fields import Section, meanings
     from spirillum.robot.robot import Robot
     from spirillum.studies.spec import Study
     from spirillum.vision.setup import Setup

@@ -123,7 +123,7 @@ def test_volume_of_the_printed_body_is_that_of_the_solids_and_what_joins_them() 
 
     The joint gains no more than half a ball and loses no more than the quarter of two crossing rods, 4/3 a^3.
     """
-    from spirillum.exports.solid import united
+    from spirillum.exports.meshes import united
 
     robot = sp.load(WIDE)
     coarse, fine = (united(robot_mesh(robot, fineness=fineness)).volume for fineness in (1.25, 2.5))
@@ -324,7 +324,7 @@ def test_sidecar_is_the_models_matrix_and_the_links(described: Path) -> None:
 
 def test_what_is_said_about_turning_the_matrix_is_true() -> None:
     """Q R Q' at the joint's angle is the model's own matrix there."""
-    from spirillum.exports.sidecar import sidecar_of
+    from spirillum.exports.descriptions import sidecar_of
     from spirillum.fluid.registry import find_swimmer_model
     from spirillum.robot.batch import RobotBatch
 
@@ -362,7 +362,7 @@ def test_a_robots_name_cannot_break_the_files(tmp_path: Path) -> None:
     [("rotor", None, 7e-7), ("rotor", "2e-5 N m s/rad", 2e-5), ("none", None, 0.0), ("body", "2e-5 N m s/rad", 7e-7)],
 )
 def test_friction_of_the_joint_is_what_acts_inside_it(reading: str, effective: str | None, wanted: float) -> None:
-    from spirillum.exports.sidecar import joint_friction
+    from spirillum.exports.descriptions import joint_friction
 
     robot = sp.load(WIDE, **{"friction.reading": reading, "friction.effective": effective})
     np.testing.assert_allclose(joint_friction(robot), wanted, rtol=1e-14)

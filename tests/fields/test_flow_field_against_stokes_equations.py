@@ -10,7 +10,7 @@ import pytest
 import spirillum as sp
 from comparisons import flow_gradients
 from spirillum.errors import InputError
-from spirillum.fields.unbounded import FlowField, flow_field
+from spirillum.fields.fluid_field import FlowField, flow_field
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.wire.interaction import Discretisation, solve

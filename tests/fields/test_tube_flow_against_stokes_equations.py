@@ -9,8 +9,8 @@ import pytest
 
 from comparisons import flow_gradients
 from spirillum.errors import InputError
+from spirillum.fields.fluid_field import flow_field
 from spirillum.fields.in_tube import TubeFlowField, tube_flow_field
-from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.placement import Placement
 

@@ -9,7 +9,7 @@ from scipy.special import ellipe, ellipkm1
 from spirillum.fluid.algebra import about_point
 from spirillum.fluid.closed.perrin import spheroid_drag
 from spirillum.fluid.wire.interaction import Discretisation, UnitTwistSolution, solve
-from spirillum.fluid.wire.revolution import panels_of
+from spirillum.fluid.wire.sources import panels_of
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline
 
 DIAGONAL = [0, 1, 3, 4]

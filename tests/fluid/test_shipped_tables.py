@@ -12,11 +12,11 @@ import spirillum as sp
 from spirillum.fluid.tube import library
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.outer_resistance import even_phases, matrix_of
-from spirillum.fluid.tube.places import Places
-from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
+from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_places import PHASES

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.fluid.tube import wire_error as module
+from spirillum.fluid.tube import table_errors as module
 from spirillum.fluid.tube.building import _wire_error
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.tube.places import Places
-from spirillum.fluid.tube.wire_error import LARGEST_WIRE_ERROR, wire_error
+from spirillum.fluid.tube.nodes import Places
+from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR, wire_error
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.robot.batch import RobotBatch

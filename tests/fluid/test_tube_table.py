@@ -17,6 +17,7 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.fluid.tube import library, tube
 from spirillum.fluid.tube.building import OnAxis, _powers
+from spirillum.fluid.tube.nodes import Places, rings_of
 from spirillum.fluid.tube.outer_resistance import (
     HARMONICS,
     PHASES,
@@ -32,10 +33,9 @@ from spirillum.fluid.tube.outer_resistance import (
     seen_in_mirror,
     solutions,
 )
-from spirillum.fluid.tube.places import Places, rings_of
-from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of, packed_from, to_bytes
+from spirillum.fluid.tube.table_errors import RESPONSES, response_errors, response_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.robot.batch import RobotBatch

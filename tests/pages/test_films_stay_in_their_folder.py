@@ -11,7 +11,7 @@ from spirillum.errors import InputError
 from spirillum.pages import video_store as films_module
 from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.setup_form import form_fields
-from spirillum.pages.uploads import TooLargeError
+from spirillum.pages.video_store import TooLargeError
 from spirillum.robot.load import load
 
 WHOLE = {

@@ -26,13 +26,12 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages import server
-from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate, Strangers
 from spirillum.pages.job import BackgroundJob
 from spirillum.pages.knobs import Settings
 from spirillum.pages.measurement_session import MeasurementSession
-from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import StudyPicture
-from spirillum.pages.uploads import TooLargeError, Uploads
+from spirillum.pages.video_store import TooLargeError, Uploads
 
 
 def _answer(served: Any, path: str, method: str = "GET", body: bytes | None = None, **headers: str) -> Any:

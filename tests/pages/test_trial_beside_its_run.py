@@ -9,8 +9,8 @@ import xarray as xr
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.pages.page_robot import PageRobot
+from spirillum.pages.replay import compared_series
 from spirillum.pages.study_picture import StudyPicture, sent_study
-from spirillum.pages.trial_comparison import compared_series
 
 
 def _series(time: np.ndarray, speed: float, tail: float, body: float, tail_name: str, offset: float) -> xr.Dataset:

@@ -14,8 +14,8 @@ from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
 from spirillum.results.study import write_report
 from spirillum.results.study_content import FRICTION_MEANINGS
-from spirillum.robot.actuation import FrictionReading
-from spirillum.view.figures.picture import Picture
+from spirillum.robot.tables import FrictionReading
+from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.style import new_figure
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}

@@ -57,7 +57,7 @@ def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
             getattr(answer.intervals, end)["forward_velocity"], rel=1e-12
         )
         assert np.isnan(float(found.sel(model="rft")))
-    from spirillum.view.figures.study_view import StudyView
+    from spirillum.view.figures.study_panels import StudyView
 
     shown = StudyView.of(dataset).part(channel=1)
     assert shown.with_intervals == ("sbt",)

@@ -18,7 +18,7 @@ from spirillum.studies.released_robots import (
     without_answer,
 )
 from spirillum.studies.spec import LaidDown
-from spirillum.view.figures.laid_down import laid_down_picture
+from spirillum.view.figures.release import laid_down_picture
 
 SHORT = {
     "models": ["sbt", "rft"],

@@ -10,7 +10,7 @@ from spirillum.robot.placement import Placement
 from spirillum.studies.ranking import LET_GO, StudyRanking, best_in_words, ranking_of
 from spirillum.studies.settled import STATES, SettledTask, not_settled
 from spirillum.studies.spec import Contact
-from spirillum.view.figures.ranking import ranking_picture
+from spirillum.view.figures.comparison import ranking_picture
 
 LET = {
     "models": ["tube"],

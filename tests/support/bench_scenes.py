@@ -20,15 +20,13 @@ from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
 from spirillum.units import Hz
-from spirillum.virtual.artifacts import Troubles, stripe_edges
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation, Troubles, stripe_edges
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import framed, lens_of, swimming_range
 from spirillum.virtual.motion import motion_of
-from spirillum.virtual.painter import Painter
+from spirillum.virtual.optics import tank_of
+from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.solids import linear
-from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.truth import setup_text
 

@@ -9,11 +9,10 @@ from PIL import Image
 
 import spirillum as sp
 from spirillum.robot.load import load
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.painter import Painter
-from spirillum.virtual.tank import tank_of
+from spirillum.virtual.optics import VirtualLens, tank_of
+from spirillum.virtual.pictures import Painter
 from spirillum.virtual.trial import render
 
 LENS = VirtualLens(0.21, 0.06, 1.4, 370.0, (320, 240))

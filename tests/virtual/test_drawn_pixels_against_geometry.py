@@ -6,10 +6,9 @@ import pytest
 import spirillum as sp
 from spirillum.kernels.raster import Shading, draw
 from spirillum.robot.surface import mass_properties
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.painter import Painter
+from spirillum.virtual.optics import VirtualLens, backdrop, spots, tank_of
+from spirillum.virtual.pictures import Painter
 from spirillum.virtual.solids import solids_of
-from spirillum.virtual.tank import backdrop, spots, tank_of
 from spirillum.virtual.trajectory import steady_trajectory
 
 

@@ -8,9 +8,8 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.virtual.artifacts import Troubles, ViewArtifacts
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.painter import Painter, light_path
-from spirillum.virtual.tank import backdrop, tank_of
+from spirillum.virtual.optics import VirtualLens, backdrop, tank_of
+from spirillum.virtual.pictures import Painter, light_path
 from spirillum.virtual.trajectory import TrialTrajectory, steady_trajectory
 
 LENS = VirtualLens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0))

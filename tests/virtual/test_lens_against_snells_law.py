@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.kernels.sightlines import sightline
-from spirillum.virtual.lens import VirtualLens
+from spirillum.virtual.optics import VirtualLens
 from spirillum.virtual.trajectory import lab_to_camera
 
 SIZE = (640, 480)

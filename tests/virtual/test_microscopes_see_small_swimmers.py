@@ -7,7 +7,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.virtual.framing import lens_of
-from spirillum.virtual.tank import tank_of
+from spirillum.virtual.optics import tank_of
 from spirillum.virtual.trial_options import CameraOptions
 
 SMALL = {

@@ -12,7 +12,7 @@ import xarray as xr
 import spirillum as sp
 from spirillum.robot.load import load
 from spirillum.units import Hz
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import motion_of_run, steady_rates
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory

@@ -10,6 +10,7 @@ from spirillum.errors import InputError
 from spirillum.robot.load import load
 from spirillum.virtual.artifacts import (
     NAMES,
+    Degradation,
     Shake,
     Troubles,
     ViewArtifacts,
@@ -18,7 +19,6 @@ from spirillum.virtual.artifacts import (
     stripe_edges,
     with_troubles,
 )
-from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.solids import solids_of
 
 

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import lens_of
-from spirillum.virtual.painter import Painter
-from spirillum.virtual.tank import tank_of
+from spirillum.virtual.optics import tank_of
+from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
 from spirillum.vision.camera.optics import BodyPose, Optics

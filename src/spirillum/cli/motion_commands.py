@@ -260,7 +260,7 @@ def check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
     from spirillum.files import output_target
     from spirillum.optional_dependencies import import_optional
-    from spirillum.view.scene3d.encode import FILMS
+    from spirillum.view.scene3d.rendering import FILMS
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):

@@ -80,7 +80,7 @@ def settle(
             progress=progress,
         )
     if target is not None:
-        from spirillum.view.figures.settling import settling_figure
+        from spirillum.view.figures.release import settling_figure
         from spirillum.view.figures.style import save_as
 
         save_as(settling_figure(found), target)

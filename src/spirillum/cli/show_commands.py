@@ -85,8 +85,8 @@ def film(
     from spirillum.cli import renderer
     from spirillum.dynamics.run_file import open_run
     from spirillum.files import output_target
-    from spirillum.view.scene3d.encode import FILMS
     from spirillum.view.scene3d.film import film as answer
+    from spirillum.view.scene3d.rendering import FILMS
 
     output_target(output, FILMS, "run.mp4")
     dataset = open_run(run)

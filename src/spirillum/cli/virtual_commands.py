@@ -287,7 +287,7 @@ def _fields(options: type[Options], given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _degradation(given: Mapping[str, Any]) -> dict[str, Any]:
     """A preset, and the fields that replace its own; a switch that is off replaces none."""
-    from spirillum.virtual.degradation import Degradation
+    from spirillum.virtual.artifacts import Degradation
 
     moves = False if given["glare_fixed"] else None
     hand = given["hand"] or None

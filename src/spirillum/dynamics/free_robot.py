@@ -18,10 +18,10 @@ from spirillum.dynamics.films import films_of
 from spirillum.fluid.model import SwimmerModel
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.steady import calibrated_resistance

@@ -11,8 +11,8 @@ from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 from spirillum.kernels.rigid_links import ATTITUDE, PHASE, POSITION, STATES
+from spirillum.robot.geometry import Channel
 from spirillum.robot.links import outlines_of
-from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import Seat, gap_of, largest_gap

@@ -15,12 +15,16 @@ from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import PARAMETERS, AxialRobot, axial_robot
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError
-from spirillum.exports.mjcf import FLUID_WARNING, check_inertia, mjcf_text
-from spirillum.exports.parts import mesh_files
-from spirillum.exports.polydata import vtp_bytes
-from spirillum.exports.sidecar import sidecar_of
-from spirillum.exports.solid import UnitedBody, is_watertight, is_watertight_file, stl_bytes, united
-from spirillum.exports.urdf import urdf_text
+from spirillum.exports.descriptions import FLUID_WARNING, check_inertia, mjcf_text, sidecar_of, urdf_text
+from spirillum.exports.meshes import (
+    UnitedBody,
+    is_watertight,
+    is_watertight_file,
+    mesh_files,
+    stl_bytes,
+    united,
+    vtp_bytes,
+)
 from spirillum.files import MARK, output_folder, output_target, protected, whole_files
 from spirillum.notes import Note, notes_in_answer
 from spirillum.robot.links import Links, links_of

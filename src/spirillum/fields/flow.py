@@ -15,10 +15,9 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
-from spirillum.fields.fluid_field import FluidField
+from spirillum.fields.fluid_field import FluidField, flow_field
 from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fields.in_tube import tube_flow_field
-from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.domain import seat_of
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import unit_of

@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, clipped
 from spirillum.measurement.depth import apparent_distance
-from spirillum.robot.parts import StripeColour
+from spirillum.robot.geometry import StripeColour
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.setup import INDICES
 from spirillum.vision.track.colours import colours_named

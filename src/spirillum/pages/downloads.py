@@ -10,8 +10,8 @@ from importlib.resources import files
 from typing import Any
 
 from spirillum.pages.knobs import Settings
-from spirillum.pages.numbers import quantity_list
 from spirillum.pages.page_robot import PageRobot
+from spirillum.pages.robot_data import quantity_list
 from spirillum.robot.toml_writer import robot_text
 from spirillum.version import own_version
 

@@ -1,8 +1,8 @@
-"""Who may talk to the page: the one who has its key, from its own address, not too much and not too often.
+"""Access control of the page: key, address, origin, and limits of connections and messages.
 
-The server listens on the loopback unless it is told otherwise, but every web page that a browser shows can send
-requests there. So each request needs the key, a `Host` that is an address and not a name of somebody else's (against
-DNS rebinding), and, where a browser says from which page it comes, this page (`Origin`).
+The server listens on the loopback interface by default, but every web page that a browser shows can send
+requests there. So each request needs the key, a `Host` that is an address and not a foreign name (against
+DNS rebinding), and, if the browser sends an `Origin`, this page's own.
 
 The key is the first part of every path. A cookie would not do: cookies ignore ports, and a browser sends them to every
 other server on this machine too.
@@ -10,11 +10,71 @@ other server on this machine too.
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import secrets
 import socket
 import time
 from collections.abc import Mapping
+from typing import Any
+
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
+
+_MOST = 64
+"""Connections without a key; for another one the oldest is closed."""
+_PATIENCE = 10.0
+"""Time after which a connection without a key is closed, s."""
+_Address = tuple[str, int]
+
+
+class Strangers:
+    """Open connections without a key, the oldest first; used by the server's one thread."""
+
+    def __init__(self, most: int = _MOST, patience: float = _PATIENCE) -> None:
+        """No connection yet.
+
+        Args:
+            most: connections without a key that are open at once.
+            patience: time in which a connection has to show the key, s.
+        """
+        self._most, self._patience = most, patience
+        self._waiting: dict[_Address, tuple[asyncio.BaseTransport, asyncio.TimerHandle]] = {}
+
+    def greet(self, transport: asyncio.BaseTransport) -> None:
+        """Begin to wait for the key of a connection."""
+        address: _Address = transport.get_extra_info("peername")[:2]
+        self.admit(address)  # the port of a connection that was closed comes again
+        timer = asyncio.get_running_loop().call_later(self._patience, self._close, address)
+        self._waiting[address] = transport, timer
+        if len(self._waiting) > self._most:
+            self._close(next(iter(self._waiting)))
+
+    def admit(self, address: _Address | None) -> None:
+        """Wait no longer: this connection has shown the key, or is closed."""
+        if address in self._waiting:
+            self._waiting.pop(address)[1].cancel()
+
+    def _close(self, address: _Address) -> None:
+        transport, timer = self._waiting.pop(address)
+        timer.cancel()
+        if isinstance(transport, asyncio.Transport):
+            transport.abort()
+
+
+def protocol_for(strangers: Strangers) -> type[asyncio.Protocol]:
+    """Return the server's HTTP protocol, which reports every new connection."""
+
+    class Reporting(AutoHTTPProtocol):  # type: ignore[misc, valid-type]  # which one it is follows from what is installed
+        def connection_made(self, transport: Any) -> None:
+            super().connection_made(transport)
+            strangers.greet(transport)
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            super().connection_lost(exc)
+            strangers.admit(getattr(self, "client", None))
+
+    return Reporting
+
 
 HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": (

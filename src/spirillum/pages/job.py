@@ -1,7 +1,8 @@
-"""Work of minutes beside the page: a module run in a process of its own, which tells its progress in lines of JSON."""
+"""Background work of the page: threads for blocking calls, processes that report progress in lines of JSON."""
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import subprocess
@@ -9,10 +10,43 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from threading import Thread
+from typing import Any, TypeVar
 
 from spirillum.errors import InputError, failure_sentence
-from spirillum.pages.commands import report_fault
+from spirillum.pages.knobs import report_fault
+
+_Answer = TypeVar("_Answer")
+
+
+async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _Answer:
+    """Return what a function returns, computed in a daemon thread.
+
+    The threads of `asyncio.to_thread` are joined when the loop closes: a film that is being searched would keep the
+    process alive for as long as it takes.
+
+    Raises:
+        BaseException: what the function raises.
+    """
+    loop = asyncio.get_running_loop()
+    future: asyncio.Future[_Answer] = loop.create_future()
+
+    def settle(setter: Callable[[Any], None], value: Any) -> None:
+        if not future.done():  # done: cancelled, for the page ends
+            setter(value)
+
+    def run() -> None:
+        outcome: tuple[Callable[[Any], None], Any]
+        try:
+            outcome = future.set_result, work(*arguments)
+        except BaseException as error:
+            outcome = future.set_exception, error
+        with suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(settle, *outcome)
+
+    Thread(target=run, name="page: request", daemon=True).start()
+    return await future
+
 
 Tell = Callable[..., None]
 """Called with what is told, by name."""

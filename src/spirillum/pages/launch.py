@@ -61,9 +61,8 @@ def page(
         raise InputError(f"port = {port}; allowed: 0 (a free one) to {_LARGEST_PORT}")
     import uvicorn
 
-    from spirillum.pages.guard import Guard, is_loopback
+    from spirillum.pages.guard import Guard, Strangers, is_loopback, protocol_for
     from spirillum.pages.server import application
-    from spirillum.pages.strangers import Strangers, protocol_for
 
     listening = _listening(host, port)
     with listening:

@@ -15,11 +15,11 @@ from starlette.routing import Route
 
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import LARGEST_TEXT
-from spirillum.pages.background import run_in_background
-from spirillum.pages.commands import text_of
+from spirillum.pages.job import run_in_background
+from spirillum.pages.knobs import text_of
 from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.simulation_thread import SimulationThread
-from spirillum.pages.uploads import Uploads, stated_size
+from spirillum.pages.video_store import Uploads, stated_size
 
 _MOST_POINTS = 40
 _FARTHEST = 1e6

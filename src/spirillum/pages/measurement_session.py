@@ -18,9 +18,8 @@ from spirillum.calibration.methods import METHODS
 from spirillum.errors import InputError
 from spirillum.files import scratch_folder
 from spirillum.pages.job import BackgroundJob
-from spirillum.pages.plain_names import plain, plain_names
 from spirillum.pages.setup_form import FORM, form_fields, form_list
-from spirillum.pages.video_store import VideoStore
+from spirillum.pages.video_store import VideoStore, plain, plain_names
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.model_options import CALIBRATED
 from spirillum.robot.robot import Robot
@@ -307,9 +306,9 @@ class MeasurementSession:
             self._start("measure", {"films": films, "setup": str(self.desk.written())})
 
     def beside(self, name: str) -> dict[str, Any]:
-        """A measured trial beside the simulated robot; see `spirillum.pages.trial_comparison`."""
+        """A measured trial beside the simulated robot; see `spirillum.pages.replay`."""
         from spirillum.dynamics.run_file import open_run
-        from spirillum.pages.trial_comparison import trial_beside_its_run
+        from spirillum.pages.replay import trial_beside_its_run
 
         with self._lock:
             trials = self._results.get("measure", {}).get("trials", [])

@@ -14,12 +14,9 @@ import numpy as np
 
 from spirillum.errors import InputError, failure_sentence
 from spirillum.notes import notes_in
-from spirillum.pages.commands import report_fault
 from spirillum.pages.job import BackgroundJob, worker
-from spirillum.pages.knobs import MODELS, Settings
-from spirillum.pages.numbers import SERIES, axial_forces_of, quantity_list
-from spirillum.pages.recording import SampleRecording, finite
-from spirillum.pages.shapes import shape_of
+from spirillum.pages.knobs import MODELS, Settings, report_fault
+from spirillum.pages.robot_data import SERIES, SampleRecording, axial_forces_of, finite, quantity_list, shape_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot

@@ -18,16 +18,15 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
-from spirillum.pages.background import run_in_background
 from spirillum.pages.downloads import MODULES, asset, command_line, python_lines, replay_page, robot_file
-from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate, Strangers
+from spirillum.pages.job import run_in_background
 from spirillum.pages.measurement_routes import bench_routes
 from spirillum.pages.measurement_session import MeasurementSession
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
 from spirillum.pages.simulation_thread import SimulationThread
-from spirillum.pages.strangers import Strangers
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
-from spirillum.pages.uploads import TooLargeError, Uploads
+from spirillum.pages.video_store import TooLargeError, Uploads
 
 _MOST_CLIENTS = 32
 _MOST_REFUSALS = 20

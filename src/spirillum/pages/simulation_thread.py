@@ -11,11 +11,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from spirillum.errors import InputError, failure_sentence
-from spirillum.pages.commands import number_of, refusal_of, report_fault, robot_tables, text_of
 from spirillum.pages.job import BackgroundJob, worker
-from spirillum.pages.knobs import Settings
-from spirillum.pages.numbers import prediction_answer, quantity_list
+from spirillum.pages.knobs import Settings, number_of, refusal_of, report_fault, robot_tables, text_of
 from spirillum.pages.page_robot import Built, PageRobot, build
+from spirillum.pages.robot_data import prediction_answer, quantity_list
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot

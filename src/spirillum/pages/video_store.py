@@ -1,24 +1,86 @@
-"""Films that were sent to the page, in its temporary folder under names that are given here."""
+"""Uploads to the page: declared sizes and limits, videos in a temporary folder, messages without its path."""
 
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import threading
-from contextlib import suppress
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from starlette.requests import Request
+
 from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
-from spirillum.pages.plain_names import plain_names
-from spirillum.pages.uploads import TooLargeError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from spirillum.vision.video.frames import Video
+
+
+def plain(sentence: str, folder: Path) -> str:
+    """A sentence without the folder, or one of the folders in it, before the names of files."""
+    return re.sub(re.escape(str(folder)) + r"(/[a-z]+-\d+(?=/))?/", "", sentence)
+
+
+@contextmanager
+def plain_names(folder: Path) -> Iterator[None]:
+    """What is wrong is said in such a sentence."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(plain(str(error), folder), [plain(one, folder) for one in error.problems]) from error
+
+
+_LARGEST_TOGETHER = 128 << 20
+"""Bytes of all files and messages that are held in memory at once. Films go to the disk."""
+
+
+class TooLargeError(InputError):
+    """More is sent than there is room for."""
+
+
+def stated_size(request: Request) -> int:
+    """Bytes that a request is about to send; the server takes no more of it."""
+    size = request.headers.get("content-length", "")
+    if not size.isdecimal():
+        raise InputError("a request without its size; allowed: one with a Content-Length")
+    return int(size)
+
+
+class Uploads:
+    """Files and messages from when they are announced until they are read; used by the server's one thread."""
+
+    def __init__(self) -> None:
+        """Nothing is sent yet."""
+        self._left = _LARGEST_TOGETHER
+
+    @asynccontextmanager
+    async def received(self, request: Request, largest: int) -> AsyncIterator[bytes]:
+        """What a request sends, counted until the block ends.
+
+        Raises:
+            TooLargeError: if it is too large, by itself or with all that others are sending.
+            InputError: if it does not state its size.
+        """
+        size = stated_size(request)
+        if size > largest:
+            raise TooLargeError(f"{size} bytes are too much; allowed: {largest} bytes")
+        if size > self._left:
+            raise TooLargeError(
+                f"too much is sent at once; allowed: {_LARGEST_TOGETHER >> 20} MB in all, so try again soon"
+            )
+        self._left -= size
+        try:
+            yield await request.body()
+        finally:
+            self._left += size
+
 
 _LARGEST_FILM = 4 << 30
 """Bytes of one film."""

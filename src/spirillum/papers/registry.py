@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from spirillum.papers.biorob2012.claims import evaluated, foretold
 from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.papers.claim import Claim
-from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.study import study_figures
-from spirillum.view.figures.study_view import PaperFigure
+from spirillum.view.figures.study_panels import PaperFigure
 
 if TYPE_CHECKING:
     import xarray as xr

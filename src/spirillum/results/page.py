@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.files import output_folder
-from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.style import save
 
 

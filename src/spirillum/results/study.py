@@ -22,19 +22,19 @@ from spirillum.papers.studies import study_of
 from spirillum.results.page import draw_pictures, page
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
-from spirillum.robot.actuation import Drive, Motor
-from spirillum.robot.parts import Body, Channel, Coupling, Fluid, Tail
+from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import Drive, Motor
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
 from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
 from spirillum.studies.run import Progress, computed_study, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
 from spirillum.studies.study_loader import LARGEST_STUDY, load_study
-from spirillum.view.figures.laid_down import laid_down_picture
-from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.ranking import ranking_picture
+from spirillum.view.figures.comparison import ranking_picture
+from spirillum.view.figures.release import laid_down_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
+from spirillum.view.figures.sheet import Picture
 from spirillum.worker_pool import checked_crew
 
 if TYPE_CHECKING:

@@ -13,11 +13,10 @@ from spirillum.argument_validation import number_array, validate_arguments, whol
 from spirillum.arrays import Flags, PerRobot, Values
 from spirillum.errors import InputError, clipped
 from spirillum.robot import geometry
-from spirillum.robot.actuation import DriveKind, FrictionReading
+from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
-from spirillum.robot.parts import End, Shape
 from spirillum.robot.placement import Placement
-from spirillum.robot.tables import RobotTables
+from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables
 
 
 class Column(NamedTuple):

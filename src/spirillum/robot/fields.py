@@ -1,9 +1,13 @@
-"""Field types of the robot file: a quantity with its unit goes in, an SI float comes out."""
+"""Field types of the robot file: convert a quantity with its unit to an SI float; descriptions of fields."""
 
 from __future__ import annotations
 
+import ast
+import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from textwrap import dedent
 from typing import Annotated, Any, NamedTuple, get_args
 
 from pydantic import (
@@ -60,6 +64,23 @@ __all__ = [
     "kind_of",
     "quantity_schema",
 ]
+
+
+def meanings(model: type[BaseModel]) -> dict[str, str]:
+    """Meanings of the fields of a table by their names; its own words replace those of what it is made from."""
+    ours = (part for part in reversed(model.__mro__) if part.__module__.startswith("spirillum."))
+    return {name: words for part in ours for name, words in _words(part) if name in model.model_fields}
+
+
+def _words(part: type) -> Iterator[tuple[str, str]]:
+    """Names that are declared in a class, with the texts that follow them."""
+    (definition,) = ast.parse(dedent(inspect.getsource(part))).body
+    assert isinstance(definition, ast.ClassDef)  # noqa: S101 - the source of a class
+    for field, below in pairwise(definition.body):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(below, ast.Expr):
+            text = below.value.value if isinstance(below.value, ast.Constant) else None
+            if isinstance(text, str):
+                yield field.target.id, inspect.cleandoc(text)
 
 
 class Section(BaseModel):

@@ -15,10 +15,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.costs import check_memory
 from spirillum.errors import InputError
-from spirillum.robot.geometry import Centreline, centreline
+from spirillum.robot.geometry import Centreline, Seal, StripeColour, centreline
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
-from spirillum.robot.parts import Seal, StripeColour
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
 from spirillum.units import show

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.parts import End, Shape
+from spirillum.robot.geometry import End, Shape
 
 
 @dataclass(frozen=True)

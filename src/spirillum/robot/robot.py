@@ -8,12 +8,11 @@ import numpy as np
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.robot.actuation import Battery, Motor
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
-from spirillum.robot.tables import RobotTables
+from spirillum.robot.tables import Battery, Motor, RobotTables
 from spirillum.units import display_unit, in_unit, show
 
 STANDARD_GRAVITY = 9.80665

@@ -1,17 +1,144 @@
-"""The tables of a robot file, each field checked and the fields checked against each other."""
+"""Drive, motor, battery and friction (Table II), and the complete robot file with its cross-field checks."""
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Mapping
+from math import pi
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.notes import Note
-from spirillum.robot.actuation import Battery, Drive, Friction, Magnetic, Motor
-from spirillum.robot.fields import Section, Text
+from spirillum.robot.fields import (
+    AlsoReads,
+    BackEmfConstant,
+    Charge,
+    Inductance,
+    InverseCurrent,
+    Length,
+    MagneticField,
+    MagneticMoment,
+    MomentAngle,
+    Rate,
+    Resistance,
+    ResistancePerCurrent,
+    RotaryFriction,
+    Section,
+    Text,
+    Torque,
+    TorqueConstant,
+    Voltage,
+    quantity_schema,
+)
+from spirillum.robot.geometry import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
-from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.units import KINDS
+
+DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
+
+FrictionReading = Literal["none", "rotor", "body", "paper"]
+
+
+class Drive(Section):
+    """What turns the tail, and the joint between tail and body."""
+
+    kind: DriveKind
+    """`dc-motor` (motor and battery of the file), `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
+    joint: Literal["revolute", "fixed"] = "revolute"
+    """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
+    rate: Rate | None = None
+    """For `rate`: rotation rate of the tail about +x in the lab."""
+    torque: Torque | None = None
+    """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
+    duty: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
+    """For `dc-motor`: pulse-width duty of the voltage controller; 1 is full throttle."""
+
+
+class MotorResistance(Section):
+    """Table II: R(I) = constant + decay exp(-decay_rate I) + growth exp(growth_rate I) + slope I."""
+
+    constant: Resistance
+    """Constant term."""
+    decay: Resistance = 0.0
+    """Amplitude of the term that decays with current."""
+    decay_rate: InverseCurrent = 0.0
+    """Rate of that decay."""
+    growth: Resistance = 0.0
+    """Amplitude of the term that grows with current."""
+    growth_rate: InverseCurrent = 0.0
+    """Rate of that growth."""
+    slope: ResistancePerCurrent = 0.0
+    """Slope of the linear term (with its sign)."""
+
+
+def _plain_resistance(value: Any) -> Any:
+    """A single value, which does not depend on the current, as the constant term."""
+    return value if isinstance(value, (Mapping, MotorResistance)) else {"constant": value}
+
+
+_PLAIN_RESISTANCE = AlsoReads(lambda _: quantity_schema(KINDS["resistance"]))
+
+
+class Motor(Section):
+    """The DC-motor of eqs (17) and (18)."""
+
+    torque_constant: TorqueConstant
+    """Torque constant K_m (Table II)."""
+    back_emf_constant: BackEmfConstant
+    """Back-emf constant K_b (Table II)."""
+    inductance: Inductance
+    """Inductance L (Table II)."""
+    rotor_friction: RotaryFriction
+    """Friction B_m of the rotor alone, on the motor's shaft (Table II)."""
+    resistance: Annotated[MotorResistance, BeforeValidator(_plain_resistance), _PLAIN_RESISTANCE]
+    """Equivalent resistance R(I) of motor and driver (Table II): its terms, or one value such as `"10.4 ohm"`."""
+    gear_ratio: Annotated[float, Field(strict=True, ge=1e-3, le=1e4, allow_inf_nan=False)] = 1.0
+    """Turns of the motor's shaft for one of the joint, G, of a gear without losses of its own; 1: driven directly."""
+    polarity: Literal["forward", "reverse"] = "forward"
+    """`forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
+    shaft_diameter: Length | None = None
+    """Diameter of the shaft (Table I's rotor), for pictures and exports only; unset: the wire's."""
+
+    @property
+    def joint_rotor_friction(self) -> float:
+        """B_m G^2: friction of the rotor as the joint feels it, N m s/rad."""
+        return self.rotor_friction * self.gear_ratio**2
+
+
+class Battery(Section):
+    """Table II: V(I) = voltage - internal_resistance I at the terminals."""
+
+    voltage: Voltage
+    """Open-circuit voltage."""
+    internal_resistance: Resistance
+    """Voltage lost per current."""
+    capacity: Charge | None = None
+    """Rated charge."""
+
+
+class Magnetic(Section):
+    """A magnet fixed in the robot, and the uniform field that turns it about the lab's x axis."""
+
+    moment: MagneticMoment
+    """Magnetic moment m of the robot, fixed in it."""
+    moment_angle: MomentAngle = 0.5 * pi
+    """Angle between the moment and the motor axis, towards +z at rest; 90 deg (the default) is across the axis."""
+    field: MagneticField
+    """Flux density B of the field, which is at right angles to its axis of rotation."""
+    rotation_rate: Rate
+    """Rotation rate of the field about +x in the lab."""
+    axis: Literal["x"] = "x"
+    """Axis about which the field turns: `x`, the lab's and the channel's; no other is computed."""
+
+
+class Friction(Section):
+    """The effective rotary friction of eqs (18) and (19), and how it is read."""
+
+    effective: RotaryFriction | None = None
+    """B_eff in the joint, which contains B_m G^2; unset: that alone. For the `body` reading: B of the wall."""
+    reading: FrictionReading = "rotor"
+    """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""
 
 
 class RobotTables(Section):

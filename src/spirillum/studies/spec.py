@@ -10,10 +10,10 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.arguments import in_range
 from spirillum.robot.fields import Length, Rate, Section, Text, Time
 from spirillum.robot.placement import Placement
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz, show

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, Matrix12, Samples, Values
-from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.tables import FrictionReading
 
 _ZERO = np.zeros(1)
 _ZERO.setflags(write=False)

@@ -15,11 +15,11 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.notes import Note
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import friction_reading
 from spirillum.swimming.steady_quantities import STEADY, headline

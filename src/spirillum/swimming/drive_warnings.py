@@ -6,8 +6,8 @@ import numpy as np
 
 from spirillum.fluid.model import SwimmerModel
 from spirillum.notes import Note
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.steady_quantities import Swimming
 from spirillum.units import show
 

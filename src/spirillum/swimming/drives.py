@@ -8,8 +8,8 @@ import numpy as np
 
 from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import (
     FRICTIONLESS,
     FrictionTorques,

@@ -11,10 +11,10 @@ import numpy as np
 from spirillum.envelope import quantity
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.freedom import Motion
 from spirillum.swimming.steady import requirements, swim

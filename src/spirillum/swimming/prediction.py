@@ -20,13 +20,13 @@ from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import TILTED
 from spirillum.notes import Note
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import (
     accuracy_limits,

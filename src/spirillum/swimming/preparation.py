@@ -16,10 +16,10 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
-from spirillum.fluid.tube.places import Places
-from spirillum.fluid.tube.responses import RESPONSES
+from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import TubeTable, key_of
+from spirillum.fluid.tube.table_errors import RESPONSES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note

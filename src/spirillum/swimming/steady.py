@@ -15,10 +15,10 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
 from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
 from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of

@@ -8,9 +8,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
-from spirillum.virtual.degradation import Degradation
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.tank import Tank
+from spirillum.virtual.artifacts import Degradation
+from spirillum.virtual.optics import Tank, VirtualLens
 
 _LAMP, _LOST, _TILT, _GLARE, _BUBBLES, _HAND, _GRAIN = range(10, 17)
 _GRAINS = 1 << 21

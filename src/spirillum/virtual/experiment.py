@@ -40,7 +40,7 @@ from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
 from spirillum.version import own_version
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.trial import render

@@ -9,8 +9,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
-from spirillum.virtual.lens import VirtualLens
-from spirillum.virtual.tank import Tank, tube_height
+from spirillum.virtual.optics import Tank, VirtualLens, tube_height
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
 

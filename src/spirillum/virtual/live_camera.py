@@ -17,12 +17,11 @@ from spirillum.files import write_text
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import check_size, lens_of, swimming_range
-from spirillum.virtual.painter import Painter
-from spirillum.virtual.tank import tank_of
+from spirillum.virtual.optics import tank_of
+from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
 from spirillum.virtual.trial_options import CameraOptions, Seeded
 from spirillum.virtual.truth import setup_text

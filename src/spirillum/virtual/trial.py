@@ -34,15 +34,19 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
 from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
-from spirillum.virtual.artifacts import Troubles, ViewArtifacts, counted_frames, stripe_edges, with_troubles
-from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.artifacts import (
+    Degradation,
+    Troubles,
+    ViewArtifacts,
+    counted_frames,
+    stripe_edges,
+    with_troubles,
+)
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.frames import FrameEncoder
 from spirillum.virtual.framing import check_size, framed, lens_of, out_of_picture
-from spirillum.virtual.lens import VirtualLens
 from spirillum.virtual.motion import motion_of, motion_of_run
-from spirillum.virtual.painter import Painter
-from spirillum.virtual.tank import Tank, tank_of
+from spirillum.virtual.optics import Tank, VirtualLens, tank_of
+from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.files import MARK
-from spirillum.virtual.lens import VirtualLens
+from spirillum.virtual.optics import VirtualLens
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions
 

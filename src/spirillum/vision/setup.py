@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.files import read_toml
 from spirillum.robot.fields import Length, LengthOrZero, Section, Text, Time
+from spirillum.robot.geometry import Stripes
 from spirillum.robot.load import load
-from spirillum.robot.parts import Stripes
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.patches import FancyArrowPatch
 
 import spirillum as sp
-from spirillum.papers.biorob2012.frenet_figure import frenet_figure, frenet_frames
+from spirillum.papers.biorob2012.figures import frenet_figure, frenet_frames
 
 XI = np.linspace(0.001, 0.059, 40)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from spirillum.view.figures.settling import settling_figure
+from spirillum.view.figures.release import settling_figure
 
 TIME = np.linspace(0.0, 30.0, 200)
 WAY = {

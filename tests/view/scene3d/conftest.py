@@ -13,7 +13,7 @@ import spirillum as sp
 @pytest.fixture(scope="session", autouse=True)
 def drawing() -> None:
     """Skip where the machine has no off-screen rendering at all; a missing package is a failure."""
-    from spirillum.view.scene3d.window import new_plotter
+    from spirillum.view.scene3d.rendering import new_plotter
 
     try:
         plotter = new_plotter((32, 32))

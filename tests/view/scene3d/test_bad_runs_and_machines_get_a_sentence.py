@@ -144,9 +144,9 @@ def test_window_without_a_display(
 def test_machine_that_cannot_draw_says_what_to_install(
     sentence: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from spirillum.view.scene3d import window
+    from spirillum.view.scene3d import rendering
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(window, "_can_draw", lambda _window: False)
+    monkeypatch.setattr(rendering, "_can_draw", lambda _window: False)
     assert "this machine cannot draw in 3D" in sentence("show", "biorob2012-wide")
     assert list(tmp_path.iterdir()) == []

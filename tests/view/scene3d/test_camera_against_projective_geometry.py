@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.view.scene3d.camera import VIEWS, Margins, checked_view, fitted
 from spirillum.view.scene3d.overlay import scale_bar
+from spirillum.view.scene3d.scenery import VIEWS, Margins, checked_view, fitted
 
 SIZE = (1600, 900)
 POINTS = np.random.default_rng(4).normal(size=(50, 3)) * [0.05, 0.01, 0.02] + [0.3, 0.1, -0.2]

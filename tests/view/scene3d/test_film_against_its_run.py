@@ -9,8 +9,8 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics.poses import poses_of
-from spirillum.view.scene3d.camera import fitted
 from spirillum.view.scene3d.scene import DrawnRobot
+from spirillum.view.scene3d.scenery import fitted
 
 SIZE = (320, 180)
 SMALL: dict[str, Any] = {"size": SIZE, "fps": 10, "view": "side"}

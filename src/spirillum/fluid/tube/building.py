@@ -19,6 +19,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.film import FilmTable
+from spirillum.fluid.tube.nodes import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.outer_resistance import (
     PHASES,
     NodeSolution,
@@ -34,12 +35,11 @@ from spirillum.fluid.tube.outer_resistance import (
     solutions,
     solved_as_one,
 )
-from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.progress_messages import kept_after, progress_message
-from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.table_errors import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.tube import check_solvable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import MOST_STATIONS

@@ -1,20 +1,21 @@
-"""Solids of revolution in a tube: the wall's waves as Fourier modes on their rings, about their own axis.
+"""Solids of revolution in a tube: Fourier modes of the wall's reflected waves on their rings.
 
+`Rings` are about the body's own axis, `LevelRings` about an axis that is parallel to the tube's.
 Axes here: x along the robot, y up, z to the right; angles count from y.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.wall import WallWaves, point_waves, times_layers
-from spirillum.fluid.wire.revolution import Panels
+from spirillum.fluid.tube.wall import SLACK, WallWaves, each, extensions, point_waves, times_layers, weighted_layers
+from spirillum.fluid.wire.sources import Panels
 
 
 class Rows(NamedTuple):
@@ -118,3 +119,174 @@ def finer(panels: Panels, times: int) -> tuple[Samples, Samples, Samples]:
     x, rho = panels.x @ cardinal.T, panels.rho @ cardinal.T
     average: Samples = cardinal.T * (gauss * rho)[:, None, :] / panels.area.reshape(*panels.x.shape, 1)
     return x, rho, average
+
+
+_FINER = 4
+"""Nodes that average waves over a panel, over its own."""
+
+
+class LevelRings(Rings):
+    """Rings about an axis parallel to the tube's, `offset` below it.
+
+    A wave is carried over to the second axis by its velocities on one cylinder about it, the reference: Fourier modes
+    there follow from its values around the cylinder, and each mode extends to other rings as in a tube.
+    """
+
+    def __init__(self, panels: Panels, offset: float, modes: int) -> None:
+        """Rings of solids.
+
+        Args:
+            panels: of the solids.
+            offset: m.
+            modes: Fourier modes about the second axis.
+        """
+        self.panels, self.offset, self.modes = panels, offset, modes
+        self.reference = float(np.max(panels.rho))
+
+    def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
+        """See `Rings.subtract`."""
+        at_nodes, averages = self._strengths(waves), self._strengths(waves, averaged=True)
+        between = self._matrices(waves)
+
+        def lessen(family: Rows) -> None:
+            starts, matrix = family.starts, matrices[family.parity]
+            for band, near in self._bands(waves):
+                active = [np.flatnonzero(near[here]) for here in family.of_mode]
+                size = waves.k[band].size
+                sources = [
+                    averages[n][there[some], band].reshape(some.size, 6 * size)
+                    for n, (there, some) in enumerate(zip(family.of_mode, active, strict=True))
+                ]
+                for m, (here, some) in enumerate(zip(family.of_mode, active, strict=True)):
+                    target = at_nodes[m][here[some], band].swapaxes(0, 1).reshape(size, 2 * some.size, 3)
+                    pressed = target @ between[family.parity][band, m].reshape(size, 3, 3 * self.modes)
+                    shaped = pressed.reshape(size, some.size, 2, self.modes, 3).transpose(3, 1, 0, 2, 4)
+                    left = np.ascontiguousarray(shaped).reshape(self.modes, some.size, 6 * size)
+                    for n, source in enumerate(sources):
+                        block = source @ left[n].T
+                        block *= family.dual[starts[n] + active[n], None]
+                        _take(block, matrix.T, starts[n] + active[n], starts[m] + some)
+
+        each(lessen, [family for (family,) in systems])
+
+    def _bands(self, waves: WallWaves) -> Iterator[tuple[slice, np.ndarray]]:
+        """Bands of k, each with the rows (of 3 a node) that its waves reach before they are damped, there and back."""
+        distance = np.repeat(waves.radius - self.offset - self.panels.rho.ravel(), 3)
+        edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
+        for low, high in pairwise([0, *edges.tolist(), waves.k.size]):
+            if high > low:
+                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + SLACK
+
+    def sent(
+        self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+    ) -> list[Samples]:
+        """See `Rings.sent`."""
+        columns = forces.shape[1]
+        middle = np.empty((2, self.modes, waves.k.size, 2, 3, columns))
+
+        def fill(number: int) -> None:
+            onto_wall = sent_to_wall(waves, number, points, forces)
+            for parity, trace in enumerate(self._traces(waves, number)):
+                flat = trace.reshape(3 * self.modes, -1)
+                both = flat @ onto_wall[:, :, parity].transpose(2, 3, 1, 0).reshape(flat.shape[1], -1)
+                middle[parity, :, number] = both.reshape(self.modes, 3, 2, columns).swapaxes(1, 2)
+
+        each(fill, range(waves.k.size))
+        strengths = self._strengths(waves)
+        found = []
+        for (family,) in systems:
+            parts = [
+                strengths[m][here].reshape(here.size, -1) @ middle[family.parity, m].reshape(-1, columns)
+                for m, here in enumerate(family.of_mode)
+            ]
+            found.append(np.concatenate(parts))
+        return found
+
+    def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+        """See `Rings.received`."""
+        strengths = self._strengths(waves)
+
+        def product(number: int) -> list[Samples]:
+            found = []
+            for (family,), traces in zip(systems, self._traces(waves, number), strict=True):
+                fields = [
+                    np.tensordot(values[rows, number], trace, axes=1)
+                    for values, rows, trace in zip(strengths, family.of_mode, traces, strict=True)
+                ]
+                found.append(times_layers(np.concatenate(fields)[:, :, None], waves, number))
+            return found
+
+        return each(product, range(waves.k.size))
+
+    def _traces(self, waves: WallWaves, number: int) -> tuple[Samples, Samples]:
+        """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
+        from spirillum.kernels.tube_waves import circle_waves
+
+        orders = waves.orders[number]
+        theta = midpoints(max(waves.orders), self.modes)
+        y, z = self.reference * np.cos(theta) - self.offset, self.reference * np.sin(theta)
+        angle = np.arctan2(z, y)
+        values = extensions(float(waves.k[number]), waves.radius, np.hypot(y, z), orders)
+        even, odd = (np.empty((3, theta.size, orders, 3)) for _ in range(2))
+        circle_waves(values, angle, angle - theta, even, odd)
+        found = []
+        for parity, field in enumerate((even, odd)):
+            flat = field.reshape(3, theta.size, -1)
+            modes = [matrix @ part for matrix, part in zip(projectors(theta, self.modes, parity), flat, strict=True)]
+            found.append(np.stack(modes, axis=1).reshape(self.modes, 3, orders, 3))
+        return found[0], found[1]
+
+    def _matrices(self, waves: WallWaves) -> tuple[Samples, Samples]:
+        """sum_p eps_p U S U' between modes, even and odd, (k, modes, 3, modes, 3), with the weights in k."""
+        size = 3 * self.modes
+
+        def product(number: int) -> list[Samples]:
+            layers = weighted_layers(waves, number)
+            found = []
+            for trace in self._traces(waves, number):
+                flat = trace.reshape(size, -1, 3)
+                pressed = np.matmul(flat.swapaxes(0, 1), layers).swapaxes(0, 1)
+                matrix = pressed.reshape(size, -1) @ flat.reshape(size, -1).T
+                found.append(matrix.reshape(self.modes, 3, self.modes, 3))
+            return found
+
+        pairs = each(product, range(waves.k.size))
+        return np.stack([pair[0] for pair in pairs]), np.stack([pair[1] for pair in pairs])
+
+    def _strengths(self, waves: WallWaves, *, averaged: bool = False) -> list[Samples]:
+        """Each mode on the nodes from unit modes on the reference cylinder, (3 nodes, k, 2, 3) each.
+
+        The 2 stands for the real and the imaginary part of the wave. The film between a body and the wall may be
+        thinner than nodes are apart: tractions enter by averages over the panels, with what each node contributes.
+        """
+        panels = self.panels
+        x, rho, average = finer(panels, _FINER) if averaged else (panels.x, panels.rho, None)
+        found: list[Samples] = [np.empty((3 * panels.size, waves.k.size, 2, 3)) for _ in range(self.modes)]
+
+        def fill(number: int) -> None:
+            k = float(waves.k[number])
+            values = extensions(k, self.reference, rho.ravel(), self.modes).reshape(*x.shape, self.modes, 3, 3)
+            wave = np.exp(1j * k * x)[..., None] * np.array([1j, 1.0, 1.0])
+            parts = np.stack([wave.real, wave.imag], axis=-1)[..., None]
+            for q in range(self.modes):
+                block = parts * values[:, :, q, :, None, :]
+                if average is not None:
+                    block = np.matmul(average, block.reshape(*x.shape, 18))
+                found[q][:, number] = block.reshape(-1, 2, 3)
+
+        each(fill, range(waves.k.size))
+        return found
+
+
+def _take(block: Samples, matrix: Samples, rows: np.ndarray, columns: np.ndarray) -> None:
+    """Subtract a block from rows and columns of a matrix; ascending ones without gaps as a slice, ten times faster."""
+    if not block.size:
+        return
+    where = [
+        slice(int(lines[0]), int(lines[-1]) + 1) if lines[-1] - lines[0] == lines.size - 1 else lines
+        for lines in (rows, columns)
+    ]
+    if all(isinstance(lines, np.ndarray) for lines in where):
+        matrix[np.ix_(rows, columns)] -= block
+    else:
+        matrix[where[0], where[1]] -= block

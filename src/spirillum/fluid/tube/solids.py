@@ -18,12 +18,11 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.costs import check_memory
-from spirillum.fluid.tube.level_rings import LevelRings
-from spirillum.fluid.tube.rings import Rings, Rows, System
+from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
 from spirillum.fluid.tube.wall import WallWaves, each, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
-from spirillum.fluid.wire.revolution import Panels, panels_of
+from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import Seat

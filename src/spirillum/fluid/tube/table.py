@@ -26,10 +26,9 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.cache import sealed, unsealed
-from spirillum.fluid.tube.places import CHECKED_FROM
-from spirillum.fluid.tube.responses import RESPONSES
+from spirillum.fluid.tube.nodes import CHECKED_FROM
 from spirillum.fluid.tube.stages import STAGES, StageName
-from spirillum.fluid.tube.wire_error import SOLIDS_ERROR, at_any_place, wire_error
+from spirillum.fluid.tube.table_errors import RESPONSES, SOLIDS_ERROR, at_any_place, wire_error
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.kernels import film_table

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, System, finer, midpoints, projectors, sent_to_wall
 from spirillum.fluid.tube.wall import WallWaves, distances_of, each, extensions, times_layers
-from spirillum.fluid.wire.revolution import Panels
+from spirillum.fluid.wire.sources import Panels
 from spirillum.robot.tube_pose import Seat
 
 _FINER = 3

@@ -31,7 +31,7 @@ from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
-from spirillum.fluid.tube.wire_error import LARGEST_WIRE_ERROR
+from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, MOST_STATIONS, Slender, stations_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire

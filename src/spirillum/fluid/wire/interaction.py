@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
-from spirillum.fluid.wire.revolution import Panels, panels_of
-from spirillum.fluid.wire.sources import Sources
+from spirillum.fluid.wire.sources import Panels, Sources, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire, WireSystem, wire_system
 from spirillum.robot.outline import Outline
 

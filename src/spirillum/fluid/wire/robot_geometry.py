@@ -11,9 +11,8 @@ from spirillum.arrays import PerRobot
 from spirillum.costs import check_memory
 from spirillum.fluid.wire.stokeslets import Wire, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import centreline
+from spirillum.robot.geometry import End, Shape, centreline
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
-from spirillum.robot.parts import End, Shape
 from spirillum.units import show
 
 _POINTS_PER_TURN = 200

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from spirillum.papers.biorob2012 import claims_geometry, claims_predicted, claims_swimming
+from spirillum.papers.biorob2012 import claims_predicted, claims_swimming
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.claim import Claim
 
@@ -27,9 +27,9 @@ def evaluated(dataset: xr.Dataset) -> list[Claim]:
         claims_swimming.motor_rates,
         claims_swimming.effective_friction,
         claims_swimming.model_comparison,
-        claims_geometry.calibration_factors,
-        claims_geometry.robot_and_channel,
-        claims_geometry.method,
+        claims_predicted.calibration_factors,
+        claims_predicted.robot_and_channel,
+        claims_predicted.method,
     )
     return [claim for source in sources for claim in source(evidence)]
 

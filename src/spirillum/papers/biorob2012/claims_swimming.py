@@ -7,14 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.papers.biorob2012.constants import (
+from spirillum.papers.biorob2012.evidence import (
     BODY_ROTATION_ERROR,
     GLOBAL_DROP,
     LARGEST_REYNOLDS,
     LOW_REYNOLDS,
+    NO_RATES,
     VELOCITY_DROPS,
+    Evidence,
+    fraction_between,
+    in_hertz,
 )
-from spirillum.papers.biorob2012.evidence import NO_RATES, Evidence, fraction_between, in_hertz
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label

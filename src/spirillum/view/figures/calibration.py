@@ -15,7 +15,7 @@ from spirillum.units import Hz
 from spirillum.view.figures.posterior import posterior_figure, profile_figure
 from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
-from spirillum.view.figures.study_view import spread
+from spirillum.view.figures.study_panels import spread
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from spirillum.measurement.outliers import LEADING
 from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.quantities import unit_of
-from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.sheet import Picture
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, new_figure, plain
 
 if TYPE_CHECKING:

@@ -26,15 +26,14 @@ from spirillum.studies.ranking import can_be_ranked, ranking_of
 from spirillum.swimming.comparison import ModelComparison
 from spirillum.swimming.prediction import Prediction
 from spirillum.view.figures.calibration import calibration_figures
-from spirillum.view.figures.comparison import comparison_figure
+from spirillum.view.figures.comparison import comparison_figure, ranking_picture
 from spirillum.view.figures.control import control_figure
 from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.measurement import measurement_figures
-from spirillum.view.figures.ranking import ranking_picture
+from spirillum.view.figures.release import settling_figure
 from spirillum.view.figures.robot import robot_figure
-from spirillum.view.figures.settling import settling_figure
 from spirillum.view.figures.style import DPI, save_as, styled
 from spirillum.view.figures.trajectory import trajectory_figure
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
 from spirillum.units import Hz
-from spirillum.view.figures.study_view import StudyView, spread
+from spirillum.view.figures.study_panels import StudyView, spread
 from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, label_of_model, look_of_model
 
 MOST_CURVES = 6

@@ -1,8 +1,9 @@
-"""A sheet of panels with title, subtitle, legends and notes; matplotlib's constrained layout finds room for them."""
+"""Figures as documents: `Picture` with title and caption, `Sheet` of panels with legend and notes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import count, product
 from string import ascii_lowercase
 from typing import Any, Literal, cast
@@ -12,7 +13,30 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure
+from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure, readable, styled
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure that is drawn when it is asked for."""
+
+    title: str
+    caption: str
+    """What it shows and what it does not, sentences."""
+    alternative: str
+    """What it shows for those who cannot see it."""
+    draw: Callable[[], Figure] = field(repr=False)
+
+    @classmethod
+    def of(cls, title: str, caption: str, alternative: str, draw: Callable[[], Figure]) -> Picture:
+        """A picture whose words may hold formulas, which are spelled out."""
+        return cls(readable(title), readable(caption), readable(alternative), draw)
+
+    def figure(self) -> Figure:
+        """Draw it."""
+        with styled():
+            return self.draw()
+
 
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.rows import (
     PanelRow,
     amplitude_handles,
@@ -23,10 +22,9 @@ from spirillum.view.figures.rows import (
     robot_rows,
     settled_handles,
 )
-from spirillum.view.figures.sheet import Sheet, add_letters, width_of
-from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
+from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
+from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
 from spirillum.view.figures.style import UnitPrefix, plain, told_apart
-from spirillum.view.figures.tail_panels import head_column, tail_axis
 
 if TYPE_CHECKING:
     import xarray as xr

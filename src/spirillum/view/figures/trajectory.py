@@ -19,8 +19,7 @@ from spirillum.dynamics.run_file import check_increasing, robot_of
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
-from spirillum.view.figures.cross_section import draw_cross_section
-from spirillum.view.figures.run_events import event_words, events_of, mark_events
+from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
 

@@ -19,11 +19,11 @@ from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
-from spirillum.view.figures.cross_section import silhouette
+from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK
 from spirillum.view.figures.style import COLOURS
-from spirillum.view.scene3d.camera import Margins, SceneCamera, View, checked_view, fitted
-from spirillum.view.scene3d.encode import FILMS, film_writer
+from spirillum.view.scene3d.rendering import FILMS, film_writer
+from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
 from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 
 if TYPE_CHECKING:
@@ -338,7 +338,7 @@ def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[
 
 def _round_down(value: float) -> float:
     """The number of 1, 2 or 5 times a power of ten at or below a value."""
-    from spirillum.view.scene3d.glass import ruler_steps
+    from spirillum.view.scene3d.scenery import ruler_steps
 
     return ruler_steps(value)
 

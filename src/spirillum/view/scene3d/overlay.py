@@ -15,8 +15,7 @@ from matplotlib.patches import FancyArrowPatch
 from spirillum.arrays import Samples
 from spirillum.view.figures.scene import FAINT, HALO, INK, length_words
 from spirillum.view.figures.style import UnitPrefix, plain, styled
-from spirillum.view.scene3d.camera import SceneCamera
-from spirillum.view.scene3d.glass import ruler_steps
+from spirillum.view.scene3d.scenery import SceneCamera, ruler_steps
 
 _DPI = 200
 _REFERENCE = 900.0

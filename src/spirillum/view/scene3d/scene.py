@@ -15,9 +15,8 @@ from spirillum.dynamics.poses import RobotPose
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
-from spirillum.view.scene3d.camera import SceneCamera, View
-from spirillum.view.scene3d.glass import add_glass, ruler_steps
-from spirillum.view.scene3d.window import new_plotter
+from spirillum.view.scene3d.rendering import new_plotter
+from spirillum.view.scene3d.scenery import SceneCamera, View, add_glass, ruler_steps
 
 _ALONG, _AROUND = 160, 49
 _HALF_ANGLE = 0.9
@@ -145,7 +144,7 @@ _BEYOND = 8
 """Lines beyond what is to be seen, on every side."""
 _WIDTH = 0.014
 """Width of a line, in distances of lines."""
-_PANELS_ACROSS: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
+_ACROSS_GRID: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
 """Axis across the grid, by view; along x there is none, for the robot swims through it."""
 
 
@@ -160,9 +159,9 @@ def add_grid(plotter: Any, pyvista: Any, view: View, low: Samples, high: Samples
         high: (3,) largest ones.
         step: distance of its lines.
     """
-    if view not in _PANELS_ACROSS:
+    if view not in _ACROSS_GRID:
         return
-    across = _PANELS_ACROSS[view]
+    across = _ACROSS_GRID[view]
     level = high[1] + 0.5 * step if across == 1 else low[2] - 0.5 * step
     first = np.floor(low / step - _BEYOND).astype(int)
     last = np.ceil(high / step + _BEYOND).astype(int)

@@ -19,7 +19,7 @@ from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
-from spirillum.view.scene3d.camera import Margins, SceneCamera, View, checked_view, fitted
+from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
 
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
@@ -162,7 +162,7 @@ def glass_around(
 
 def shown_points(solids: DrawnRobot, pose: RobotPose, glass: tuple[float, float] | None) -> Samples:
     """(n, 3) points that a picture has to hold: the robot at any angle of its tail, and the ends of the glass, m."""
-    from spirillum.view.scene3d.glass import WALL
+    from spirillum.view.scene3d.scenery import WALL
 
     corners = solids.corners(pose)
     channel = solids.robot.channel

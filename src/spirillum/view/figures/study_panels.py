@@ -1,4 +1,4 @@
-"""A study as its figures read it: values and scales, readings, bands, and what a figure has to say about them."""
+"""Labels, selections, axes and headings that figures over the tails of a study share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
@@ -19,6 +21,7 @@ from spirillum.view.figures.style import UnitPrefix, plain
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
 
@@ -280,3 +283,21 @@ class StudyView:
         fluid, body = self.robots[place]["fluid"], self.robots[place]["body"]
         reynolds = self.paper_figures[channel].largest_reynolds
         return reynolds, reynolds * fluid["viscosity"] / (fluid["density"] * body["diameter"])
+
+
+def head_column(axes: Axes, shown: StudyView, wavelength: int) -> None:
+    """Head a column of panels with its wavelength, by its place in the study."""
+    values = np.asarray(shown.whole["wavelength"].values, dtype=float)
+    scale = UnitPrefix.of(values, "m")
+    axes.set_title(f"$\\lambda$ = {values[wavelength] / scale.factor:.4g} {scale.unit}", loc="center", pad=3)
+
+
+def tail_axis(axes: Axes, x: Values) -> None:
+    """Horizontal axis of tails: ticks at the amplitudes themselves where they are few and apart."""
+    span = float(x.max() - x.min())
+    if 1 < x.size <= 6 and float(np.min(np.diff(np.sort(x)))) > 0.12 * span:
+        axes.set_xticks(x, [f"{value:.3g}" for value in x])
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+    margin = 0.08 * span if span > 0 else 0.5 * abs(float(x[0]))
+    axes.set_xlim(float(x.min()) - margin, float(x.max()) + margin)

@@ -1,8 +1,8 @@
-"""Places of a robot in its tube at which a table is computed.
+"""Interpolation nodes of a table: poses of a robot in its tube.
 
 The coordinates are those of `spirillum.kernels.tube_table`: t runs from the floor (0) to the tube's axis (1), f from
-level (0) to the largest pitch (1), at which tail or coupling come as near to the glass as the model resolves, and a yaw
-is a share of the largest one at its place, at which the tail does.
+level (0) to the largest pitch (1), at which the clearance of tail or coupling is the smallest that the model resolves.
+The yaw is normalized by the largest yaw at the node, which has the same clearance of the tail.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""The camera of a three-dimensional scene, and its projection of points of the lab to pixels."""
+"""Camera of a three-dimensional scene and the glass tube in it: both sides, rims, a ruler on its floor."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
@@ -140,3 +141,111 @@ def _framed(
         if abs(zoom - 1.0) < 1e-9 and float(np.abs(off).max()) < 1e-9 * camera.half_height:
             break
     return camera
+
+
+WALL = 0.035
+"""Thickness with which the glass is drawn, in radii: the true one is unknown."""
+_SIDES = 144
+_MOST_MARKS = 300
+_CLEAR = 0.004
+"""Alpha below which a side of a tube is not drawn."""
+_AROUND = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+_CEILING, _FLOOR, _BAND, _NEAR = "#cdd6dc", "#e3eef4", "#eaf1f5", "#f4fafd"
+_RIM, _EDGE, _TICK = "#9dbfd1", "#5f8ba3", "#54788e"
+
+
+def ruler_steps(about: float) -> float:
+    """A length of 1, 2 or 5 times a power of ten, at most `about`."""
+    power = 10.0 ** np.floor(np.log10(about))
+    return float(next(m * power for m in (5.0, 2.0, 1.0) if m * power <= about * 1.0001))
+
+
+def _tube(pyvista: Any, radius: float, start: float, end: float, colours: Samples) -> Any:
+    """An open cylinder about the x axis with a colour (with or without alpha, 0 to 1) at each of its sides."""
+    ring = np.stack([np.zeros(_SIDES), np.cos(_AROUND), np.sin(_AROUND)], axis=-1)
+    points = np.concatenate([radius * ring + np.array([x, 0.0, 0.0]) for x in (start, end)])
+    j = np.arange(_SIDES)
+    k = (j + 1) % _SIDES
+    faces = np.stack([np.full(_SIDES, 4), j, k, k + _SIDES, j + _SIDES], axis=-1)
+    if colours.shape[1] == 4:
+        faces = faces[np.maximum(colours[j, 3], colours[k, 3]) > _CLEAR]
+    mesh = pyvista.PolyData(points, faces.ravel())
+    mesh.point_data["colour"] = np.round(255.0 * np.concatenate([colours, colours])).astype(np.uint8)
+    return mesh
+
+
+def _inner_colours() -> Samples:
+    """Colours of the inner side: light from above falls on the floor, a soft streak lies along each side.
+
+    They are fixed, and not worked out from lamps: the tube fills the picture, and lamps would double a frame's time.
+    """
+    height = np.sin(_AROUND)[:, None]
+    streak = np.exp(-(((height - 0.18) / 0.10) ** 2))
+    shade = np.clip(0.5 - 0.5 * height, 0.0, 1.0) ** 0.8
+    dark, light = (np.array(to_rgb(colour)) for colour in (_CEILING, _FLOOR))
+    return np.asarray(np.clip(dark + (light - dark) * shade + 0.035 * streak, 0.0, 1.0))
+
+
+def _outer_colours() -> Samples:
+    """Colours and alpha of the outer side, which is seen in front of the robot: clear but for a streak of light."""
+    streak = np.exp(-(((np.degrees(_AROUND) - 128.0) / 9.0) ** 2)) + 0.5 * np.exp(
+        -(((np.degrees(_AROUND) - 52.0) / 9.0) ** 2)
+    )
+    alpha = 0.32 * np.clip(streak, 0.0, 1.0)
+    return np.concatenate([np.broadcast_to(to_rgb(_NEAR), (_SIDES, 3)), alpha[:, None]], axis=1)
+
+
+def _sheet(pyvista: Any, first: Samples, second: Samples) -> Any:
+    """The strip between two lines of as many points."""
+    count = len(first)
+    j = np.arange(count - 1)
+    faces = np.stack([np.full(count - 1, 4), j, j + 1, j + 1 + count, j + count], axis=-1)
+    return pyvista.PolyData(np.concatenate([first, second]), faces.ravel())
+
+
+def _arc(radius: float, x: float, half_angle: float = np.pi) -> Samples:
+    """Points of an arc across the axis, its middle on the floor."""
+    count = _SIDES + 1 if half_angle == np.pi else 13
+    angle = -0.5 * np.pi + np.linspace(-half_angle, half_angle, count)
+    return np.stack([np.full(count, x), radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def _marks(pyvista: Any, radius: float, width: float, places: dict[float, float]) -> Any:
+    """Marks of a ruler on the floor: half of the angle that each spans, by its x."""
+    strips = [
+        _sheet(pyvista, _arc(radius, x - 0.5 * width, half), _arc(radius, x + 0.5 * width, half))
+        for x, half in places.items()
+    ]
+    return pyvista.merge(strips) if len(strips) > 1 else strips[0]
+
+
+def add_glass(plotter: Any, pyvista: Any, radius: float, start: float, end: float, step: float) -> None:
+    """Add the tube to a scene, behind everything translucent that follows.
+
+    Args:
+        plotter: the scene's plotter.
+        pyvista: the library.
+        radius: inner radius.
+        start: x of its rear end.
+        end: x of its front end.
+        step: distance of the ruler's marks.
+    """
+    outer, line = radius * (1.0 + WALL), 0.008 * radius
+    flat = {"lighting": False, "show_scalar_bar": False}
+    shell = {"scalars": "colour", "rgb": True, **flat}
+    # Culling faces that look at the camera leaves the far half, from wherever it is seen.
+    band = np.broadcast_to(to_rgb(_BAND), (_SIDES, 3))
+    plotter.add_mesh(_tube(pyvista, radius, start, end, _inner_colours()), culling="front", **shell)
+    plotter.add_mesh(_tube(pyvista, outer, start, end, band), culling="front", **shell)
+    step *= max(1.0, float(np.ceil((end - start) / step / _MOST_MARKS)))
+    first, last = int(np.ceil(start / step)), int(np.floor(end / step))
+    places = {i * step: 0.11 if i % 5 else 0.26 for i in range(first, last + 1)}
+    if places:
+        marks = _marks(pyvista, 0.997 * radius, line, places)
+        plotter.add_mesh(marks, color=_TICK, opacity=0.7, **flat)
+    for x in (start, end):
+        plotter.add_mesh(_sheet(pyvista, _arc(radius, x), _arc(outer, x)), color=_RIM, opacity=0.6, **flat)
+        for edge in (radius, outer):
+            rim = _sheet(pyvista, _arc(edge - 0.5 * line, x), _arc(edge + 0.5 * line, x))
+            plotter.add_mesh(rim, color=_EDGE, **flat)
+    plotter.add_mesh(_tube(pyvista, outer, start, end, _outer_colours()), culling="back", **shell)

@@ -1,0 +1,281 @@
+"""Robot descriptions for simulators: URDF, MuJoCo's MJCF, and a sidecar with masses and resistance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.envelope import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.exports.meshes import MESH_SCALE, MeshFile
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
+from spirillum.notes import Note
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.links import Link, links_of
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+
+FULL_MODELS = tuple(name for name, model in SWIMMER_MODELS.items() if not (model.axial_only or model.placed))
+"""Models that give the whole 12x12 matrix in unbounded fluid, for any motion of the robot."""
+
+_UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
+_CONVENTION = (
+    "(F_body, T_body, F_rotor, T_rotor) = -R (U_body, Omega_body, U_rotor, Omega_rotor): force and torque of the fluid "
+    "on each link against velocity and rotation of each link; torques and velocities at the origin, which is the "
+    "body's mid-length on the motor axis; all in the axes of the body (x forward, z up) with the tail at phase 0; "
+    "R is symmetric and positive definite, and units repeat in blocks of 3x3"
+)
+_TURNING = (
+    "at joint angle q, positive about +x, the tail's phase is q + joint.phase_at_zero, and R is Q R Q' with Q four "
+    "blocks of the rotation about x by that phase; the same without turning R: express all velocities in the axes of "
+    "the rotor, and the wrenches come out in them. R does not change with place or attitude"
+)
+
+
+class _Resistance(NamedTuple):
+    """The resistance of both links in unbounded fluid."""
+
+    matrix: Samples
+    """(12, 12)."""
+    error: Any
+    """Stated error of the model."""
+    references: list[str]
+    """Sources of the model."""
+    warnings: list[Note]
+
+
+def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
+    """Masses, joint, buoyancy and 12x12 resistance of a robot, SI.
+
+    Args:
+        robot: a checked robot.
+        model: `rft` or `slender`.
+        phase: phase of the tail at joint angle zero, rad.
+    """
+    resistance = _resistance(robot, model)
+    links = links_of(robot)
+    content = {
+        "robot": robot.name,
+        "model": model,
+        "known_error": resistance.error,
+        "references": resistance.references,
+        "viscosity": quantity(robot.fluid.viscosity, "Pa s"),
+        "density": quantity(robot.fluid.density, "kg/m^3"),
+        "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
+        "joint": {
+            "type": "fixed" if _fixed(robot) else "revolute",
+            "origin": quantity([0.0, 0.0, 0.0], "m"),
+            "axis": [1.0, 0.0, 0.0],
+            "phase_at_zero": quantity(phase, "rad"),
+            "friction": quantity(joint_friction(robot), "N m s/rad"),
+        },
+        "links": {"body": _link_masses(links.body), "rotor": _link_masses(links.rotor)},
+        "matrix": {**quantity(resistance.matrix, ""), "unit": _UNITS},
+        "convention": _CONVENTION,
+        "turning": _TURNING,
+    }
+    return envelope("links", content, resistance.warnings)
+
+
+def _resistance(robot: Robot, model: str) -> _Resistance:
+    """The resistance by a model that knows all of it."""
+    chosen = find_swimmer_model(model)
+    if model not in FULL_MODELS:
+        raise InputError(
+            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
+            f"{', '.join(FULL_MODELS)}"
+        )
+    batch = RobotBatch.of(robot)
+    outside = broken(chosen.domain(batch))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
+    matrix = chosen.resistance(batch, np.zeros(1))[0]
+    warnings = [limit.caution() for limit in broken(chosen.cautions(batch))]
+    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
+        words = f"model '{model}' has no coupling: its drag is missing; use another of {', '.join(FULL_MODELS)}"
+        warnings.append(Note("coupling-left-out", words, ("coupling",)))
+    return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
+
+
+def _fixed(robot: Robot) -> bool:
+    return robot.drive is not None and robot.drive.joint == "fixed"
+
+
+def joint_friction(robot: Robot) -> float:
+    """Friction inside the joint, N m s/rad; what acts on body or rotor from outside is not in it."""
+    own = robot.motor.joint_rotor_friction if robot.motor is not None else 0.0
+    if robot.friction.reading == "rotor":
+        return own if robot.friction.effective is None else robot.friction.effective
+    return own if robot.friction.reading == "body" else 0.0
+
+
+def _link_masses(link: Link) -> dict[str, Any]:
+    """Of one link, at phase 0 of the tail; null where a mass is not known."""
+    return {
+        "mass": quantity(link.mass, "kg"),
+        "centre_of_mass": quantity(link.centre, "m"),
+        "inertia": quantity(link.inertia, "kg m^2", about="centre_of_mass"),
+        "displaced_volume": quantity(link.volume, "m^3"),
+        "centre_of_buoyancy": quantity(link.centroid, "m"),
+    }
+
+
+def urdf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
+    """The description; lengths in m, the origin of both links on the motor axis at the body's mid-length.
+
+    Args:
+        robot: a checked robot whose masses are known.
+        meshes: the mesh files.
+        folder: where they lie, relative to the description.
+        phase: phase of the tail at joint angle zero, rad.
+    """
+    root = ET.Element("robot", name=robot.name)
+    root.append(
+        ET.Comment(
+            " Lengths in m, x forward, z up. A URDF holds no fluid: forces come from the resistance matrix beside it. "
+        )
+    )
+    files = list(meshes)
+    for name, link in zip(("body", "rotor"), links_of(robot), strict=True):
+        own = [item for item in files if item.part == name]
+        root.append(_link(name, link, own, folder))
+    fixed = robot.drive is not None and robot.drive.joint == "fixed"
+    joint = ET.SubElement(root, "joint", name="motor", type="fixed" if fixed else "continuous")
+    ET.SubElement(joint, "parent", link="body")
+    ET.SubElement(joint, "child", link="rotor")
+    ET.SubElement(joint, "origin", xyz="0 0 0", rpy=numbers((phase, 0.0, 0.0)))
+    if not fixed:
+        ET.SubElement(joint, "axis", xyz="1 0 0")
+        ET.SubElement(joint, "dynamics", damping=numbers([joint_friction(robot)]), friction="0")
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _link(name: str, link: Link, meshes: Iterable[MeshFile], folder: str) -> ET.Element:
+    element = ET.Element("link", name=name)
+    inertial = ET.SubElement(element, "inertial")
+    ET.SubElement(inertial, "origin", xyz=numbers(link.centre), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=numbers([link.mass]))
+    places = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ET.SubElement(inertial, "inertia", {key: numbers([link.inertia[at]]) for key, at in places.items()})
+    for item in meshes:
+        shown = ET.SubElement(element, "collision" if item.colour is None else "visual", name=item.name)
+        ET.SubElement(shown, "origin", xyz="0 0 0", rpy="0 0 0")
+        geometry = ET.SubElement(shown, "geometry")
+        ET.SubElement(geometry, "mesh", filename=f"{folder}/{item.name}.stl", scale=numbers([MESH_SCALE] * 3))
+        if item.colour is not None:
+            material = ET.SubElement(shown, "material", name=f"{name} {item.name}")
+            ET.SubElement(material, "color", rgba=numbers([*np.round(item.colour, 4), 1.0]))
+    return element
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers as XML has them, to the last digit."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+FLUID_WARNING = Note(
+    "physics-engine-fluid",
+    "MuJoCo's own fluid gives a helix no thrust and must stay off; apply the forces of the resistance matrix at "
+    "each step",
+)
+_LEAST = 1e-15
+"""MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers."""
+_MOST_TRIANGLES = 200_000
+_STEP = 1e-4
+
+
+def check_inertia(robot: Robot) -> None:
+    """Both links are heavy enough for MuJoCo."""
+    for name, link in zip(("body", "rotor"), links_of(robot), strict=True):
+        least = min(link.mass, float(np.min(np.linalg.eigvalsh(link.inertia))))
+        if not least > _LEAST:
+            raise InputError(
+                f"{robot.name}: {name} has a mass of {link.mass:.3g} kg and a moment of inertia of "
+                f"{np.min(np.linalg.eigvalsh(link.inertia)):.3g} kg m^2; allowed: more than {_LEAST:g} in both, the "
+                "least that MuJoCo takes; .urdf has no such bound"
+            )
+
+
+def check_triangles(meshes: Iterable[MeshFile]) -> None:
+    """No mesh has more triangles than MuJoCo reads."""
+    most = max(meshes, key=lambda item: item.triangles)
+    if most.triangles > _MOST_TRIANGLES:
+        raise InputError(
+            f"{most.name}.stl would have {most.triangles} triangles; allowed: at most {_MOST_TRIANGLES}, which is all "
+            "that MuJoCo reads (a smaller fineness)"
+        )
+
+
+def mjcf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
+    """The model; lengths in m, the origin of both bodies on the motor axis at the robot body's mid-length.
+
+    Args:
+        robot: a checked robot whose masses are known.
+        meshes: the mesh files.
+        folder: where they lie, relative to the model.
+        phase: phase of the tail at joint angle zero, rad.
+    """
+    files = list(meshes)
+    check_triangles(files)
+    root = ET.Element("mujoco", model=robot.name)
+    root.append(
+        ET.Comment(
+            "\n  WARNING: keep density and viscosity at 0. MuJoCo's own fluid gives a helix no thrust.\n"
+            "  The fluid's forces come from the resistance matrix in the JSON file beside this model; a program has\n"
+            "  to apply them, and buoyancy, at every step. Without it the robot falls as in a vacuum.\n"
+            "  Lengths in m, x forward, z up.\n  "
+        )
+    )
+    ET.SubElement(root, "compiler", angle="radian", meshdir=folder, autolimits="true")
+    ET.SubElement(
+        root,
+        "option",
+        timestep=numbers([_STEP]),
+        integrator="implicitfast",
+        gravity=numbers([0.0, 0.0, -STANDARD_GRAVITY]),
+        density="0",
+        viscosity="0",
+    )
+    asset = ET.SubElement(root, "asset")
+    for item in files:
+        # A surface to look at need not be closed: `shell` lets it be one.
+        mesh = {"name": item.name, "file": f"{item.name}.stl", "scale": numbers([MESH_SCALE] * 3), "inertia": "shell"}
+        ET.SubElement(asset, "mesh", mesh)
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", pos="0 0 1", dir="0 0 -1", directional="true")
+    links = links_of(robot)
+    body = _body(world, "body", links.body, files)
+    body.insert(0, ET.Element("freejoint", name="body"))
+    rotor = _body(body, "rotor", links.rotor, files)
+    rotor.set("euler", numbers([phase, 0.0, 0.0]))
+    if robot.drive is None or robot.drive.joint == "revolute":
+        hinge = ET.Element(
+            "joint", name="motor", type="hinge", axis="1 0 0", pos="0 0 0", damping=numbers([joint_friction(robot)])
+        )
+        rotor.insert(0, hinge)
+        actuator = ET.SubElement(root, "actuator")
+        actuator.append(ET.Comment(" Control: torque in the joint before friction, N m. "))
+        ET.SubElement(actuator, "motor", name="motor", joint="motor")
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _body(parent: ET.Element, name: str, link: Link, files: list[MeshFile]) -> ET.Element:
+    element = ET.SubElement(parent, "body", name=name)
+    order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    inertia = numbers(link.inertia[at] for at in order)
+    ET.SubElement(element, "inertial", pos=numbers(link.centre), mass=numbers([link.mass]), fullinertia=inertia)
+    for item in (item for item in files if item.part == name):
+        geom = {"name": item.name, "type": "mesh", "mesh": item.name}
+        if item.colour is None:
+            geom |= {"group": "3"}  # closed bodies collide and are hidden by default
+        else:
+            rgba = numbers([*np.round(item.colour, 4), 1.0])
+            geom |= {"group": "1", "contype": "0", "conaffinity": "0", "rgba": rgba}
+        ET.SubElement(element, "geom", geom)
+    return element
