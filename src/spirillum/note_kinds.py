@@ -262,8 +262,8 @@ _FAMILIES = {
     ),
     "outline-alone": (
         "The coloured seal was not found, and over a grid or through glass the outline of the body may follow what is"
-        " not the body's. Speed and tail rate are less certain or not given. Look at the named frame; a seal in a saturated"
-        " colour, or plain paper under the tube, helps."
+        " not the body's. Speed and tail rate are less certain or not given. Look at the named frame; a bright seal"
+        " or plain paper under the tube helps."
     ),
     "two-robots not-the-robot something-else-followed robot-stands-still nothing-moves does-not-advance one-picture": (
         "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Look at the annotated"

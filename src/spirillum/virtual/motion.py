@@ -41,7 +41,7 @@ class TrialMotion:
 
 def steady_rates(
     robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
-) -> tuple[dict[str, float], str, tuple[str, ...]]:
+) -> tuple[dict[str, float], str, tuple[Note, ...]]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
     Args:
@@ -139,7 +139,7 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     return TrialMotion(trajectory, f"run, {model}" if model else "run", _between_samples(trajectory))
 
 
-def _between_samples(trajectory: TrialTrajectory) -> tuple[str, ...]:
+def _between_samples(trajectory: TrialTrajectory) -> tuple[Note, ...]:
     """A sentence where the samples of a run are too few for what the tail does between them."""
     step = float(np.abs(np.diff(trajectory.tail_phase)).max())
     if step <= _LARGEST_STEP:

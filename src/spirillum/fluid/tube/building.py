@@ -350,7 +350,7 @@ def _largest_errors(
     table: Samples, places: Sequence[NodeSolution], found: Sequence[Sequence[Samples]]
 ) -> dict[str, float]:
     """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
-    errors = [np.zeros(len(RESPONSES))]
+    errors: list[Samples] = [np.zeros(len(RESPONSES))]
     for place, answers in zip(places, found, strict=True):
         (_, phases), seat = place.tails[0], place.seat
         own, *turn = np.empty((1 + PHASES, kernel.MOTIONS, kernel.MOTIONS))
