@@ -92,7 +92,7 @@ class VirtualCamera:
         Raises:
             InputError: for a time that does not rise, or a robot that turns across the channel.
         """
-        check_kind("pose", pose, "Pose")
+        check_kind("pose", pose, "RobotPose")
         now = as_number(time)
         before = (now - 1.0, pose) if self._last is None else self._last
         if not before[0] < now < math.inf:
