@@ -1,1 +1,1 @@
-"""The robot in the terms of others' tools: python-control, Gymnasium, and a remote at a serial port."""
+"""Bindings to other tools: python-control, Gymnasium, FMU, and a remote at a serial port."""
