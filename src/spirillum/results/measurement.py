@@ -71,7 +71,7 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
         "measurement.html.jinja",
         title=f"{measurement.robot.name}: measured from video",
         setup=Path(measurement.setup).name,
-        trials=[_trial(trial, pictures, thumbnails) for trial in measurement.trials],
+        trials=[_trial_entry(trial, pictures, thumbnails) for trial in measurement.trials],
         summary=_rows(measurement.summary.quantities, measurement.summary.counts),
         count=len(measurement.trials),
         failures=measurement.failures,
@@ -87,7 +87,7 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
     )
 
 
-def _trial(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Mapping[str, bytes]) -> dict[str, Any]:
+def _trial_entry(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Mapping[str, bytes]) -> dict[str, Any]:
     data = thumbnails.get(trial.name)
     track = trial.track
     span = float(track.time[-1] - track.time[0]) if track.time.size else 0.0
