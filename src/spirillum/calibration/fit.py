@@ -291,7 +291,7 @@ def _by_posterior(
     )
 
 
-def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> list[str]:
+def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> list[Note]:
     return [
         *outlier_warnings(problem, fit.z),
         *report.warnings,

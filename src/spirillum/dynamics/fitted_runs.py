@@ -46,7 +46,7 @@ def chosen_run(
     calibration: str | Path | None,
     posterior: PosteriorFile | None,
     contact: FittedContact,
-) -> tuple[ModelChoice, str, list[str]]:
+) -> tuple[ModelChoice, str, list[Note]]:
     """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
     Args:

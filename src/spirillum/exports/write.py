@@ -155,7 +155,7 @@ def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: 
 
 def printable_solid(
     robot: Robot, pieces: Sequence[RobotMesh], unit: str | None
-) -> tuple[ExportFile, dict[str, Any], list[str]]:
+) -> tuple[ExportFile, dict[str, Any], list[Note]]:
     """An STL file of the whole robot, the numbers of its solid, and what to be careful about.
 
     Args:

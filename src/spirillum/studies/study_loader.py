@@ -304,7 +304,7 @@ def _fitted_places(
 
 def _with_models(
     study: Study, robots: Sequence[Robot], calibration: str | Path | None, posterior: PosteriorFile | None
-) -> tuple[Study, tuple[str, ...]]:
+) -> tuple[Study, tuple[Note, ...]]:
     """The study with one model for all robots in place of `auto`, and what to be careful about in it."""
     if AUTO not in study.models:
         return study, ()

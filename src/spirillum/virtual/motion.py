@@ -41,7 +41,7 @@ class TrialMotion:
 
 def steady_rates(
     robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
-) -> tuple[dict[str, float], str, tuple[str, ...]]:
+) -> tuple[dict[str, float], str, tuple[Note, ...]]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
     Args:
