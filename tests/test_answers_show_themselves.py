@@ -41,7 +41,7 @@ def test_html_is_escaped() -> None:
 def test_prediction_shows_five_quantities_and_completes_all() -> None:
     answer = sp.predict("biorob2012-wide", model="sbt")
     lines = str(answer).splitlines()
-    assert repr(answer) == f"Prediction(biorob2012-wide, sbt, U = {1e3 * answer.forward_velocity:.4g} mm/s)"
+    assert repr(answer) == f"Prediction(biorob2012-wide, sbt, U_x = {1e3 * answer.forward_velocity:.4g} mm/s)"
     assert [line.split()[0] for line in lines if line.startswith("  ")][:5] == [
         "forward",
         "tail",
@@ -82,6 +82,23 @@ def test_study_shows_its_ranking_first_and_stays_a_dataset() -> None:
     part = dataset.sel(model="sbt")
     assert str(part) == repr(part)
     assert isinstance(part.mean(), xr.Dataset)
+
+
+def test_robots_that_are_a_product_of_tails_unstack_to_wavelength_and_amplitude(tmp_path) -> None:
+    files = []
+    for wavelength, amplitude in ((20, 2), (20, 3), (25, 3), (25, 2)):
+        files.append(tmp_path / f"{wavelength}-{amplitude}.toml")
+        tail = f'wavelength = "{wavelength} mm"\namplitude = "{amplitude} mm"\n'
+        files[-1].write_text(f'extends = "biorob2012-wide"\nname = "{files[-1].stem}"\n[tail]\n{tail}')
+    study = {"models": ["rft"], "friction": ["rotor"], "robots": [str(file) for file in files]}
+    dataset = sp.study(study)
+    grid = dataset.unstacked()
+    assert {name: grid.sizes[name] for name in ("wavelength", "amplitude")} == {"wavelength": 2, "amplitude": 2}
+    one = grid.sel(wavelength=0.025, amplitude=0.002, method="nearest")
+    assert str(one["robot_name"].item()) == "25-2"
+    assert one["forward_velocity"].squeeze() == dataset["forward_velocity"].sel(robot="25-2").squeeze()
+    with pytest.raises(sp.InputError, match="3 robots are not all combinations of their sizes"):
+        sp.study({**study, "robots": study["robots"][:3]}).unstacked()
 
 
 def test_batches_and_systems_print_their_numbers() -> None:

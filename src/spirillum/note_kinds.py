@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 CAUTIONS = {
+    "posterior-unusable": (
+        "The chains of the sampler have not mixed, or hold too few effective draws, so that intervals from this "
+        "posterior are wrong. Sample for longer (`--doublings`), or free fewer numbers."
+    ),
     "synthetic": (
         "The observations or the video say that they are synthetic: computed, not measured. What follows from them "
         "tests the method and describes no real robot."
@@ -25,10 +29,6 @@ CAUTIONS = {
         "All models neglect inertia (Stokes flow). Above a Reynolds number of 0.1 the error grows, and no error "
         "estimate covers it; above 10 the answer is refused. A more viscous fluid, a smaller or a slower robot stays "
         "below."
-    ),
-    "posterior-unusable": (
-        "The chains of the sampler have not mixed, or hold too few effective draws, so that intervals from this "
-        "posterior are wrong. Sample for longer (`--doublings`), or free fewer numbers."
     ),
     "calibration-missing": (
         "The model has no walls, and the robot has no drag factors for it, which could replace their effect. Speeds "

@@ -134,7 +134,7 @@ def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibratio
     other = load(WIDE, **{"tail.wavelength": "13 mm"})
     found = sp.predict(other, model="rft", calibration=calibration, friction="paper").warnings
     assert any("the median of 3 fitted tails" in words and "8e-06 to 1.6e-05" in words for words in found)
-    assert any("and is used under 'paper'" in words for words in found)
+    assert any("is another torque with 'paper'" in words for words in found)
     assert any("o.csv says that its numbers are synthetic" in words for words in found)
     own = sp.predict(WIDE, model="rft", calibration=calibration)
     assert own.robot.friction.effective == pytest.approx(8e-6)

@@ -99,7 +99,7 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
     assert answer["placement"]["ends"] == "closed"
     assert "plug_velocity" in answer
     assert not any("wall" in warning for warning in answer["warnings"])
-    table = run("flow", WIDE, *SMALL, *files, *place).out
+    table = run("flow", WIDE, *SMALL, *files, *place, "--notes").out
     assert "model tube, lab frame" in table
     assert "ends of the channel: closed" in table
     assert "gap" in table

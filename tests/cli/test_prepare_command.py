@@ -57,7 +57,7 @@ def test_an_error_above_the_allowed_one_is_written_with_digits_that_differ() -> 
     for error, said in ((0.0201, "2.01 %"), (0.02 + 1e-9, "2.0000001 %"), (0.034, "3.4 %")):
         worse = replace(found.table, error={**found.table.error, "sideways_force": error})
         (sentence,) = Prepared(found.robot, worse).warnings
-        assert f"sideways force is off by up to {said} at yawed places" in sentence
+        assert f"sideways force is off by up to {said} at yawed poses" in sentence
         assert "at most 2 % is expected" in sentence
 
 

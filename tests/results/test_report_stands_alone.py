@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.notes import note_attributes
 from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
 from spirillum.results.study import write_report
@@ -184,7 +185,7 @@ def test_study_without_claims_has_an_empty_list(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("blank")
 def test_hostile_words_stay_words(tmp_path: Path) -> None:
     dataset = small_study(title=HOSTILE, note='" onload="x" <b>')
-    dataset.attrs["warnings"] = HOSTILE
+    dataset.attrs |= note_attributes([HOSTILE])
     page = written(dataset, tmp_path)
     assert not page.all("script")
     assert not page.all("b")

@@ -165,7 +165,7 @@ def test_wrong_ranges_are_refused(table, words: str) -> None:
 
 def test_runs_that_tell_nothing_are_counted() -> None:
     speeds = np.array([[[np.nan, np.nan], [1e-3, np.nan]]])
-    assert without_answer([{"forward_velocity": speeds}])[0].startswith("1 of 2 runs of laid-down robots")
+    assert without_answer([{"forward_velocity": speeds}])[0].startswith("1 of 2 runs of released robots")
     assert without_answer([{"forward_velocity": speeds[:, 1:]}]) == []
 
 

@@ -7,6 +7,7 @@ long, and if that does not help the posterior is marked: whoever uses it is refu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,9 +79,9 @@ class Posterior:
         few = [f"{name} {value:.0f}" for name, value in self.effective.items() if not value >= FEWEST_EFFECTIVE]
         found = []
         if bad:
-            found.append(f"the chains have not mixed: R-hat above {LARGEST_RHAT:g} for {', '.join(bad)}")
+            found.append(f"the chains have not mixed: R-hat above {LARGEST_RHAT:g} for {_first(bad)}")
         if few:
-            found.append(f"too few effective draws: below {FEWEST_EFFECTIVE:g} for {', '.join(few)}")
+            found.append(f"too few effective draws: below {FEWEST_EFFECTIVE:g} for {_first(few)}")
         return [f"{sentence}; more doublings sample for longer" for sentence in found]
 
     @property
@@ -91,6 +92,11 @@ class Posterior:
     def values(self) -> dict[str, Samples]:
         """Numbers by label, (chains, draws)."""
         return {name: v.reshape(self.z.shape[:2]) for name, v in self.density.values(self.flat).items()}
+
+
+def _first(items: Sequence[str]) -> str:
+    """The first of several, and how many more there are."""
+    return items[0] if len(items) == 1 else f"{items[0]} and {len(items) - 1} more"
 
 
 def sampled(

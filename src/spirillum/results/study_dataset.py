@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
+import numpy as np
 import xarray as xr
 
+from spirillum.errors import InputError
 from spirillum.notes import notes_in
 from spirillum.results.study_content import shown_ranking
 from spirillum.studies.ranking import can_be_ranked, ranking_of
+
+_SIZES = ("channel_diameter", "wavelength", "amplitude")
+"""Sizes that tell the robots of a study apart."""
 
 
 # xarray leaves __init_subclass__ without types.
@@ -22,6 +27,31 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
     def of(cls, dataset: xr.Dataset) -> StudyDataset:
         """A study's values, coordinates and attributes in a dataset that shows its ranking."""
         return cls(dataset.data_vars, dataset.coords, dataset.attrs)
+
+    def unstacked(self) -> xr.Dataset:
+        """The study over `wavelength` and `amplitude`, and `channel_diameter` if it varies, in place of `robot`.
+
+        A study of a grid has these dimensions already. The robots' names become the variable `robot_name`.
+
+        Raises:
+            InputError: if the robots are not all combinations of these sizes.
+        """
+        if "robot" not in self.dims:
+            return self
+        sizes = {name: np.unique(self[name].values) for name in _SIZES}
+        varied = [name for name, values in sizes.items() if values.size > 1] or ["wavelength"]
+        if int(np.prod([values.size for values in sizes.values()])) != self.sizes["robot"]:
+            counts = ", ".join(f"{values.size} of {name}" for name, values in sizes.items())
+            raise InputError(
+                f"the study's {self.sizes['robot']} robots are not all combinations of their sizes ({counts}); "
+                "allowed: robots that are a product of channels, wavelengths and amplitudes"
+            )
+        named = (
+            xr.Dataset(self.data_vars, self.coords, self.attrs)
+            .assign(robot_name=("robot", self["robot"].values))
+            .drop_vars("robot")
+        )
+        return named.set_index(robot=varied).unstack("robot")
 
     def __str__(self) -> str:
         """The ranking and the warnings, or what xarray prints where nothing can be ranked."""
