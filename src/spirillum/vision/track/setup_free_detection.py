@@ -114,7 +114,7 @@ def detect_without_setup(
     tell("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
     guesses = _guesses(robot, video.size, lines, spacing)[: None if stills.changes else 1]
-    looks = 2 * len(guesses) * len(directions)
+    looks = (2 if stills.changes else 1) * len(guesses) * len(directions)
     tell("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
         found = _found_at(video, robot, (guess, lines, directions), stills)
