@@ -24,7 +24,7 @@ from spirillum.vision.track import colours, constants, contour, cuts, search, st
 QUANTITIES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
 MODULES = (constants, search, contour, steps, colours, steadiness, cuts)
 """Of the tracker, each with the constants of its stages."""
-STAGES = ("SEARCH", "CONTOUR", "OUTLINE", "FIRST_LOOK", "FOLLOWING", "COLOURS", "STRIPES", "TAIL", "UNWRAPPING")
+STAGES = ("SEARCH", "CONTOUR", "OUTLINE", "DETECTION", "FOLLOWING", "COLOURS", "STRIPES", "TAIL", "UNWRAPPING")
 WARNINGS = ("SIZE", "IDENTITY", "STEADINESS", "CUTS", "VISIBILITY")
 """Stages whose constants decide on warnings, not on numbers."""
 FILMS = (

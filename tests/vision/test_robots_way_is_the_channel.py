@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.track.direction import along_its_way
+from spirillum.vision.track.direction import align_with_path
 
 FPS, PIXEL = 30.0, 2.5e-4
 
@@ -23,7 +23,7 @@ def track(roll: float, speed: float, noise: float = 0.05) -> tuple[np.ndarray, n
 @pytest.mark.parametrize("roll", [-20.0, -3.0, 8.0, 85.0])
 def test_length_is_that_of_the_way(roll: float, speed: float) -> None:
     time, position, heading = track(np.radians(roll), speed)
-    along = along_its_way(time, position, heading)
+    along = align_with_path(time, position, heading)
     good = np.isfinite(position[:, 0])
     good[::23] = False
     slope = np.polyfit(time[good], along.position[good], 1)[0]
@@ -36,18 +36,18 @@ def test_length_is_that_of_the_way(roll: float, speed: float) -> None:
 @pytest.mark.parametrize(("roll", "speed"), [(0.0, 3e-3), (1.2, 3e-3)])
 def test_level_cameras_stay_as_they_are(roll: float, speed: float) -> None:
     time, position, heading = track(np.radians(roll), speed)
-    along = along_its_way(time, position, heading)
+    along = align_with_path(time, position, heading)
     np.testing.assert_array_equal(along.position, position)
     assert not along.flags
 
 
 def test_a_robot_that_hardly_moves_lies_along_the_channel() -> None:
     time, position, heading = track(np.radians(8.0), 0.0, noise=0.5)
-    along = along_its_way(time, position, heading)
+    along = align_with_path(time, position, heading)
     assert "lies at 11.0 deg" in along.flags[0].sentence
     assert np.degrees(along.heading) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_too_few_frames_tell_no_direction() -> None:
     time, position, heading = track(np.radians(8.0), 3e-3)
-    assert not along_its_way(time[:8], position[:8], heading[:8]).flags
+    assert not align_with_path(time[:8], position[:8], heading[:8]).flags

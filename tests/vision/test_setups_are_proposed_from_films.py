@@ -111,7 +111,7 @@ def test_without_a_ruler_the_robot_gives_the_scale_and_another_order_of_stripes_
 def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
     """With a ruler the setup is written as far as it goes; without one there is nothing to write."""
     monkeypatch.setattr(setup_free_detection, "best_other_size", lambda *given: None)  # it takes a while
-    monkeypatch.setattr(setup_free_detection, "SCOUTING", replace(setup_free_detection.SCOUTING, shares=(0.25,)))
+    monkeypatch.setattr(setup_free_detection, "SETUP_FREE", replace(setup_free_detection.SETUP_FREE, shares=(0.25,)))
     empty = {"frames": 2, "start": (1.0, 0.0), "noise": 4.0}
     flat_pictures.Flat(**empty, size=(240, 120), focal=260.0, spacing=3e-3).write(tmp_path / "a.mp4")
     looks = []

@@ -1,1 +1,1 @@
-"""The tracker on a live picture: a camera, a stream, or a film at its own pace."""
+"""The tracker on a live picture: a camera, a stream, or a video at its own pace."""

@@ -30,9 +30,9 @@ from spirillum.vision.camera.optics import BodyPose, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
-from spirillum.vision.track.body import Placed
+from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.constants import VISIBILITY
-from spirillum.vision.track.direction import along_its_way
+from spirillum.vision.track.direction import align_with_path
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.track.learning import InitialDetection
 from spirillum.vision.track.size import checked_scale
@@ -179,7 +179,7 @@ class Following:
         """Angle of the channel to the rows of the picture where no ruler tells it, by the first look."""
         path = self.learnt.known.start.path
         time, pose = np.array([at for at, _ in path]), np.array([one for _, one in path])
-        along = along_its_way(time, self._places(pose[:, :2]), pose[:, 2])
+        along = align_with_path(time, self._places(pose[:, :2]), pose[:, 2])
         return float(np.median(pose[:, 2] - along.heading)), along.flags
 
     def _places(self, xy: np.ndarray) -> np.ndarray:
@@ -226,7 +226,7 @@ class Following:
         )
         return _without_spoiled(seen)
 
-    def _magnified(self, found: Placed) -> float:
+    def _magnified(self, found: PoseFit) -> float:
         """Standard error of the place at the stated scale, m."""
         known, sight = self.learnt.known.start.body.optics, self.learnt.sight.optics
         return found.error.x * known.focal / sight.focal

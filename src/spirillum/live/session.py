@@ -28,7 +28,7 @@ _WAITING = 2
 
 
 def at_own_pace(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
-    """A film's pictures, each when it is due."""
+    """A video's pictures, each when it is due."""
     start = None
     for frame in frames:
         start = time.perf_counter() - frame.time if start is None else start
@@ -96,18 +96,18 @@ def track(
     overrides: Mapping[str, Any] | None = None,
     on_observation: OnObservation | None = None,
 ) -> Tracked:
-    """Track a robot live: in front of a camera, in a stream, or in a film at its own pace.
+    """Track a robot live: in front of a camera, in a stream, or in a video at its own pace.
 
     Args:
-        source: a film or folder of images, `camera:0`, or the address of a stream.
+        source: a video or folder of images, `camera:0`, or the address of a stream.
         setup: the setup file.
-        pace: `real`: pictures that come while the tracker is busy are dropped; `fast`: all pictures of a film, as fast
+        pace: `real`: pictures that come while the tracker is busy are dropped; `fast`: all pictures of a video, as fast
             as it goes.
         size: width and height that a camera is asked for, pixels.
         fps: frames a second that it is asked for.
         learn: time from which the robot's appearance is learnt, with its unit or a float in s.
         window: time over which the rates of each frame are taken.
-        learn_from: a film of the same robot before the same camera, instead of the first seconds.
+        learn_from: a video of the same robot before the same camera, instead of the first seconds.
         udp: `PORT` or `HOST:PORT` to which each observation is sent as JSON in a datagram; without a host, to this
             computer.
         duration: time after which it ends; None: with the source, or an interrupt.
@@ -243,7 +243,7 @@ class _Log:
             self._clocks = Note("clock-in-doubt", words, ("camera.frames_per_second",))
 
     def _hint(self) -> str:
-        """What helps a film that has ended while the robot was still learnt."""
+        """What helps a video that has ended while the robot was still learnt."""
         if self.source.kind != "film" or self.length is not None:
             return ""
         if self.pace == "fast" or self.span <= self.tracker.learning:

@@ -1,4 +1,4 @@
-"""Where pictures come from: a film, a camera, or a stream of the network."""
+"""Where pictures come from: a video, a camera, or a stream of the network."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Source:
     options: Mapping[str, Any] = field(repr=False)
     """How it is opened: see `source_of`."""
     words: str = ""
-    """What a film says of itself, such as that it is synthetic."""
+    """What a video says of itself, such as that it is synthetic."""
     flags: list[Flag] = field(default_factory=list, repr=False)
     """What was odd about its pictures while they were read."""
 
@@ -79,7 +79,7 @@ class Source:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What was odd about its pictures: for example, that a film breaks off."""
+        """Notes on its pictures: for example, that a video breaks off."""
         return tuple(flag.note for flag in self.flags)
 
 
@@ -94,11 +94,11 @@ def source_of(
     """The source that a word names.
 
     Args:
-        word: a film or folder, `camera:0` or `/dev/video0`, or the address of a stream.
+        word: a video or folder, `camera:0` or `/dev/video0`, or the address of a stream.
         size: width and height that a camera is asked for, pixels.
         fps: frames a second that it is asked for.
-        camera: of the setup, for the rate of a folder's images, and for what replaces a film's own times or pixels.
-        between: first and last time of a film that count, s.
+        camera: of the setup, for the rate of a folder's images, and for what replaces a video's own times or pixels.
+        between: first and last time of a video that count, s.
     """
     pace, aspect = (None, None) if camera is None else (camera.frames_per_second, camera.pixel_aspect_ratio)
     scheme = word.partition("://")[0].lower() if "://" in word else ""
@@ -121,7 +121,7 @@ def source_of(
         address = scheme + word[len(scheme) :]
         options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
         return Source(_without_secrets(word), "stream", options)
-    video = open_video(word, pace, aspect)  # says what is wrong with a film
+    video = open_video(word, pace, aspect)  # says what is wrong with a video
     return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
 
 

@@ -24,7 +24,7 @@ from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
 
 _SAMPLES = 24
-"""Frames from which the robot is learnt, as for a film."""
+"""Frames from which the robot is learnt, as for a video."""
 _GOLDEN = 0.618034
 """Step of the low-discrepancy sequence that spreads them."""
 
@@ -54,12 +54,12 @@ class LiveTracker:
             robot: the robot in front of the camera; None: that of the setup.
             learn: time from which the robot's appearance is learnt, with its unit or a float in s.
             window: time over which rates are taken, with its unit or a float in s.
-            learn_from: a film of the same robot before the same camera; the tracker then begins with the first frame.
+            learn_from: a video of the same robot before the same camera; the tracker then begins with the first frame.
             name: of the source, for sentences.
             words: what the source says of itself, such as that it is synthetic.
 
         Raises:
-            InputError: for wrong input, or a film in which neither ruler nor robot is found.
+            InputError: for wrong input, or a video in which neither ruler nor robot is found.
         """
         if isinstance(setup, Setup):
             self.setup, self._folder = setup, Path()
@@ -127,7 +127,7 @@ class LiveTracker:
         self._count += frames
 
     def summary(self) -> Trial:
-        """Speed and rates over all frames so far (of 36,000 at most), as `measure` takes them from a film.
+        """Speed and rates over all frames so far (of 36,000 at most), as `measure` takes them from a video.
 
         Raises:
             InputError: if the robot was never found.

@@ -22,7 +22,7 @@ class Tracked(DisplayMixin):
     source: str
     """Its name."""
     pace: str
-    """`real`: as the pictures come; `fast`: a film, as fast as it goes."""
+    """`real`: as the pictures come; `fast`: a video, as fast as it goes."""
     frames: int
     """Frames that were looked at."""
     tracked: int
@@ -38,7 +38,7 @@ class Tracked(DisplayMixin):
     source_notes: tuple[Note, ...] = ()
     """What to be careful about that lies in the source."""
     stopped: str = ""
-    """Why it ended before its time, in a sentence; empty for a film that ended, or a time that was asked for."""
+    """Why it ended before its time, in a sentence; empty for a video that ended, or a time that was asked for."""
     interrupted: bool = False
     """Whether it was interrupted."""
 

@@ -155,7 +155,7 @@ def feasibility(
         frames_per_second: of the camera; unset: the setup's, else 30.
         view_width: width of the field of view at the height of the axis; replaces the scale of the setup.
         picture_width: width of the picture, pixels; unset: 640, or the video's.
-        video: a film or folder of images from whose ruler the scale is fitted, in place of `view_width`.
+        video: a video or folder of images from whose ruler the scale is fitted, in place of `view_width`.
         overrides: dotted fields of the robot, as for `spirillum.load`.
 
     Raises:
@@ -203,7 +203,7 @@ def feasibility(
 
 
 def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
-    """Refuse what a film states itself."""
+    """Refuse what a video states itself."""
     for name, value in (("view-width", view_width), ("width", picture_width)):
         if video is not None and value is not None:
             raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")

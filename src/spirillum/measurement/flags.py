@@ -23,8 +23,8 @@ from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.track import Track
 
 _CLEAR = 0.2
-"""Change beyond the ends of its interval from which on it is flagged, pixels. On clean films of bodies that do not tilt
-it is below 0.1."""
+"""Change beyond the ends of its interval from which on it is flagged, pixels. On clean videos of bodies that do not
+tilt it is below 0.1."""
 
 
 class Elongation(NamedTuple):
@@ -49,7 +49,7 @@ class Elongation(NamedTuple):
 
     @property
     def clear(self) -> bool:
-        """Whether the change is more than noise and what clean films of bodies show that do not tilt."""
+        """Whether the change is more than noise and what clean videos of bodies show that do not tilt."""
         return abs(self.change) - self.half_width > _CLEAR * self.pixel
 
     def flags(self) -> tuple[Flag, ...]:

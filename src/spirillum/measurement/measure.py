@@ -198,11 +198,11 @@ def _notes(trial: Trial) -> list[Note]:
     return [note.prefixed(f"{trial.name}: ") for note in (*flags, *missing)]
 
 
-class Asked(NamedTuple):
+class MeasurementRequest(NamedTuple):
     """Videos of one robot with one setup, checked: one trial each."""
 
     videos: tuple[Path, ...]
-    """Films or folders of images."""
+    """Videos or folders of images."""
     names: tuple[str, ...]
     """Names of the trials."""
     readings: tuple[Marks | None, ...]
@@ -224,7 +224,7 @@ class Asked(NamedTuple):
         return Path(self.setup_file).parent
 
 
-def asked_of(
+def check_request(
     videos: str | Path | Sequence[str | Path],
     setup: str | Path,
     *,
@@ -234,11 +234,11 @@ def asked_of(
     start: float | None = None,
     end: float | None = None,
     overrides: Mapping[str, Any] | None = None,
-) -> Asked:
+) -> MeasurementRequest:
     """Check what is to be measured, before any video is opened.
 
     Args:
-        videos: films or folders of images, each once.
+        videos: videos or folders of images, each once.
         setup: the setup file.
         marks: table of readings by hand.
         track: table of trackpy, DeepLabCut or Tracker with the positions of one video, in pixels.
@@ -256,11 +256,13 @@ def asked_of(
     chosen, robot = _loaded(setup, overrides, start, end)
     readings = _readings(paths, marks, track, tracking=tracking)
     table = None if track is None else Path(track)
-    return Asked(tuple(paths), tuple(_names(paths)), tuple(readings), chosen, str(setup), robot, table, tracking)
+    return MeasurementRequest(
+        tuple(paths), tuple(_names(paths)), tuple(readings), chosen, str(setup), robot, table, tracking
+    )
 
 
 def measured_trial(
-    asked: Asked,
+    asked: MeasurementRequest,
     number: int,
     video: Path | Video,
     *,
@@ -287,7 +289,7 @@ def measured_trial(
     return trial_of(track, asked.robot, name, read)
 
 
-def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Asked) -> Track:
+def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: MeasurementRequest) -> Track:
     if asked.track is not None:
         assert seen.ruled is not None  # noqa: S101 - asked for
         assert seen.time_of is not None  # noqa: S101
@@ -305,7 +307,11 @@ def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Asked) -
 
 
 def measurement_of(
-    asked: Asked, trials: Sequence[Trial], failures: Sequence[tuple[str, str]] = (), *, interrupted: bool = False
+    asked: MeasurementRequest,
+    trials: Sequence[Trial],
+    failures: Sequence[tuple[str, str]] = (),
+    *,
+    interrupted: bool = False,
 ) -> Measurement:
     """All trials compared with each other, and their summary."""
     compared_trials = compared(trials)

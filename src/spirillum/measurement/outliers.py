@@ -1,9 +1,9 @@
-"""Outliers: frames of a series, trials among trials, and the first frames of a compressed film, which are ahead.
+"""Outliers: frames of a series, trials among trials, and the first frames of a compressed video, which are ahead.
 
 The first picture is stored whole. The next ones store what changed, which noise hides: within some frames the robot
 falls behind, by up to a third of a pixel and two degrees of the tail, and stays so. At the end of a line such frames
-have much weight. On twenty degraded films of 3 s, in two styles, the speed fell short by 0.17 pixels from end to end in
-the mean, without them by 0.08.
+have much weight. On twenty degraded videos of 3 s, in two styles, the speed fell short by 0.17 pixels from end to end
+in the mean, without them by 0.08.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From a film to a setup file: what the film tells is filled in, what only the experimenter knows is marked."""
+"""From a video to a setup file: what the video tells is filled in, what only the experimenter knows is marked."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.camera.optics import seen
-from spirillum.vision.track.constants import IDENTITY, SCOUTING, SIZE
-from spirillum.vision.track.setup_free_detection import Scouted, scouted
+from spirillum.vision.track.constants import IDENTITY, SETUP_FREE, SIZE
+from spirillum.vision.track.setup_free_detection import SetupFreeDetection, detect_without_setup
 from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.video.frames import Video, open_video
 
@@ -39,7 +39,7 @@ _AT_REST = 0.2
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a film tells."""
+    """One thing that a video tells."""
 
     name: str
     """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `appearance`, `stripes` or `walls`."""
@@ -67,10 +67,10 @@ class Finding:
 
 @dataclass(frozen=True, repr=False)
 class Proposal(DisplayMixin):
-    """A setup as far as a film tells it."""
+    """A setup as far as a video tells it."""
 
     film: str
-    """Name of the film."""
+    """Name of the video."""
     size: tuple[int, int]
     """Width and height of its pictures, pixels."""
     robot: str
@@ -114,14 +114,14 @@ def propose_setup(
     overwrite: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Proposal:
-    """Look at a film and propose its setup.
+    """Look at a video and propose its setup.
 
     Args:
-        film: the film, or a folder of images.
+        film: the video, or a folder of images.
         robot: a preset's name or a robot file; None: the paper's robot, in the channel that the walls look like.
         output: setup file to write (`.toml`); None: none is written.
         spacing: from each line of the ruler to the next, with its unit or a float in m; None: left to be filled in.
-        fps: frames a second of a folder of images, or in place of a film's own times.
+        fps: frames a second of a folder of images, or in place of a video's own times.
         overwrite: replace a file that is there.
         progress: told what is looked for, how many looks are done, and how many there are at most.
 
@@ -129,7 +129,7 @@ def propose_setup(
         What was found and how sure it is, what is left to be filled in, and the text of the file.
 
     Raises:
-        InputError: if the film or the robot cannot be read, the film shows neither a ruler nor the robot, or the file
+        InputError: if the video or the robot cannot be read, the video shows neither a ruler nor the robot, or the file
             cannot be written.
     """
     target = None
@@ -143,7 +143,7 @@ def propose_setup(
     video = open_video(
         film, fps or (_USUAL_RATE if checked_path(film, "a film, or a folder of images").is_dir() else None)
     )
-    seen_there = scouted(video, loaded, apart, progress)
+    seen_there = detect_without_setup(video, loaded, apart, progress)
     if seen_there.known is None and seen_there.lines is None:
         raise InputError(
             f"{video.name} shows neither a ruler nor a robot like '{loaded.name}' at any scale; allowed: a film in "
@@ -185,7 +185,7 @@ def _beside(file: Path, target: Path) -> str:
     return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else file.as_posix()
 
 
-def _by_walls(found: Scouted, robot: Robot) -> str:
+def _by_walls(found: SetupFreeDetection, robot: Robot) -> str:
     """The paper's robot whose channel is nearest to the walls; the first one where no walls were found."""
     if found.walls is None:
         return PAPER_ROBOTS[0]
@@ -195,7 +195,7 @@ def _by_walls(found: Scouted, robot: Robot) -> str:
 
 
 def _findings(
-    video: Video, found: Scouted, robot: Robot, name: str, spacing: float | None, *, timed: bool, given: bool
+    video: Video, found: SetupFreeDetection, robot: Robot, name: str, spacing: float | None, *, timed: bool, given: bool
 ) -> Iterator[Finding]:
     yield _frame_rate(video, timed=timed)
     yield _ruler(found, spacing)
@@ -251,7 +251,7 @@ def _frame_rate(video: Video, *, timed: bool) -> Finding:
     return Finding("frame_rate", rate, "1/s", "clear", f"{rate:.4g} frames a second, {own}", field)
 
 
-def _ruler(found: Scouted, spacing: float | None) -> Finding:
+def _ruler(found: SetupFreeDetection, spacing: float | None) -> Finding:
     lines = found.lines
     if lines is None:
         words = "no equally spaced lines across the picture's rows"
@@ -270,7 +270,7 @@ def _ruler(found: Scouted, spacing: float | None) -> Finding:
     return Finding("ruler", lines.distance, "pixel", "clear", words, pixels=tuple(strips))
 
 
-def _travel(found: Scouted) -> Finding:
+def _travel(found: SetupFreeDetection) -> Finding:
     speed = found.speed
     if abs(speed) < _AT_REST:
         return Finding("travel", speed, "pixel/s", "doubtful", "the robot hardly moves")
@@ -279,7 +279,7 @@ def _travel(found: Scouted) -> Finding:
     return Finding("travel", speed, "pixel/s", "clear" if speed > 0 else "doubtful", words)
 
 
-def _appearance(found: Scouted) -> Finding:
+def _appearance(found: SetupFreeDetection) -> Finding:
     appearance = found.appearance
     if appearance == "unknown":
         words = "the picture does not tell whether the body's cover is opaque or glass"
@@ -290,7 +290,7 @@ def _appearance(found: Scouted) -> Finding:
     )
 
 
-def _stripes(found: Scouted) -> Finding:
+def _stripes(found: SetupFreeDetection) -> Finding:
     assert found.known is not None  # noqa: S101 - asked where it is known
     stated = found.known.stripes.stripes
     if not stated:
@@ -306,7 +306,7 @@ def _stripes(found: Scouted) -> Finding:
     return Finding("stripes", list(found.stripes), "", "doubtful", words, "robot.stripes")
 
 
-def _walls(found: Scouted, robot: Robot) -> Finding:
+def _walls(found: SetupFreeDetection, robot: Robot) -> Finding:
     walls = found.walls
     if walls is None:
         words = "no edges along the channel were found on both sides of the robot"
@@ -318,7 +318,7 @@ def _walls(found: Scouted, robot: Robot) -> Finding:
         "measure the bore"
     )
     ends = tuple(tuple((float(u), float(v)) for u, v in line) for line in walls.ends)
-    confidence: Confidence = "clear" if walls.contrast > 2.0 * SCOUTING.clear else "doubtful"
+    confidence: Confidence = "clear" if walls.contrast > 2.0 * SETUP_FREE.clear else "doubtful"
     return Finding("walls", width, "m", confidence, words, pixels=ends)
 
 
@@ -337,7 +337,7 @@ def _doubt(findings: tuple[Finding, ...], name: str) -> str:
     return f"CHECK: the paper's robot was found; its channel by the walls, {walls.confidence}"
 
 
-def _scale_lines(found: Scouted, robot: Robot, spacing: float | None) -> dict[str, tuple[str, str]]:
+def _scale_lines(found: SetupFreeDetection, robot: Robot, spacing: float | None) -> dict[str, tuple[str, str]]:
     """The spacing, where it is known; without a ruler the scale by the robot's own size."""
     if spacing is not None and (found.lines is not None or found.known is None):
         return {"markers.spacing": (f'"{1e3 * spacing:.9g} mm"', "as given")}
@@ -355,7 +355,9 @@ def _scale_lines(found: Scouted, robot: Robot, spacing: float | None) -> dict[st
     }
 
 
-def _warnings(video: Video, found: Scouted, findings: tuple[Finding, ...], spacing: float | None) -> Iterator[Note]:
+def _warnings(
+    video: Video, found: SetupFreeDetection, findings: tuple[Finding, ...], spacing: float | None
+) -> Iterator[Note]:
     yield from (flag.note for flag in video.flags)
     unsure = ("robot", "direction", "ruler")
     yield from (

@@ -131,11 +131,11 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
 
 
 def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, Any]:
-    """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, and what a film shows.
+    """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, what a video shows.
 
     Args:
         path: the setup file.
-        film: a film that was taken with it; None: none is looked at.
+        film: a video that was taken with it; None: none is looked at.
     """
     setup, robot = load_setup(path)
     fields = {
@@ -196,7 +196,7 @@ def _as_in_example(setup: Setup) -> list[str]:
 
 
 def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
-    """What the tracker's first look at a film tells with a setup, and all that is odd about it."""
+    """What the tracker's first look at a video tells with a setup, and all that is odd about it."""
     video = opened(film, setup)
     frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)

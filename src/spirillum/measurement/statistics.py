@@ -66,7 +66,7 @@ PIXEL_ERROR = 0.03
 AMPLITUDE_ERROR = 0.12
 """Relative standard error of a lateral amplitude: static edges of the glass beside the body bias it towards zero.
 
-On rendered films from the side, with the body within a few pixels of the tube's edge, the bias was 12 to 20 %."""
+On rendered videos from the side, with the body within a few pixels of the tube's edge, the bias was 12 to 20 %."""
 STRIPE_ERROR = math.radians(0.2)
 """Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
 PHASE_ERROR = math.radians(1.0)
@@ -74,7 +74,7 @@ PHASE_ERROR = math.radians(1.0)
 DRIFT_PIXELS = 0.01
 """Drift of the position error from end to end, by light and perspective, pixels."""
 DRIFT_BARE = 0.1
-"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered films."""
+"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos."""
 DRIFT_ANGLE = math.radians(0.1)
 """Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
 POSITION_ERROR = 0.25

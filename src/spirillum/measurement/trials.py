@@ -187,7 +187,7 @@ def _with_interval(item: Measured) -> Measured:
 
 
 def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
-    """Fitted lines, without the first frames of a compressed film that are ahead, unless the robot slows down there."""
+    """Fitted lines, without the first frames of a compressed video that are ahead, unless the robot slows there."""
     shorter = track if read is not None else without_lead(track)
     fits = _fits_of(shorter, robot, read)
     if shorter is track or all(rate.steady for rate in fits.values()):
@@ -282,7 +282,7 @@ def _drift(track: Track, error: float) -> float:
 
 
 def _timing(rate: Rate, track: Track) -> float:
-    """Standard error of a rate by the uncertain length of the film in time."""
+    """Standard error of a rate by the uncertain length of the video in time."""
     return track.time_uncertainty * abs(rate.value) if math.isfinite(rate.value) else 0.0
 
 
@@ -312,7 +312,7 @@ def _velocity(rate: Rate, track: Track, tilt: float) -> Measured:
 
 
 def _wander(rate: Rate) -> float:
-    """Scatter of the mean residuals of tenths of the track: pictures of a compressed film lag behind, and catch up."""
+    """Scatter of the mean residuals of tenths of the track: pictures of a compressed video lag behind, and catch up."""
     known = rate.residual[np.isfinite(rate.residual)]
     if known.size < _TENTHS:
         return 0.0

@@ -40,7 +40,7 @@ def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) ->
     """Scale and times of a video.
 
     Args:
-        path: the film or folder.
+        path: the video or folder.
         setup: the setup.
         folder: folder of the setup file.
         needed: whether pixels are to be turned into lengths.

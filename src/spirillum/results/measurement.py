@@ -18,10 +18,10 @@ from spirillum.files import check_replaceable, protected, results_folder, whole_
 from spirillum.measurement.flags import BY_HAND, says_synthetic
 from spirillum.measurement.measure import (
     TABLE,
-    Asked,
     Measurement,
+    MeasurementRequest,
     Progress,
-    asked_of,
+    check_request,
     measured_trial,
     measurement_of,
 )
@@ -180,7 +180,7 @@ def measure(
         KeyboardInterrupt: if it was interrupted; the trials that were finished are written.
         OSError: if a file could not be written, for want of space, say; the trials that were finished are written.
     """
-    asked = asked_of(
+    asked = check_request(
         videos, setup, marks=marks, track=track, tracking=tracking, start=start, end=end, overrides=overrides
     )
     tell: Progress = progress or (lambda _what, _done, _total: None)
@@ -209,7 +209,7 @@ class _Folder:
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     """JPEG of an annotated frame by the trial's name."""
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: MeasurementRequest) -> None:
         """Look at all that will be written, before any video is measured."""
         names = [TABLE, *(["report.html"] if self.figures else [])]
         for name in asked.names:
@@ -219,7 +219,7 @@ class _Folder:
             check_replaceable(self.path / name)
 
 
-def _measured(asked: Asked, folder: _Folder | None, tell: Progress) -> Measurement:
+def _measured(asked: MeasurementRequest, folder: _Folder | None, tell: Progress) -> Measurement:
     """Measure one video after the other; what is finished is written even if the next ones cannot be."""
     trials: list[Trial] = []
     failures: list[tuple[str, str]] = []
@@ -246,7 +246,9 @@ def _frames_told(tell: Progress, words: str) -> Callable[[int, int | None], None
     return lambda done, frames: tell(words, done, max(done, frames or 0))
 
 
-def _trial(asked: Asked, number: int, folder: _Folder | None, tell: Callable[[int, int | None], None]) -> Trial:
+def _trial(
+    asked: MeasurementRequest, number: int, folder: _Folder | None, tell: Callable[[int, int | None], None]
+) -> Trial:
     """Measure one video and write what belongs to it alone."""
     path, name = asked.videos[number], asked.names[number]
     if folder is None:
@@ -261,7 +263,9 @@ def _trial(asked: Asked, number: int, folder: _Folder | None, tell: Callable[[in
     return trial
 
 
-def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[[int, int | None], None]) -> Trial:
+def _annotated_trial(
+    asked: MeasurementRequest, number: int, folder: _Folder, tell: Callable[[int, int | None], None]
+) -> Trial:
     path, name = asked.videos[number], asked.names[number]
 
     def thumbnail(picture: bytes) -> None:
@@ -283,7 +287,7 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
 
 
 def _finished(
-    asked: Asked,
+    asked: MeasurementRequest,
     trials: Sequence[Trial],
     failures: Sequence[tuple[str, str]],
     folder: _Folder | None,

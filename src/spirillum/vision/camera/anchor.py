@@ -54,7 +54,7 @@ class PictureRegistration(NamedTuple):
 
 @dataclass(frozen=True)
 class Anchor:
-    """What stands still in the pictures of a film, to which each of them is registered."""
+    """What stands still in the pictures of a video, to which each of them is registered."""
 
     flat: Samples = field(repr=False)
     """High-pass filtered brightness, (h, w)."""
@@ -119,7 +119,7 @@ class Anchor:
 
 
 class Steadied(NamedTuple):
-    """How a camera swayed during a film."""
+    """How a camera swayed during a video."""
 
     anchor: Anchor
     """The first picture, reduced where it is large."""
@@ -150,7 +150,7 @@ def sways(frames: Sequence[Frame]) -> bool:
 
 
 def steadied(frames: Iterable[Frame]) -> Steadied:
-    """Register all frames of a film to the first one."""
+    """Register all frames of a video to the first one."""
     anchor: Anchor | None = None
     before: Samples = np.empty((0, 0, 0))
     times, poses = [], []
@@ -168,7 +168,7 @@ def steadied(frames: Iterable[Frame]) -> Steadied:
         before = now
         times.append(frame.time)
         poses.append(pose)
-    assert anchor is not None  # noqa: S101 - a film has a frame
+    assert anchor is not None  # noqa: S101 - a video has a frame
     return Steadied(anchor, np.array(times), np.array(poses) * np.array([factor, factor, 1.0]))
 
 

@@ -21,7 +21,7 @@ _SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 480_000_000
 _GOLDEN = 0.618034
 """Step of the low-discrepancy sequence that spreads them."""
 _UNKNOWN = 10.0
-"""Duration from which is learnt where that of the film is unknown, s."""
+"""Duration from which is learnt where that of the video is unknown, s."""
 
 
 def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[CalibratedCamera, Video]:
@@ -43,7 +43,7 @@ def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
     """Frames at uneven intervals over the measured part, so that they do not alias with the rotation.
 
     Args:
-        video: the film, or a folder of images.
+        video: the video, or a folder of images.
         start: beginning of that part, s.
         end: its end, s; None: that of the video.
     """

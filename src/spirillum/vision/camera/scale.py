@@ -115,7 +115,7 @@ _FOCAL = (0.2, 250.0)
 _MODEL = 3e-4
 """Relative standard uncertainty of lengths by the models of lens and body, with an exact setup.
 
-Assumed; on rendered films with an exact setup, errors of the speed are below 0.02 %."""
+Assumed; on rendered videos with an exact setup, errors of the speed are below 0.02 %."""
 _SMALL_ROLL = 0.1
 """Roll from which on the fit does not begin with an upright camera, rad."""
 _STEP = 1e-3

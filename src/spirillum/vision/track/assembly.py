@@ -26,7 +26,7 @@ from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
 from spirillum.vision.track.cues import CUES, Agreement, agreement_of
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
-from spirillum.vision.track.direction import Along, along_its_way
+from spirillum.vision.track.direction import AlignedTrack, align_with_path
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import InitialDetection
 from spirillum.vision.track.lone_outline import OutlineCheck
@@ -204,7 +204,7 @@ def track_of(
     still: Steadied | None = None,
     outline: OutlineCheck = OutlineCheck(),  # noqa: B008 - a constant
 ) -> Track:
-    """The track of a film, with all flags."""
+    """The track of a video, with all flags."""
     sight, known = learnt.sight, learnt.known
     body, time = known.start.body, np.array(record.time)
     seen = np.array([one.known for one in record.placed])
@@ -220,9 +220,9 @@ def track_of(
     other = something_else(time, pose[:, :2], np.isfinite(roll[:, 0]) | np.isfinite(tail[:, 0]), body.robot.body.length)
     pose[other] = errors[other] = elongation[other] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
-    along = Along(position, pose[:, 2], ())
+    along = AlignedTrack(position, pose[:, 2], ())
     if setup.markers.spacing is None:  # no ruler says how the camera is rolled
-        along = along_its_way(time, *along[:2])
+        along = align_with_path(time, *along[:2])
     position = along.position
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
     picture = picture_steps(np.array(record.change))

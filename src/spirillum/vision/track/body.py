@@ -20,7 +20,7 @@ from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
 from spirillum.vision.track.search import Shape
 
 
-class Placed(NamedTuple):
+class PoseFit(NamedTuple):
     """Pose of the body on a frame, with its quality of fit."""
 
     pose: BodyPose
@@ -121,7 +121,7 @@ class BodyFinder:
         """Change the part of the picture to look at: left, top, right, bottom."""
         self.bounds, self._shapes = bounds, {}
 
-    def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
+    def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[PoseFit]:
         """Learn the edges' templates from frames with approximately known poses, and refine these poses.
 
         Args:
@@ -135,7 +135,7 @@ class BodyFinder:
         poses = _smooth(list(poses), times)
         self._bias, self._scatter = np.zeros(len(self.contour.group)), self.contour.floor.copy()
         parts = [self._part(image, pose) for image, pose in zip(images, poses, strict=True)]
-        found: list[Placed] = []
+        found: list[PoseFit] = []
         if self.seal is not None:  # what does not move along with the seal is not the body's
             found = self._learn_seal(parts, poses)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
@@ -155,7 +155,7 @@ class BodyFinder:
                 poses = _smooth(poses, times)
         return found
 
-    def _learn_seal(self, parts: list[_Part], poses: list[BodyPose]) -> list[Placed]:
+    def _learn_seal(self, parts: list[_Part], poses: list[BodyPose]) -> list[PoseFit]:
         """Learn the seal's colours from frames with approximately known poses; the poses by its edges alone."""
         assert self.seal is not None  # noqa: S101 - asked by those who know
         for turn in range(SEAL.learning_rounds):
@@ -196,7 +196,7 @@ class BodyFinder:
         weight = np.where(self._scatter < OUTLINE.trusted_error, np.minimum(self._strength, OUTLINE.strength_cap), 0.0)
         return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
-    def place(self, image: np.ndarray, guess: BodyPose) -> Placed:
+    def place(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
         """Fit the pose of the body near a guess.
 
         Args:
@@ -205,7 +205,7 @@ class BodyFinder:
         """
         return self._place(self._part(image, guess), guess)
 
-    def place_by_seal(self, image: np.ndarray, guess: BodyPose) -> Placed:
+    def place_by_seal(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
         """Fit the pose to the edges of the seal alone, before anything was learnt.
 
         Args:
@@ -281,7 +281,7 @@ class BodyFinder:
         strength = np.sqrt(np.mean(np.einsum("fik,ik->fi", bare, template) ** 2, axis=0))
         self._strength = strength
 
-    def _learn_biases(self, parts: list[_Part], found: list[Placed], most: tuple[float, float] = SEAL.follows) -> None:
+    def _learn_biases(self, parts: list[_Part], found: list[PoseFit], most: tuple[float, float] = SEAL.follows) -> None:
         """Learn the bias of each edge and the scatter about it, as glare shifts edges.
 
         Args:
@@ -305,7 +305,7 @@ class BodyFinder:
             self._scatter[~enough | (self._scatter > bound)] = np.inf
             self._learn_seal_biases(parts, found)
 
-    def _learn_seal_biases(self, parts: list[_Part], found: list[Placed]) -> None:
+    def _learn_seal_biases(self, parts: list[_Part], found: list[PoseFit]) -> None:
         """Learn the bias of each colour of the seal, and the scatter of its edges."""
         assert self.seal is not None  # noqa: S101 - asked by those who know
         seen = [
@@ -354,10 +354,10 @@ class BodyFinder:
             )
         return _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
 
-    def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> Placed:
+    def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0
         pose = np.array(guess)
-        lost = Placed(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
+        lost = PoseFit(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
         if seal_only and part.colours is None:
             return lost
         for step in range(rough + OUTLINE.iterations):
@@ -377,22 +377,22 @@ class BodyFinder:
         try:
             covariance = np.linalg.inv(slopes.T @ (used[:, None] * slopes)) * max(level, 0.5) ** 2 * self._correlation
         except np.linalg.LinAlgError:  # all edges are parallel
-            return Placed(found, lost.error, fitting, share)
+            return PoseFit(found, lost.error, fitting, share)
         errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).tolist())
         if (
             fitting < OUTLINE.least_share
             or not 0.0 < errors.x < OUTLINE.largest_error * self.optics.length_per_pixel
             or share < 0.2
         ):
-            return Placed(found, lost.error, fitting, share)
+            return PoseFit(found, lost.error, fitting, share)
         if seal_only:
-            return Placed(found, errors, fitting, share)
+            return PoseFit(found, errors, fitting, share)
         count = len(self.contour.group)
         left = shifts - slopes @ change
         elongation = _elongation(left[:count], slopes[:count], used[:count], self.contour.group)
         cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
         spread = max(level, 0.5) * np.sqrt(self._correlation)
-        return Placed(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, cue, spread))
+        return PoseFit(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, cue, spread))
 
 
 def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:

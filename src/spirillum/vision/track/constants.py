@@ -1,7 +1,7 @@
 """Tuned numbers of the tracker that more than one module uses: one frozen set for each stage; others stand beside it.
 
-Where a field names no source, its value was set by hand while the tracker was developed on rendered films; nothing else
-stands behind it. What halving and doubling them does to measured rates is in `docs/measuring.md`, found by
+Where a field names no source, its value was set by hand while the tracker was developed on rendered videos; nothing
+else stands behind it. What halving and doubling them does to measured rates is in `docs/measuring.md`, found by
 `benchmarks/tracker_constants.py`. Numbers that are definitions or numerical resolutions stand where they are used, and
 compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, because arguments would slow them down.
 """
@@ -25,7 +25,7 @@ class OutlineConstants:
     largest_shift: float = 2.5
     """Largest displacement of an edge within the linear range, pixels."""
     rounding_noise: float = 1.5
-    """Least standard deviation of brightness in a compressed film, of 255."""
+    """Least standard deviation of brightness in a compressed video, of 255."""
     iterations: int = 5
     """Most Gauss-Newton steps on a frame."""
     learning_rounds: int = 5
@@ -57,7 +57,7 @@ class SealConstants:
     search_blur: float = 0.8
     """Least standard deviation of the blur of the picture in which it is looked for, pixels."""
     least_score: float = 12.0
-    """Least difference of colour between a seal and its surroundings, of 255; of films without one it was below 6."""
+    """Least difference of colour between a seal and its surroundings, of 255; of videos without one it was below 6."""
     clear_share: float = 0.7
     """Least share of the frames on which it is found and its edges fit."""
     beside: float = 3.0
@@ -115,8 +115,8 @@ class SealConstants:
 
 
 @dataclass(frozen=True)
-class FirstLookConstants:
-    """Whether the robot is in the video, and where (`first_look`)."""
+class InitialDetectionConstants:
+    """Whether the robot is in the video, and where (`detect_robot`)."""
 
     searched: int = 8
     """Frames that are searched without any prior knowledge."""
@@ -156,7 +156,7 @@ class SizeConstants:
     edge_error: float = 0.2
     """Standard error of where its edges appear, pixels.
 
-    Assumed; on a hundred rendered and degraded films (70 pixels from the middle to the nose) the apparent size was
+    Assumed; on a hundred rendered and degraded videos (70 pixels from the middle to the nose) the apparent size was
     within 0.2 % in standard deviation."""
     doubt: float = 2.0
     """Standard errors from which on size and scale are said to differ."""
@@ -191,12 +191,12 @@ class IdentityConstants:
     sure_share: float = 0.75
     """Share on which the tail has to be read then, and on which it says where the nose is.
 
-    It was 0.83 and more on rendered films of a hundred robots, 0.52 on one at half the size."""
+    It was 0.83 and more on rendered videos of a hundred robots, 0.52 on one at half the size."""
 
 
 @dataclass(frozen=True)
-class ScoutingConstants:
-    """The first look at a film without a setup (`scouting`)."""
+class SetupFreeConstants:
+    """The first look at a video without a setup (`scouting`)."""
 
     distance: float = 1.15
     """Distance of the provisional lens over the width of what it shows."""
@@ -303,7 +303,7 @@ class StripeConstants:
     fits: float = 0.25
     """Loss over that of one even colour from which on the stripes are not those that are stated.
 
-    Wrong ones had 0.26 and more, right ones on a hundred degraded films at most 0.19."""
+    Wrong ones had 0.26 and more, right ones on a hundred degraded videos at most 0.19."""
     width_range: float = 0.3
     """Logarithm of the stripes' width over the stated one from which on there are more or fewer of them."""
     doubt: float = 1.0
@@ -317,12 +317,12 @@ class StripeConstants:
     hidden: float = 0.25
     """Share of what is seen of the seal that glare hides on half of the frames, from which on it is told."""
     turned_under_glare: float = 2.0
-    """Stripes by which the body has to turn then, so that its rate is given: of three degraded films on which it turned
-    by less than one and a half, two were off by 24 degrees; standing glare seemed to stop another body."""
+    """Stripes by which the body has to turn then, so that its rate is given: of three degraded videos on which it
+    turned by less than one and a half, two were off by 24 degrees; standing glare seemed to stop another body."""
     under_glare: float = radians(12.0)
     """Standard error of the body's angle from end to end then, rad.
 
-    On seven degraded films, of three styles, of 3 s, in which half of the seal was hidden, the angle was off by 13
+    On seven degraded videos, of three styles, of 3 s, in which half of the seal was hidden, the angle was off by 13
     degrees from end to end, root mean square, where the intervals expected 6."""
     ambiguous: float = 1.15
     """Least ratio of the second smallest loss to the smallest one."""
@@ -415,7 +415,7 @@ class UnwrappingConstants:
     leap: float = radians(25.0)
     """Deviation of a step of the body from the running median from which on it leaps, rad.
 
-    On rendered films with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and
+    On rendered videos with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and
     more."""
     leaps: int = 2
     """Leaps that say that stripes are misread."""
@@ -444,7 +444,7 @@ class LostFramesConstants:
     around: int = 60
     """Frames through which the local slope is taken."""
     most: int = 40
-    """Most frames that may be lost in a row; beyond it, the film is cut."""
+    """Most frames that may be lost in a row; beyond it, the video is cut."""
     spike: float = 5.0
     """Distance from the neighbours' median, over the standard error of a step, from which on a frame is misread."""
     beyond: float = 3.0
@@ -484,7 +484,7 @@ class LostFramesConstants:
     still: float = 0.4
     """Motion of a third of these frames over the usual one below which nothing moves, or which goes the other way."""
     repeats_error: float = 0.75
-    """Standard error of the film's length by each repeated frame, frames: 0 or 1 is too much, and some are not seen."""
+    """Standard error of the video's length by each repeated frame, frames: 0 or 1 is too much, some are not seen."""
 
 
 @dataclass(frozen=True)
@@ -537,10 +537,10 @@ class VisibilityConstants:
 
 OUTLINE = OutlineConstants()
 SEAL = SealConstants()
-FIRST_LOOK = FirstLookConstants()
+DETECTION = InitialDetectionConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
-SCOUTING = ScoutingConstants()
+SETUP_FREE = SetupFreeConstants()
 STANDING = StandingConstants()
 STRIPES = StripeConstants()
 SINGLE_LINE = SingleLineConstants()

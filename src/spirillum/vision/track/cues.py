@@ -32,7 +32,7 @@ class CueConstants:
     """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
     of this way.
 
-    Compression lets colours lag by this much: of nine path traced films, at most 0.22 pixels were seen."""
+    Compression lets colours lag by this much: of nine path traced videos, at most 0.22 pixels were seen."""
 
 
 CUES = CueConstants()

@@ -1,6 +1,6 @@
-"""Detection of films whose time stamps or pictures contradict the motion.
+"""Detection of videos whose time stamps or pictures contradict the motion.
 
-Where a part of the film is missing but time stamps continue evenly, position, body and tail jump on the same frame.
+Where a part of the video is missing but time stamps continue evenly, position, body and tail jump on the same frame.
 Where time stamps jump but nothing is missing, the motion continues as if no time had passed. Where strong compression
 repeats the edges of the body, or something that stands still is taken for them, its tail turns and the robot stays.
 """
@@ -27,7 +27,7 @@ from spirillum.vision.track.visibility import EVERYTHING
 
 @dataclass(frozen=True)
 class CutConstants:
-    """Films whose times do not fit what they show."""
+    """Videos whose times do not fit what they show."""
 
     window: int = 8
     """Frames before and after a moment through which straight lines are fitted."""
@@ -126,7 +126,7 @@ class Clock(NamedTuple):
     """What the motion says of the largest gap between the times of the frames."""
 
     relative_error: float
-    """Relative standard uncertainty that it leaves in the length of the film."""
+    """Relative standard uncertainty that it leaves in the length of the video."""
     flags: tuple[Flag, ...]
 
 
@@ -141,7 +141,7 @@ def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated
         motion: the robot's motion.
         length_per_pixel: length per pixel, m.
         period: period of the stripes, rad.
-        stated: times of the frames as the film states them, s, (n,), where lost frames were put back; else None.
+        stated: times of the frames as the video states them, s, (n,), where lost frames were put back; else None.
     """
     time, x, body_angle, tail_phase = motion
     none = Clock(0.0, ())

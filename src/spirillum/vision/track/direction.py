@@ -27,7 +27,7 @@ class DirectionConstants:
 DIRECTION = DirectionConstants()
 
 
-class Along(NamedTuple):
+class AlignedTrack(NamedTuple):
     """Places and headings against the channel."""
 
     position: Samples
@@ -37,7 +37,7 @@ class Along(NamedTuple):
     flags: tuple[Flag, ...]
 
 
-def along_its_way(time: Samples, position: Samples, heading: Samples) -> Along:
+def align_with_path(time: Samples, position: Samples, heading: Samples) -> AlignedTrack:
     """Turn a track so that x runs along the robot's way.
 
     A ruler says how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
@@ -50,7 +50,7 @@ def along_its_way(time: Samples, position: Samples, heading: Samples) -> Along:
     """
     known = np.isfinite(position).all(axis=1)
     if np.count_nonzero(known) < DIRECTION.frames:
-        return Along(position, heading, ())
+        return AlignedTrack(position, heading, ())
     at, places = time[known], position[known].T
     lines = [repeated_median_line(at, values) for values in places]
     way = np.array([float(line.slope) for line in lines]) * np.ptp(at)
@@ -59,10 +59,10 @@ def along_its_way(time: Samples, position: Samples, heading: Samples) -> Along:
     roll = float(np.arctan2(way[1], way[0])) if moves else float(np.nanmedian(heading))
     roll -= np.pi * round(roll / np.pi)  # forwards and backwards are one way
     if abs(roll) < DIRECTION.least:
-        return Along(position, heading, ())
+        return AlignedTrack(position, heading, ())
     c, s = np.cos(roll), np.sin(roll)
     sentence = (
         f"the robot {'moves' if moves else 'lies'} at {np.degrees(roll):.1f} deg to the rows of the picture: lengths "
         "are measured along its way, so the camera is taken to be rolled; put a ruler beside the channel to be sure"
     )
-    return Along(position @ np.array([[c, -s], [s, c]]), heading - roll, (Flag("camera-rolled", sentence),))
+    return AlignedTrack(position @ np.array([[c, -s], [s, c]]), heading - roll, (Flag("camera-rolled", sentence),))

@@ -39,7 +39,7 @@ def follow(
     """Follow a robot through a video.
 
     Args:
-        video: the film, or a folder of images.
+        video: the video, or a folder of images.
         setup: camera, tank, markers and robot of the experiment.
         robot: the robot in front of the camera.
         folder: folder of the setup file, to which the checkerboard's folder is relative; unset: the working directory.

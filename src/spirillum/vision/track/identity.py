@@ -15,8 +15,8 @@ from spirillum.vision.camera.optics import BodyPose, Optics, opposite, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE, STANDING
-from spirillum.vision.track.initial_detection import Start, first_look
+from spirillum.vision.track.constants import DETECTION, IDENTITY, SIZE, STANDING
+from spirillum.vision.track.initial_detection import Start, detect_robot
 from spirillum.vision.track.search import close_places
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
@@ -144,7 +144,7 @@ def _at_another_size(
     """The robot at a size that its file or the scale does not state; None where none fits."""
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
-        least = FIRST_LOOK.clearness if half else SIZE.clearness
+        least = DETECTION.clearness if half else SIZE.clearness
         size = best_other_size(stated, images, still, least, about)
         if size is not None:
             with suppress(InputError):
@@ -247,7 +247,7 @@ def identified_at(
         size: of this body over that at the stated scale.
         colours: number of colours of its stripes, if it is looked for by these.
     """
-    start = first_look(name, body, frames, still, colours)
+    start = detect_robot(name, body, frames, still, colours)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))

@@ -17,7 +17,7 @@ from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, Optics, opposite, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import FIRST_LOOK, SEAL, VISIBILITY
+from spirillum.vision.track.constants import DETECTION, SEAL, VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places, most_likely, refined
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
 from spirillum.vision.track.visibility import rivals_in, turned_flags
@@ -129,7 +129,7 @@ class Start:
 
     def expected(self, time: float) -> BodyPose:
         """Where it should be at a time."""
-        return on_the_way(self.path, time)
+        return pose_on_path(self.path, time)
 
     def close(self, frame: Frame, still: Samples, guess: BodyPose) -> BodyPose:
         """Where the body is near a guess, to a pixel."""
@@ -139,7 +139,7 @@ class Start:
 
     def as_clear(self, score: float) -> bool:
         """Whether edges are as clear as a robot's."""
-        return score > FIRST_LOOK.faint * self.score
+        return score > DETECTION.faint * self.score
 
 
 class _Learnt(NamedTuple):
@@ -169,7 +169,7 @@ class _Found(NamedTuple):
     search: SealSearch | None
 
 
-def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, colours: int = 0) -> Start:
+def detect_robot(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, colours: int = 0) -> Start:
     """Find the robot on some frames, and learn how large it is, within a tenth, and what its edges look like.
 
     Args:
@@ -187,7 +187,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
         body, learnt = _by_whole_outline(body, learnt) or (body, learnt)
     outline = _outline_of(body, learnt)
     stated = True
-    for _ in range(FIRST_LOOK.relearning):
+    for _ in range(DETECTION.relearning):
         if outline.fits(body.optics.length_per_pixel, stated=stated):
             break
         resizes, stated = outline.resizes, stated and not outline.resizes
@@ -202,7 +202,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     every = range(len(learnt.poses))
     whole = [k for k in every if learnt.whole[k]]
     seen = [
-        (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= FIRST_LOOK.whole_frames else every)
+        (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= DETECTION.whole_frames else every)
     ]
     path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
     off = (outline.move.x, outline.move.y) if outline.fits(body.optics.length_per_pixel) else (0.0, 0.0)
@@ -213,7 +213,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
 def _by_outline(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> _Found:
     """Find the robot by the outline of its body."""
     every = np.unique(
-        np.linspace(0, len(frames) - 1, min(FIRST_LOOK.searched, len(frames))).round().astype(int)
+        np.linspace(0, len(frames) - 1, min(DETECTION.searched, len(frames))).round().astype(int)
     ).tolist()
     factor = frames[0].image.shape[1] // still.shape[1]
     images, shape = [frames[k].reduced(factor) for k in every], body.shape(factor)
@@ -243,7 +243,7 @@ def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _
     found = [search.places(frame.image) for frame in frames]
     scores = np.array([[one.score for one in some] + [0.0] * (2 - len(some)) for some in found])[:, :2]
     best, clear = np.median(scores, axis=0)[0], float(np.median(scores[:, 0] / np.maximum(scores[:, 1], 1.0)))
-    if best < SEAL.least_score or np.mean(scores[:, 0] > FIRST_LOOK.faint * best) < SEAL.clear_share:
+    if best < SEAL.least_score or np.mean(scores[:, 0] > DETECTION.faint * best) < SEAL.clear_share:
         return None
     finder = BodyFinder(body.robot, body.optics, body.bounds, body.contour, colours=colours)
     guesses, size = [some[0].pose if some else None for some in found], 1.0
@@ -332,12 +332,10 @@ def close_place(frame: Frame, still: Samples, body: BodyFinder, guess: BodyPose)
 
 def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
-    found = [close_place(frame, still, body, on_the_way(known, frame.time)) for frame in frames]
+    found = [close_place(frame, still, body, pose_on_path(known, frame.time)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
     found = _on_one_way(found, usual, body, frames, still)
-    clear = [
-        (frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > FIRST_LOOK.faint * usual
-    ]
+    clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > DETECTION.faint * usual]
     return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
 
 
@@ -345,15 +343,15 @@ def _on_one_way(
     found: list[PoseCandidate], usual: float, body: BodyFinder, frames: Sequence[Frame], still: Samples
 ) -> list[PoseCandidate]:
     """Look again, where the clear frames say, on those that are less clear: they may show clutter for the body."""
-    sure = {k: (frames[k].time, one.pose) for k, one in enumerate(found) if one.score > FIRST_LOOK.doubtful * usual}
+    sure = {k: (frames[k].time, one.pose) for k, one in enumerate(found) if one.score > DETECTION.doubtful * usual}
     doubtful = [k for k in range(len(found)) if k not in sure]
-    if len(sure) < FIRST_LOOK.whole_frames or not doubtful:
+    if len(sure) < DETECTION.whole_frames or not doubtful:
         return found
     found = list(found)
     for k in sorted(doubtful, key=lambda k: min(abs(k - other) for other in sure)):
-        guess = on_the_way(sorted(sure.values()), frames[k].time)
+        guess = pose_on_path(sorted(sure.values()), frames[k].time)
         better = close_place(frames[k], still, body, guess)
-        if better.score > FIRST_LOOK.clearer * found[k].score:
+        if better.score > DETECTION.clearer * found[k].score:
             found[k], sure[k] = better, (frames[k].time, better.pose)
     return found
 
@@ -382,20 +380,18 @@ def _moved(body: BodyFinder, learnt: _Learnt, outline: OutlineFit, *, stated: bo
 
 def _clear(found: Sequence[list[PoseCandidate]]) -> bool:
     """Whether something stands out of the pictures as a robot does."""
-    clear = [
-        len(some) > 0 and (len(some) < 3 or some[0].score > FIRST_LOOK.clearness * some[2].score) for some in found
-    ]
-    return float(np.mean(clear)) >= FIRST_LOOK.clear_share
+    clear = [len(some) > 0 and (len(some) < 3 or some[0].score > DETECTION.clearness * some[2].score) for some in found]
+    return float(np.mean(clear)) >= DETECTION.clear_share
 
 
 def _goes_along(found: Sequence[list[PoseCandidate]], length: float) -> bool:
     """Whether what stands out is one thing that goes along, not clutter now here, now there."""
     places = np.array([(some[0].pose.x, some[0].pose.y) for some in found if some])
     bends = np.hypot(*np.diff(places, 2, axis=0).T) if len(places) > 2 else np.zeros(1)
-    return float(np.median(bends)) < FIRST_LOOK.bend * length
+    return float(np.median(bends)) < DETECTION.bend * length
 
 
-def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
+def pose_on_path(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
     """Where the body should be at a time, by straight lines between and beyond known places."""
     times = np.array([at for at, _ in known])
     poses = np.array([pose for _, pose in known])

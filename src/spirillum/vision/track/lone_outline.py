@@ -16,6 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
@@ -134,9 +135,9 @@ class LoneOutlineConstants:
     flat: float = 0.12
     """Half the width of the running mean along the lines that is subtracted, over the body's diameter."""
     texture: float = 4.0
-    """Root mean square texture of the background from which on it is not plain, of 255.
+    """Texture of the background from which on it is not plain, of 255; a single cable or speck makes none.
 
-    On path-traced and drawn videos it was 0.3 to 1.1 on plain floors, and 13 to 24 on grid and millimetre paper."""
+    On path-traced and drawn videos it was 0.5 on plain floors, and 8 to 16 on grid and millimetre paper."""
     apart: float = 3.0
     """Least way between two frames that are compared, pixels."""
     fewest: int = 3
@@ -188,7 +189,7 @@ def check_outline(
         appearance = appearance_of(body.robot, body.optics, list(zip(images, poses, strict=True)))
     if not grid and appearance != "glass":
         return OutlineCheck()
-    suspect = "a grid under the tube" if grid else "the rim or the contents of a glass cover"
+    suspect = "a grid or texture under the tube" if grid else "the rim or the contents of a glass cover"
     if not alone:
         return OutlineCheck(suspect=suspect)
     stays = [_stays(images, poses, body, end) for end in ("front", "rear")]
@@ -207,7 +208,7 @@ def check_outline(
 
 
 def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> float:
-    """Root mean square of the still brightness before the nose, without what is wide, of 255; 0 out of view."""
+    """Robust standard deviation of the still brightness before the nose, without what is wide; 0 out of view."""
     radius, half = 0.5 * body.robot.body.diameter, 0.5 * body.robot.body.length
     step = body.optics.length_per_pixel
     near, far = (half + at * radius for at in LONE_OUTLINE.ahead)
@@ -224,7 +225,7 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
     from scipy.ndimage import uniform_filter1d
 
     wide = 2 * max(3, round(LONE_OUTLINE.flat * 2.0 * radius / step)) + 1
-    return float(np.sqrt(np.mean((still - uniform_filter1d(still, wide, axis=0, mode="nearest")) ** 2)))
+    return float(mad_scale(still - uniform_filter1d(still, wide, axis=0, mode="nearest")))
 
 
 def _stays(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder, end: str) -> Samples:

@@ -5,7 +5,7 @@ lost, all of the motion goes on by 1 + k steps on one frame. In steady motion ea
 sum of squares over the three series, each step modulo the period of its angle, weighted by the scatter of its steps.
 
 A frame that is repeated is a step of no motion between usual ones. Either the recorder stored a picture twice, and what
-follows comes a frame too late; or the film was converted from a lower frame rate, and its times are right. Both look
+follows comes a frame too late; or the video was converted from a lower frame rate, and its times are right. Both look
 alike, so that times are kept, and their uncertainty holds both.
 """
 
@@ -27,7 +27,7 @@ from spirillum.vision.track.visibility import EVERYTHING
 
 
 class FrameSeries(NamedTuple):
-    """One series of a film, as it was read on each frame."""
+    """One series of a video, as it was read on each frame."""
 
     values: Samples
     """Position, m, or angle modulo `period`, rad, (n,); NaN where unreadable."""
@@ -43,7 +43,7 @@ class Restored(NamedTuple):
     time: Samples
     """Corrected time of each frame, s, (n,); the given times where nothing was corrected."""
     relative_error: float
-    """Relative standard uncertainty that doubtful steps leave in the length of the film."""
+    """Relative standard uncertainty that doubtful steps leave in the length of the video."""
     flags: tuple[Flag, ...]
     """What was corrected, or why nothing is given."""
 
@@ -82,7 +82,7 @@ def restored_times(time: Samples, readings: tuple[FrameSeries, ...], picture: Pi
     outline has hopped, or was misread.
 
     Args:
-        time: time of each frame as the film states it, s, (n,).
+        time: time of each frame as the video states it, s, (n,).
         readings: the series: tail, body and position.
         picture: what the pictures say of each step; None: nothing.
     """
@@ -180,7 +180,7 @@ def _power(series: list[_Jumps]) -> float:
 
 
 def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...]) -> _Change | None:
-    """What changes in a film in which nothing moves for a while, or everything the other way; None of any other."""
+    """What changes in a video in which nothing moves for a while, or everything the other way; None of any other."""
     few = LOST_FRAMES.standing // 3
     means = []
     for reading in readings:

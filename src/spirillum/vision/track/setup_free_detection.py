@@ -1,7 +1,7 @@
-"""The first look at a film of which no setup is known: ruler, robot, direction and stripes, at any scale.
+"""The first look at a video of which no setup is known: ruler, robot, direction and stripes, at any scale.
 
 A provisional camera stands in for the unknown one: its lens is as far away as a usual one, and its scale is a guess
-that the search for the robot corrects. Finding and learning are those of every film
+that the search for the robot corrects. Finding and learning are those of every video
 (`spirillum.vision.track.identity`).
 """
 
@@ -25,7 +25,7 @@ from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import IDENTITY, SCOUTING
+from spirillum.vision.track.constants import IDENTITY, SETUP_FREE
 from spirillum.vision.track.identity import Identified, identified_at
 from spirillum.vision.track.lone_outline import Appearance, appearance_of
 from spirillum.vision.track.search import searched_at
@@ -49,8 +49,8 @@ class Walls(NamedTuple):
     """Pixels of both ends of both edges, (2, 2, 2)."""
 
 
-class Scouted(NamedTuple):
-    """What a film tells without a setup."""
+class SetupFreeDetection(NamedTuple):
+    """What a video tells without a setup."""
 
     lines: Lines | None
     """Lines of the ruler; None where none was found."""
@@ -91,16 +91,16 @@ class Scouted(NamedTuple):
         return float(np.polyfit(time - time.mean(), x, 1)[0]) / self.optics.length_per_pixel
 
 
-def scouted(
+def detect_without_setup(
     video: Video,
     robot: Robot,
     spacing: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-) -> Scouted:
-    """Look at a film without a setup.
+) -> SetupFreeDetection:
+    """Look at a video without a setup.
 
     Args:
-        video: the film.
+        video: the video.
         robot: the robot in front of the camera.
         spacing: of the ruler's lines, m, where it is known.
         progress: told what is looked for, how many looks are done, and how many there are at most.
@@ -114,7 +114,7 @@ def scouted(
     tell("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
     guesses = _guesses(robot, video.size, lines, spacing)[: None if stills.changes else 1]
-    looks = 2 * len(guesses) * len(directions)
+    looks = (2 if stills.changes else 1) * len(guesses) * len(directions)
     tell("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
         found = _found_at(video, robot, (guess, lines, directions), stills)
@@ -123,11 +123,11 @@ def scouted(
             if known is None:
                 continue
             stripes = _stripes_seen(robot, known)
-            if lines is None and not stripes and len(known.start.path) < SCOUTING.alone:
+            if lines is None and not stripes and len(known.start.path) < SETUP_FREE.alone:
                 continue
             walls = _walls(stills.at(factor), known, lines)
-            return Scouted(lines, known, direction, stripes, walls, frames, factor)
-    return Scouted(lines, None, "right", (), None, frames, factor)
+            return SetupFreeDetection(lines, known, direction, stripes, walls, frames, factor)
+    return SetupFreeDetection(lines, None, "right", (), None, frames, factor)
 
 
 def _check_no_noise(still: Samples, video: Video) -> None:
@@ -135,7 +135,7 @@ def _check_no_noise(still: Samples, video: Video) -> None:
     grey = still.mean(axis=2) - still.mean()
     total = float(np.mean(grey**2))
     shared = 0.5 * float(np.mean(grey[1:] * grey[:-1]) + np.mean(grey[:, 1:] * grey[:, :-1]))
-    if shared < SCOUTING.correlation * total:
+    if shared < SETUP_FREE.correlation * total:
         raise InputError(
             f"{video.name} shows noise alone: neighbouring pixels correlate by {shared / total:.2f}; allowed: a film "
             "in which all of the robot is in view"
@@ -153,12 +153,12 @@ class _Stills:
     def changes(self) -> bool:
         """Whether anything moves, in pictures at most 640 pixels wide: an empty tube shows noise alone."""
         cv2 = import_optional("cv2", "measuring a video", "video")
-        factor = -(-max(self.frames[0].image.shape) // SCOUTING.changing_width)
+        factor = -(-max(self.frames[0].image.shape) // SETUP_FREE.changing_width)
         stack = np.array([frame.reduced(factor).mean(axis=2, dtype=np.float32) for frame in self.frames])
         stack = np.array([cv2.GaussianBlur(grey, (0, 0), 1.0) for grey in stack])
         off = np.abs(stack - np.median(stack, axis=0))
-        least = max(SCOUTING.changing * float(mad_scale(off)), SCOUTING.changing_least)
-        return bool(np.mean(off > least) > SCOUTING.changing_share)
+        least = max(SETUP_FREE.changing * float(mad_scale(off)), SETUP_FREE.changing_least)
+        return bool(np.mean(off > least) > SETUP_FREE.changing_share)
 
     def at(self, factor: int) -> Samples:
         """The background reduced by a factor."""
@@ -188,7 +188,7 @@ def _ruler(
 
 def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
     """A provisional setup whose pixel shows a length at the height of the robot's axis, m."""
-    far = SCOUTING.distance * size[0] * pixel
+    far = SETUP_FREE.distance * size[0] * pixel
     deep = min(0.6 * robot.body.diameter, 0.2 * far)
     return Setup.model_validate(
         {
@@ -205,10 +205,10 @@ def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: 
     A spacing by which the robot would be a dot, or far larger than the picture, is wrong and is not tried.
     """
     length = robot.body.length + robot.coupling.length + robot.tail.length
-    wide = [length / (share * max(size)) for share in SCOUTING.shares]
+    wide = [length / (share * max(size)) for share in SETUP_FREE.shares]
     guesses = []
     if lines is not None:
-        by_ruler = SCOUTING.nearer * (SCOUTING.spacing if spacing is None else spacing) / lines.distance
+        by_ruler = SETUP_FREE.nearer * (SETUP_FREE.spacing if spacing is None else spacing) / lines.distance
         guesses += [by_ruler] if min(wide) / _WRONG < by_ruler < _WRONG * max(wide) else []
     return guesses + [guess for guess in wide if all(abs(np.log(guess / other)) > np.log(1.5) for other in guesses)]
 
@@ -240,7 +240,7 @@ def _found_at(
 
 def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
     """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there."""
-    for _ in range(SCOUTING.rounds):
+    for _ in range(SETUP_FREE.rounds):
         try:
             known = identified_at(video.name, setup, body, stills.frames, stills.at(factor), 1.0)  # no size is stated
         except InputError:
@@ -262,7 +262,7 @@ def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
         return own if reader.fits else ()
     names, fitting = list(dict.fromkeys(own)), []
     repeats = len(own) // len(names)
-    if own != tuple(names) * repeats or len(names) > SCOUTING.most_colours:
+    if own != tuple(names) * repeats or len(names) > SETUP_FREE.most_colours:
         return ()
     optics = known.start.body.optics
     for order in permutations(names[1:]):
@@ -296,9 +296,9 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     centre = centre + way * ((optics.origin[:2] - centre) @ way)
     factor = optics.size[0] // still.shape[1]
     step = factor * optics.length_per_pixel
-    reach = SCOUTING.widest * diameter
+    reach = SETUP_FREE.widest * diameter
     across = np.arange(-reach, reach, step)
-    along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * optics.length_per_pixel
+    along = np.linspace(-0.5, 0.5, SETUP_FREE.along) * 0.9 * max(optics.size) * optics.length_per_pixel
     grid = centre + along[:, None, None] * way + across[None, :, None] * side
     points = np.concatenate([grid, np.full((*grid.shape[:2], 1), optics.axis_height)], axis=2)
     pixels = np.nan_to_num(optics.pixels(points.reshape(-1, 3)), nan=-9.0).round().astype(int)
@@ -307,7 +307,7 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     rows, columns = np.minimum(pixels[inside, ::-1] // factor, np.array(still.shape[:2]) - 1).T
     brightness[inside] = still[rows, columns].mean(axis=1)
     table = brightness.reshape(grid.shape[:2])
-    seen = np.isfinite(table).mean(axis=0) > SCOUTING.seen
+    seen = np.isfinite(table).mean(axis=0) > SETUP_FREE.seen
     if not seen.any():
         return None
     profile = np.full(across.size, np.nan)
@@ -318,12 +318,14 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
         for sign in (1.0, -1.0):
             beyond = sign * there[sign * there > 0.5 * diameter]
             if beyond.size:
-                steps[sign * across > float(beyond.min()) - SCOUTING.paper * diameter] = np.nan
-    usual = float(np.nanmedian(steps)) + SCOUTING.faintest
-    left, right = (np.flatnonzero((sign * across > SCOUTING.beside * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0))
+                steps[sign * across > float(beyond.min()) - SETUP_FREE.paper * diameter] = np.nan
+    usual = float(np.nanmedian(steps)) + SETUP_FREE.faintest
+    left, right = (
+        np.flatnonzero((sign * across > SETUP_FREE.beside * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0)
+    )
     fainter = np.minimum(steps[left][:, None], steps[right]) / usual
     width, off = across[right] - across[left][:, None], np.abs(across[right] + across[left][:, None])
-    fitting = (fainter > SCOUTING.clear) & (off < SCOUTING.off_axis * diameter)
+    fitting = (fainter > SETUP_FREE.clear) & (off < SETUP_FREE.off_axis * diameter)
     if not fitting.any():
         return None
     one, other = np.unravel_index(np.argmax(np.where(fitting, width, 0.0)), width.shape)

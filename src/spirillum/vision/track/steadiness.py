@@ -25,7 +25,7 @@ class SteadinessConstants:
     """Whether camera and ruler stayed where they were."""
 
     parts: int = 4
-    """Stretches of the film whose backgrounds are compared."""
+    """Stretches of the video whose backgrounds are compared."""
     fewest_frames: int = 3
     """Fewest frames of a stretch."""
     reach: int = 12
@@ -41,11 +41,11 @@ class SteadinessConstants:
     rows_beside: int = 6
     """Rows beside the robot that its edges change, pixels."""
     moved: float = 0.2
-    """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered films."""
+    """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered videos."""
     moved_roughly: float = 2.0
     """Shift of the picture alone from which on the camera has moved, pixels.
 
-    At rest within 1 on rendered films, also under a drifting lamp."""
+    At rest within 1 on rendered videos, also under a drifting lamp."""
 
 
 STEADINESS = SteadinessConstants()
@@ -92,7 +92,7 @@ def shift_of(first: StillPicture, other: StillPicture) -> tuple[float, bool]:
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
-    """Flag a camera or tank that moved along the channel during the film.
+    """Flag a camera or tank that moved along the channel during the video.
 
     Args:
         frames: frames spread over the video, in order of time; all of them may be reduced by a whole factor, and what

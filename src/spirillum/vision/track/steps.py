@@ -13,9 +13,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
-from spirillum.vision.track.body import Placed
+from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.identity import Identified
-from spirillum.vision.track.initial_detection import close_place, on_the_way
+from spirillum.vision.track.initial_detection import close_place, pose_on_path
 from spirillum.vision.track.picture_change import PictureChange
 from spirillum.vision.track.search import PoseCandidate, candidates
 from spirillum.vision.video.frames import Frame
@@ -72,7 +72,7 @@ class Record:
     """Time of each frame, s."""
     index: list[int] = field(default_factory=list)
     """Number of each frame."""
-    placed: list[Placed] = field(default_factory=list)
+    placed: list[PoseFit] = field(default_factory=list)
     """The body on each frame."""
     roll: list[tuple[float, float]] = field(default_factory=list)
     """Angle of the body modulo the stripes' period, and its standard error, rad; NaN where unreadable."""
@@ -131,7 +131,7 @@ class FrameTracker:
             return None
         times, places = record.time[-FOLLOWING.memory :], record.placed[-FOLLOWING.memory :]
         last = [(at, one.pose) for at, one in zip(times, places, strict=True) if one.known]
-        return None if len(last) < 2 else on_the_way(last, time)
+        return None if len(last) < 2 else pose_on_path(last, time)
 
     def _expected(self, time: float) -> BodyPose:
         """Where it should be by the first look; in frames that are new, where it was last."""
@@ -139,7 +139,7 @@ class FrameTracker:
             return self.known.start.expected(time)
         return self._last
 
-    def _placed(self, frame: Frame, guess: BodyPose | None) -> Placed:
+    def _placed(self, frame: Frame, guess: BodyPose | None) -> PoseFit:
         """Place the body near a predicted pose, else where it should be; a jump counts as not detected."""
         found = None
         if guess is not None:
@@ -150,7 +150,7 @@ class FrameTracker:
         again = self._near(frame, self._expected(frame.time))
         return again if found is None or again.known else found
 
-    def _near(self, frame: Frame, guess: BodyPose) -> Placed:
+    def _near(self, frame: Frame, guess: BodyPose) -> PoseFit:
         """Place the body near a pose; further away it counts as not detected."""
         body = self.known.start.body
         found, far = body.place(frame.image, guess), FOLLOWING.largest_jump * body.optics.length_per_pixel
@@ -166,13 +166,13 @@ class FrameTracker:
             return False
         return time - times[-1] > FOLLOWING.gap * median(later - before for before, later in pairwise(times))
 
-    def _after_a_gap(self, frame: Frame, guess: BodyPose) -> Placed | None:
+    def _after_a_gap(self, frame: Frame, guess: BodyPose) -> PoseFit | None:
         """The body where most of its edges fit: at the predicted pose, near it, or where it was; None if nowhere."""
         near = self.known.start.close(frame, self.still, guess)
         tried = [self._near(frame, pose) for pose in (guess, near, self.record.placed[-1].pose)]
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
-    def _may_be_elsewhere(self, found: Placed) -> bool:
+    def _may_be_elsewhere(self, found: PoseFit) -> bool:
         """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do.
 
         It is searched for at once where they do so on a frame for the first time, then now and then.
@@ -186,7 +186,7 @@ class FrameTracker:
         few = FOLLOWING.few_edges * median(self._shares)
         return found.share < few and (now_and_then or not placed[-1].known or placed[-1].share >= few)
 
-    def _found_again(self, frame: Frame, lost: Placed) -> Placed:
+    def _found_again(self, frame: Frame, lost: PoseFit) -> PoseFit:
         """Search the whole picture for the body; `lost` if it is not found where more of its edges fit."""
         least = FOLLOWING.more_edges * lost.share if lost.known else 0.0
         start = self.known.start

@@ -75,7 +75,7 @@ class Track:
     tail_phase_drift: float = 0.0
     """Standard uncertainty of the tail's phase from end to end, by an outline that hopped, rad."""
     time_uncertainty: float = 0.0
-    """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""
+    """Relative standard uncertainty of the video's length in time, where lost frames were put back in doubt."""
     elongation: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """By how much nose and rear lie farther apart than a level body's do, m, (n,); empty where no edges were fitted."""
     cues: Mapping[str, Cue] = field(repr=False, default_factory=dict)

@@ -12,7 +12,7 @@ from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.body import BodyFinder, Placed
+from spirillum.vision.track.body import BodyFinder, PoseFit
 from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
@@ -118,7 +118,7 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
     return index[0] + whole, flags
 
 
-def cut_off(found: Sequence[Placed]) -> np.ndarray:
+def cut_off(found: Sequence[PoseFit]) -> np.ndarray:
     """Mask of the frames left out as the robot is partly out of view, (n,); all False if few show it whole."""
     part = np.array([one.known and one.inside < VISIBILITY.full_view for one in found])
     whole = np.array([one.known and one.inside >= VISIBILITY.full_view for one in found])
@@ -127,7 +127,7 @@ def cut_off(found: Sequence[Placed]) -> np.ndarray:
 
 
 def sight_flags(
-    time: Samples, pose: Samples, errors: Samples, found: Sequence[Placed], optics: Optics, setup: Setup
+    time: Samples, pose: Samples, errors: Samples, found: Sequence[PoseFit], optics: Optics, setup: Setup
 ) -> tuple[Flag, ...]:
     """Flag a robot that leaves, enters late, is partly out of view or hidden, or swims backwards.
 

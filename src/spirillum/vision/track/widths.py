@@ -1,4 +1,4 @@
-"""Uneven stripes: where the edges between them lie, learnt from the film.
+"""Uneven stripes: where the edges between them lie, learnt from the video.
 
 On each frame the edges in view are located one by one against an even pattern. An edge d off its place shows d on every
 frame, less what the frame's own angle is off; the angles of all frames and the places of all edges follow by linear
@@ -50,7 +50,7 @@ class WidthConstants:
     clear: float = 10.0
     """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
 
-    On six degraded films even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
+    On six degraded videos even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
     left: float = 0.05
     """Share of that range that is left as an error of each angle. Assumed."""
     widest: float = 0.24

@@ -82,7 +82,7 @@ AS_STORED = Display()
 
 
 def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
-    """Display of a film's frame, and the angle by which its display matrix is off a quarter turn, rad.
+    """Display of a video's frame, and the angle by which its display matrix is off a quarter turn, rad.
 
     The matrix maps stored to shown coordinates: x' = a x + c y, y' = b x + d y, y downwards.
 

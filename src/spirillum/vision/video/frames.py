@@ -1,4 +1,4 @@
-"""Pictures of a video with the times at which they were taken: from a film, or from a folder of images."""
+"""Pictures of a video with the times at which they were taken: from a video, or from a folder of images."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def ahead(items: Iterator[T], count: int) -> Iterator[T]:
 
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
-"""Endings of films."""
+"""Endings of videos."""
 
 _PURPOSE = "measuring a video"
 _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
@@ -82,7 +82,7 @@ _SAME_RATE = 0.01
 _BATCH = 16
 """Most pages of a TIFF file that are decoded at a time."""
 _FEW, _MISSING = 2, 0.02
-"""Number and share of frames, and share of the length, that a film may lack of what its file states."""
+"""Number and share of frames, and share of the length, that a video may lack of what its file states."""
 _NEAR = 10.0
 """Seconds that are rather decoded through than jumped over."""
 
@@ -115,7 +115,7 @@ class Video:
     """A video that can be read any number of times."""
 
     path: Path
-    """The film, or the folder."""
+    """The video, or the folder."""
     size: tuple[int, int]
     """Width and height as shown, pixels."""
     duration: float | None
@@ -123,15 +123,15 @@ class Video:
     rate: float | None
     """Frames a second as the file states them, or as the setup gives them."""
     given_rate: float | None = None
-    """Frames a second that replace a film's own time stamps."""
+    """Frames a second that replace a video's own time stamps."""
     images: ImageSequence | None = None
-    """The images of a folder or stack; None for a film."""
+    """The images of a folder or stack; None for a video."""
     display: Display = AS_STORED
-    """How the stored pictures of a film or its images are shown."""
+    """How the stored pictures of a video or its images are shown."""
     stated: Stated = UNSTATED
-    """How long the file states a film to be."""
+    """How long the file states a video to be."""
     words: str = ""
-    """What the file says of itself: title and comment of a film, texts in a folder's first image and its README."""
+    """What the file says of itself: title and comment of a video, texts in a folder's first image and its README."""
     flags: list[Flag] = field(default_factory=list)
     """What was found while reading."""
 
@@ -142,7 +142,7 @@ class Video:
 
     @property
     def name(self) -> str:
-        """Name of the film or folder."""
+        """Name of the video or folder."""
         return self.path.name
 
     @property
@@ -247,7 +247,7 @@ class Video:
             self._note("frames-not-read", sentence)
 
     def _decoded(self) -> Iterator[tuple[Any, float | None]]:
-        """The film's frames, each with its time, until its end, or until it cannot be decoded any further."""
+        """The video's frames, each with its time, until its end, or until it cannot be decoded any further."""
         av = import_optional("av", _PURPOSE, "video")
         count = 0
         with open_container(self.path) as container:
@@ -310,13 +310,13 @@ class Video:
 def open_video(
     path: str | Path, frames_per_second: float | None = None, pixel_aspect_ratio: float | None = None
 ) -> Video:
-    """Open a film, a TIFF file of several pages, or a folder of images in their natural order.
+    """Open a video, a TIFF file of several pages, or a folder of images in their natural order.
 
     Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
 
     Args:
-        path: the film, TIFF file or folder.
-        frames_per_second: rate of images, or instead of a film's own time stamps.
+        path: the video, TIFF file or folder.
+        frames_per_second: rate of images, or instead of a video's own time stamps.
         pixel_aspect_ratio: width of a pixel over its height, instead of what the file states.
     """
     path = checked_path(path, VIDEO)

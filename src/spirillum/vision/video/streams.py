@@ -1,4 +1,4 @@
-"""The video stream of a film's file, and how long the file states it to be."""
+"""The video stream of a video's file, and how long the file states it to be."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ _OPENING = {
     "wav,mp3",
     "max_streams": "100",
 }
-"""A film is one file: no playlist that opens other files, or asks a network for them."""
+"""A video is one file: no playlist that opens other files, or asks a network for them."""
 _FEW = 2
-"""Frames of a stream that is a picture, not a film."""
+"""Frames of a stream that is a picture, not a video."""
 _NEAR = 0.02
-"""Least part of a film that is said to be missing."""
+"""Least part of a video that is said to be missing."""
 _LOOSE = 0.5
 """The same where its length is that of the whole file, sound included, s."""
 
 
 class Stated(NamedTuple):
-    """Length of a film as its file states it."""
+    """Length of a video as its file states it."""
 
     duration: float | None
     """Length in time, s."""
     frames: int
     """Number of frames; 0 where it is not stated."""
     tolerance: float
-    """By how much a film that is read to its end may fall short of that length, s."""
+    """By how much a video that is read to its end may fall short of that length, s."""
 
 
 UNSTATED = Stated(None, 0, _LOOSE)
-"""Length of a film whose file states none."""
+"""Length of a video whose file states none."""
 
 
 def open_container(path: Path) -> Any:
-    """A film's file, opened by PyAV."""
+    """A video's file, opened by PyAV."""
     av = import_optional("av", "measuring a video", "video")
     try:
         return av.open(f"file:{path}", options=_OPENING, metadata_errors="replace")
@@ -57,7 +57,7 @@ def open_container(path: Path) -> Any:
 
 
 def film_stream(container: Any) -> tuple[Any, list[Flag]]:
-    """The longest stream of pictures that is no thumbnail, and a flag where several are films.
+    """The longest stream of pictures that is no thumbnail, and a flag where several are videos.
 
     Of streams that are about as long, the largest pictures are taken, else the first.
     """
@@ -107,7 +107,7 @@ def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
 
 
 def stated_length(container: Any, stream: Any) -> Stated:
-    """How long a film is by what its file states of it.
+    """How long a video is by what its file states of it.
 
     AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
     """
