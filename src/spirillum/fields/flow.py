@@ -66,7 +66,7 @@ class Flow(DisplayMixin):
     At a moment of a free run: weight, contact and a field; NaN where it is drawn `lifted`.
     """
     lifted: float = 0.0
-    """How much further off the wall than at that moment of its run a robot on a thin film is drawn, m."""
+    """Increase of the wall distance for the flow around a robot on a thin lubrication film in a run, m."""
 
     @property
     def robot(self) -> Robot:
@@ -75,7 +75,7 @@ class Flow(DisplayMixin):
 
     @property
     def seat(self) -> Seat | None:
-        """The tube and where in it the robot lies; None for unbounded fluid."""
+        """The tube and the robot's pose in it; None for unbounded fluid."""
         return _seat(self.prediction)
 
     @property
@@ -85,7 +85,7 @@ class Flow(DisplayMixin):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to be careful about, a sentence each."""
+        """Warnings, a sentence each."""
         if self.robot.channel is None or self.seat is not None:
             return self.prediction.warnings
         walls = "the channel's walls are not computed: this is the flow in unbounded fluid"
@@ -117,7 +117,7 @@ class Flow(DisplayMixin):
         return replace(self, held_force=float(np.linalg.norm(sideways)))
 
     def inside(self, points: Samples) -> np.ndarray:
-        """Whether each point lies inside body, coupling or tail, or outside the tube, (n,).
+        """Whether each point is inside body, coupling or tail, or outside the tube, (n,).
 
         Args:
             points: (n, 3), m.
@@ -309,7 +309,7 @@ def seat_in_tube(
     placement: Placement | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> Seat | None:
-    """The tube and where in it a robot will lie, before anything is solved; None with the model `slender`.
+    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`.
 
     Args:
         robot: the robot.
@@ -350,7 +350,7 @@ def box_around(
 
 
 def _attributes(flow: Flow) -> dict[str, Any]:
-    """How the flow came about, in what a file can hold."""
+    """Provenance of the flow, as attributes of a file."""
     motion = flow.prediction
     return {
         "title": f"Flow around {motion.robot.name}",

@@ -27,7 +27,7 @@ class FluidField(ABC):
 
     @abstractmethod
     def part_at(self, points: Samples) -> np.ndarray:
-        """Name of the part in which each point lies, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
+        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
 
         Args:
             points: (n, 3), m.
@@ -46,7 +46,7 @@ class FluidField(ABC):
         """Force (N) and torque about the origin (N m) that hold the whole robot to its motion, body axes, (6,)."""
 
     def inside(self, points: Samples) -> np.ndarray:
-        """Whether each of the points (n, 3) lies inside a solid or outside the tube, (n,)."""
+        """Whether each of the points (n, 3) is inside a solid or outside the tube, (n,)."""
         return np.asarray(self.part_at(points) != "")
 
     def velocity(self, points: Samples) -> Samples:
@@ -72,7 +72,7 @@ class FluidField(ABC):
         return self.fields(points)[1]
 
     def in_fluid(self, points: Samples) -> Samples:
-        """Points that lie in the fluid, (n, 3).
+        """Return the points (n, 3) if they are all in the fluid.
 
         Raises:
             InputError: if one of them does not, or as `checked_points`.

@@ -32,7 +32,7 @@ _WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
 
 @dataclass(frozen=True)
 class PointGrid:
-    """Evenly spaced points along x, y, z, m; an axis with one point is the place of a plane."""
+    """Evenly spaced points along x, y, z, m; an axis with one point is the position of a plane."""
 
     axes: tuple[Samples, Samples, Samples]
     """Coordinates along x, y, z."""

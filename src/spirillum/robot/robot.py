@@ -75,11 +75,11 @@ class Robot(RobotTables):
 
     @property
     def with_tail(self) -> str:
-        """Its name and its tail, which tell it apart from the others of a study."""
+        """Its name and its tail, which distinguish it from the others of a study."""
         return f"{self.name}, tail {1e3 * self.tail.wavelength:g} x {1e3 * self.tail.amplitude:g} mm"
 
     def derived(self) -> dict[str, Derived]:
-        """What follows from the fields: lengths, volumes, weight, centre of mass.
+        """Derived quantities: lengths, volumes, weight, centre of mass.
 
         Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. The
         centre of mass assumes that the measured mass is spread evenly over body and coupling.

@@ -1,4 +1,4 @@
-"""What of the channel is in the picture: the camera's optics, and whether and where the robot is seen."""
+"""Field of view of the virtual camera: its optics, and the visibility of the robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FOCAL = 740.0 / 640.0
 _SHORTEST, _LONGEST = 24, 2.0
 """Shortest robot in pixels, longest in widths of the picture."""
 _LOOKS = 1001
-"""Moments at which it is asked whether the robot is in the picture."""
+"""Times at which the visibility of the robot is checked."""
 
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:
@@ -87,7 +87,7 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens, start: 
 
 
 def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens) -> tuple[str, ...]:
-    """A sentence if the robot is beyond the left or the right edge of the picture for a part of the film."""
+    """Warning if the robot is beyond the left or the right edge of the picture for a part of the video."""
     times = np.linspace(trajectory.time[0], trajectory.time[-1], _LOOKS)
     x = np.interp(times, trajectory.time, trajectory.position[:, 0])
     low, high = _visible(lens, float(trajectory.position[:, 2].mean()))

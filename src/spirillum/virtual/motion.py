@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _USUAL = 20.0
-"""Length of a film of steady swimming, s."""
+"""Length of a video of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
-"""Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
+"""Largest turn of the tail between two samples of a run above which a note states the interpolation, rad."""
 _WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
-"""How else to come to a film with walls than by `spirillum prepare`, a clause."""
+"""Alternative remedy to `spirillum prepare` for a video with walls, a clause."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def steady_rates(
 
 
 def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[str, ...]:
-    """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
+    """Note on a video of a robot in a channel whose walls its model neglects; else none."""
     if choice.caution:
         return (choice.caution,)
     if robot.channel is None or find_swimmer_model(choice.model).placed:

@@ -1,4 +1,4 @@
-"""Tables are made: the flow is solved for at their places, and what is left without the film is packed.
+"""Computation of tables: solve for the flow at all nodes, pack the outer resistance and the lubrication film.
 
 Robots that differ in their tails have places in common: wall and body are solved for once for all of them.
 
@@ -106,13 +106,13 @@ def _about_x(angle: float) -> Samples:
 
 
 _TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
-"""How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
+"""Resolution of the flow at the nodes of a table; finer where that costs little, without pitch and yaw."""
 _NEAR_GLASS = 0.9
 """Share of the largest pitch from which all harmonics of the tail's phase matter."""
 _FAR, _LITTLE_YAWED = 5, 7
 """Phases at nodes further from the glass: without yaw, and at the least yaw."""
 HELD_OUT = 6
-"""Places without yaw, and with it, from which a table's errors are stated."""
+"""Check poses without and with yaw, from which a table's errors are estimated."""
 _SEED = 20121
 _WIRE_PHASES, _WIRE_TOLERANCE = 3, 0.05
 """Resolution at which both forms of the wire are compared: their ratio is good to a hundredth of their difference."""
@@ -121,7 +121,7 @@ _WIRE_PHASES, _WIRE_TOLERANCE = 3, 0.05
 def built_tables(
     robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
 ) -> list[TubeTable]:
-    """Solve for the flow at every place of every robot and make their tables.
+    """Solve for the flow at every node of every robot and build their tables.
 
     Raises:
         InputError: for a robot without a table, such as one whose tail is wider than its body, or whose flow does not
@@ -143,7 +143,7 @@ def built_tables(
 
 
 def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
-    """Number of places that are solved for on their own, and how many of them are kept."""
+    """Number of nodes that are solved for separately, and how many of them are cached."""
     shared = solved_as_one(places)
     return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
 
@@ -185,12 +185,12 @@ def _wire_error(places: Places, workers: int = 1) -> float | None:
 
 @lru_cache(maxsize=4)
 def _tabulated_film(body: Outline, radius: float) -> Samples:
-    """Packed film of a body in a tube, for all the places that tables have."""
+    """Packed lubrication film of a body in a tube, for all poses in the range of a table."""
     return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(kernel.STEEPEST)).packed
 
 
 def _nodes(places: Places) -> list[NodeSolution]:
-    """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
+    """Nodes without yaw, then those with yaw, of the robot and of its mirror image."""
 
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
         return places.geometry, even_phases(place.phases)
@@ -215,7 +215,7 @@ def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> Non
 
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
-    """The packed table from the answers to `_nodes`."""
+    """Packed table from the solutions at `_nodes`."""
     count, film = len(_level(places)), _tabulated_film(places.geometry.body, places.radius)
     return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
 
@@ -311,19 +311,19 @@ def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> t
 
 
 def _yawed_seats(places: Places) -> list[Seat]:
-    """Seats of all nodes with yaw, without it."""
+    """Poses of all nodes with yaw, with their yaw set to zero."""
     return [places.seat(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
 
 
 def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
-    """Fourier coefficients of the factor of the rest, as the table without yaw has them at a seat."""
+    """Fourier coefficients of the factor of the outer resistance, interpolated from the table without yaw."""
     out = np.empty((count, kernel.PARAMETERS))
     kernel.rest_coefficients(straight, seat.offset, seat.pitch, out)
     return out
 
 
 def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
-    """Random places of a table that are no nodes, each with a random phase of the tail."""
+    """Random check poses of a table between its nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
     chosen: list[NodeSolution] = []
     while len(chosen) < HELD_OUT:
@@ -339,7 +339,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
 def _largest_errors(
     table: Samples, places: Sequence[NodeSolution], found: Sequence[Sequence[Samples]]
 ) -> dict[str, float]:
-    """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
+    """Largest error of `RESPONSES` at poses with a reference solution, over their sizes in a turn of the tail."""
     errors = []
     for place, answers in zip(places, found, strict=True):
         (_, phases), seat = place.tails[0], place.seat

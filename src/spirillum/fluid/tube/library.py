@@ -87,7 +87,7 @@ def _mirrored(key: str, table: TubeTable) -> TubeTable:
 
 
 def _put(table: TubeTable) -> TubeTable:
-    """Keep a table; as the next call will find it."""
+    """Store a table in the cache and return it as the next call will read it."""
     path = _kept(table.key)
     if path is not None:
         try:

@@ -1,20 +1,20 @@
-"""What is said before work that takes minutes, which nobody has asked for by name."""
+"""Progress messages of computations that take minutes and start implicitly."""
 
 from __future__ import annotations
 
 ANNOUNCED = "no table of this tube yet"
-"""How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
+"""Prefix of a progress message that a command prints as a line of its own."""
 TABLE_TAKES = "12 to 28 minutes of one core"
-"""What it takes to make the table of one robot, measured on a fast and on a slow machine."""
+"""Time to compute the table of one robot, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
 """Progress messages that are to be read, too."""
 _SECONDS = (10.0, 17.0)
-"""Time that a place takes one process of a fast and of a slow machine, s; near the glass it is three times as long."""
+"""Time of one process per node on a fast and on a slow machine, s; three times as long near the wall."""
 
 
 def progress_message(places: int, workers: int, kept: int) -> str:
-    """That tables are made, from how many places, and about how long it takes."""
+    """Announce the computation of tables: number of nodes and estimated duration."""
     remaining = places - kept
     least, most = (max(round(remaining * seconds / max(workers, 1) / 60.0), 1) for seconds in _SECONDS)
     minutes = f"about {least} min" if least == most else f"{least} to {most} min"
@@ -26,5 +26,5 @@ def progress_message(places: int, workers: int, kept: int) -> str:
 
 
 def kept_after(places: int, kept: int) -> str:
-    """What is kept of a preparation that was interrupted, and how it resumes."""
+    """Describe the saved state of an interrupted preparation, and how to resume it."""
     return f"{kept} of {places} places are kept, and the same command resumes from there"

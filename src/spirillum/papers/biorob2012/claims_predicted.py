@@ -126,7 +126,7 @@ _EQUAL = 0.05
 
 
 def predicted(evidence: Evidence) -> list[Claim]:
-    """The verdicts of a study whose robots were laid down; empty for one without."""
+    """Verdicts of a study with released robots; empty for one without."""
     if "forward_velocity_at_run" not in evidence.dataset:
         return []
     readings = FrictionModelRuns(evidence)
@@ -145,7 +145,7 @@ def predicted(evidence: Evidence) -> list[Claim]:
 
 
 def _range(values: Values, unit: str, scale: float = 1.0) -> str:
-    """Least and largest in words."""
+    """Format the smallest and largest value."""
     known = scale * values[np.isfinite(values)]
     if not known.size:
         return "not computed"

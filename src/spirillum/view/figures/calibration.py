@@ -143,7 +143,7 @@ def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
 
 
 def _rows(found: Calibrated) -> list[dict[str, Any]]:
-    """What each row shows, in its unit: observed, half width, predicted with limits."""
+    """Content of each row, in its unit: observed, half width, predicted with limits."""
     experiment, rows = found.experiment, []
     rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
     if "advance" in found.predicted:

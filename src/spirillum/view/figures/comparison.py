@@ -167,7 +167,7 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
 
 
 def _label(comparison: ModelComparison, name: str) -> str:
-    """A model's name, with a star where calibration factors are in its answer."""
+    """A model's name, with a star if its result contains calibration factors."""
     answer = comparison.predictions.get(name)
     return f"{name}*" if answer is not None and answer.calibrated else name
 
@@ -245,7 +245,7 @@ _WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "styl
 
 
 def _finish(axes: Axes, values: np.ndarray) -> None:
-    """Horizontal axis from zero, with room for words; models on lines of their own."""
+    """Set the horizontal axis from zero, with room for labels; one line for each model."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     low, high = min(low, 0.0), max(high, 0.0)

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 _SHORT = 0.2
-"""Time constant over the length of the run above which the way does not reach the steady motion."""
+"""Time constant over the run's length above which the run does not reach the steady state."""
 _TILTS = {"pitch": "green", "yaw": "purple"}
 """Angles of the tilt, and their colours."""
 
 
 def settling_figure(settling: Settling) -> Figure:
-    """Three panels over time: gap, azimuth, pitch and yaw; dashed where the robot comes to lie."""
+    """Three panels over time: gap, azimuth, pitch and yaw; dashed at the resting pose."""
     with styled():
         motion = settling.prediction
         sheet = Sheet(
@@ -54,7 +54,7 @@ def settling_figure(settling: Settling) -> Figure:
 
 
 def _notes(settling: Settling) -> list[str]:
-    """That the way ends before the steady motion, where it does."""
+    """Note on a run that ends before the steady state."""
     slow, end = settling.lying.approach_time, float(settling.way("time")[-1])
     if settling.lying.state != "steady" or not slow > _SHORT * end:
         return []
@@ -100,12 +100,12 @@ _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewi
 
 
 def _steady(axes: Axes, value: float) -> None:
-    """Where the robot comes to lie."""
+    """Plot the resting pose."""
     axes.axhline(value, **_STEADY)
 
 
 def _legend(settling: Settling) -> list[Line2D]:
-    """Of the panel with two lines, and of the place where the robot comes to lie, if there is one."""
+    """Legend of the panel with two lines, and of the resting pose, if there is one."""
     lines = [Line2D([], [], color=COLOURS[name], label=words) for words, name in _TILTS.items()]
     return [*lines, *([Line2D([], [], **_STEADY, label="steady")] if settling.lying.state == "steady" else [])]
 
@@ -122,7 +122,7 @@ _MOST = 4
 
 
 def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
-    """Every reading of every run over the median of its robot; None where no robot was laid down."""
+    """Every reading of every run over the median of its robot; None if no robot was released."""
     if "forward_velocity_at_run" not in dataset:
         return None
     there = _readings(dataset, "forward_velocity")

@@ -73,7 +73,7 @@ def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] 
 
 
 def _pages(count: int, most: int) -> list[list[int]]:
-    """Places of the wavelengths on each figure, as even as can be."""
+    """Indices of the wavelengths on each figure, as evenly distributed as possible."""
     places = spread(count, most * MOST_COLUMNS)
     pages = -(-len(places) // MOST_COLUMNS)
     return [list(map(int, page)) for page in np.array_split(places, pages)]
@@ -104,7 +104,7 @@ def _channel_title(shown: StudyView, channel: int) -> str:
 
 
 def _left_out(shown: StudyView, wavelengths: int, channels: int) -> str:
-    """A sentence on what the figures leave out; empty if nothing."""
+    """Note on omitted robots; empty if there are none."""
     sizes = shown.whole.sizes
     parts = []
     if wavelengths < sizes["wavelength"]:
@@ -238,7 +238,7 @@ def _bound_picture(shown: StudyView) -> Picture:
 
 
 def _frictions(shown: StudyView) -> list[str]:
-    """Against what a motor turns under the readings that are drawn, with their marks where there are several."""
+    """Friction models of the plotted motors, with marks if there are several."""
     words = {"none": "as fast as it can against the fluid alone", "rotor": "with the rotor's own friction"}
     readings = shown.own_drive_readings
     found = [words.get(reading, f"with friction reading '{reading}'") for reading in readings]
