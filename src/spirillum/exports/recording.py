@@ -231,7 +231,7 @@ def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[
     """Frames of a video during the run."""
     from spirillum.vision.video.frames import open_video
 
-    pictures = import_optional("PIL.Image", "a film in a recording", "video")
+    pictures = import_optional("PIL.Image", "a video in a recording", "video")
     for frame in open_video(film).frames():
         time = start + speed * frame.time
         if time > end + 1e-9:

@@ -191,7 +191,7 @@ def _cautions(robot: Robot, body: UnitedBody, found: Mapping[str, Any]) -> list[
     unit = found["unit"]
     sentences = []
     if found["bodies"] != 1:
-        sentences.append(f"the STL file holds {found['bodies']} separate bodies; a printer may refuse it")
+        sentences.append(f"the STL file contains {found['bodies']} separate bodies; a printer may refuse it")
     if not found["watertight"]:
         better = next((name for name in STL_UNITS if is_watertight_file(_stl_of(robot, body, name))), None)
         remedy = f"use --unit {better}" if better else "repair it before printing"

@@ -82,7 +82,7 @@ class FluidField(ABC):
         if np.any(names != ""):
             first = int(np.argmax(names != ""))
             at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
-            raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
+            raise InputError(f"point {first} = ({at}) mm is inside the {names[first]}; allowed: points in the fluid")
         return places
 
 
@@ -95,7 +95,7 @@ def checked_points(points: Samples) -> Samples:
     if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
         raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
     if np.any(np.abs(places) > _FARTHEST):
-        raise InputError(f"points lie farther away than {_FARTHEST:g} m; allowed: nearer ones")
+        raise InputError(f"points are farther away than {_FARTHEST:g} m; allowed: nearer ones")
     return np.ascontiguousarray(places)
 
 

@@ -48,7 +48,7 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
     found = None if resolved else tabled(batch)
     if found is None and options.form == "table":
         raise InputError(
-            "model.tube.form = 'table': there is no table of this robot in this tube that holds at this place; "
+            "model.tube.form = 'table': no table of this robot in this tube covers this pose; "
             "allowed: 'direct', or after `spirillum prepare`"
         )
     return found or model

@@ -180,7 +180,7 @@ class SetupEditor:
         if missing:
             raise InputError(
                 "no ruler of equally spaced lines is seen, so that the marks give a length per pixel: the heights "
-                f"({', '.join(missing)}) have to stand in the form first"
+                f"({', '.join(missing)}) have to be set in the form first"
             )
         heights = {name: parse_option(name, self._fields[name], KINDS["length or zero"]) for name in needed}
         surface, index = self._fields.get("tank.surface"), self._fields.get("tank.index", 1.4)
@@ -300,7 +300,7 @@ class MeasurementSession:
         with self._lock:
             films = [str(path) for path in self.films.paths()]
             if not films:
-                raise InputError("no film is here; allowed: one at least")
+                raise InputError("no video is uploaded; allowed: at least one")
             problems = self.desk.checked()["problems"]
             if problems:
                 raise InputError(problems[0])

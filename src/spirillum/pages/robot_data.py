@@ -125,7 +125,7 @@ _LABELS = {
     "electrical_power": "power",
     "hydrodynamic_efficiency": "efficiency, fluid",
     "overall_efficiency": "efficiency, overall",
-    "wall_gap": "film under the body",
+    "wall_gap": "lubrication film under the body",
     "tail_gap": "gap of the tail",
     "contact_force": "load on asperities",
     "tail_rotation_rate": "tail rate",

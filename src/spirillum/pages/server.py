@@ -82,7 +82,7 @@ class _Guarded:
         headers, guard = Headers(scope=scope), self._guard
         host, origin = headers.get("host", ""), headers.get("origin")
         if not guard.own_host(host):
-            return "this server is not the host that was asked for"
+            return "this server is not the requested host"
         if origin is not None and not guard.own_origin(origin, host):
             return "another page has no business here"
         if origin is None and (scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")):

@@ -105,7 +105,7 @@ FORM: tuple[Entry, ...] = (
         "From",
         "Time",
         "the beginning",
-        "Time in the film from which on to measure, as when the robot has started up.",
+        "Start of the measurement in the video, such as the end of the start-up.",
     ),
     Entry("end", "Until", "Time", "the end", "Time until which to measure."),
     Entry(
@@ -113,7 +113,7 @@ FORM: tuple[Entry, ...] = (
         "Frame rate",
         "Time",
         "the film's own",
-        "Frames a second, instead of the film's own time stamps, as in slow motion.",
+        "Frames per second, instead of the video's time stamps, for slow motion.",
         number=True,
     ),
 )

@@ -290,7 +290,7 @@ class SimulationThread:
 
     def _prepare(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None and self._preparing.running:
-            raise InputError("a table is being made already; allowed: one at a time")
+            raise InputError("another table is being computed; allowed: one at a time")
         self._preparing = Preparing(lane.robot, self._wake_up)
 
     def _leave_off(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:

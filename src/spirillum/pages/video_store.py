@@ -127,12 +127,12 @@ class VideoStore:
             written = self._written()
             self._stated = {path: self._stated[path] for path in written}
             if len(written) >= _MOST_FILMS:
-                raise TooLargeError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+                raise TooLargeError(f"{_MOST_FILMS} videos are uploaded already; allowed: to remove some first")
             stated = sum(self._stated.values())
             free = shutil.disk_usage(self._folder).free - (stated - sum(written.values())) - _SPARE
             if size > min(_LARGEST_FILM, _LARGEST_ALL - stated, free):
-                limits = f"{_LARGEST_FILM >> 30} GB a film, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
-                raise TooLargeError(f"a film of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
+                limits = f"{_LARGEST_FILM >> 30} GB per video, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
+                raise TooLargeError(f"a video of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
             self._count += 1
             path = self._folder / f"trial-{self._count}.{kind}"
             path.touch()
@@ -173,7 +173,7 @@ class VideoStore:
         with self._lock:
             film = self._films.get(name)
         if film is None:
-            raise InputError(f"film {name[:40]!r}; allowed: one of those that are here")
+            raise InputError(f"film {name[:40]!r}; allowed: an uploaded video")
         return film.video
 
     def paths(self) -> list[Path]:

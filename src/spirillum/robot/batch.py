@@ -225,7 +225,7 @@ class RobotBatch:
         known = {source.path: (name, source) for name, source in _columns("RobotBatch").items()}
         unknown = [path for path in values if path not in known]
         if unknown:
-            raise InputError(f"{unknown[0]} is not a number that a batch can vary; allowed: {', '.join(known)}")
+            raise InputError(f"{unknown[0]} cannot vary in a batch; allowed: {', '.join(known)}")
         arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
@@ -323,7 +323,7 @@ def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float)
         least = "0 or more" if source.zero else "any sign" if source.signed else "above 0"
         raise InputError(f"{path} of robot {wrong} = {values[wrong]:.6g}; allowed: finite SI numbers, {least}")
     if not source.optional and np.all(np.isnan(values)):
-        raise InputError(f"{path} = nan for all robots; allowed: numbers in SI units, NaN only where one is not known")
+        raise InputError(f"{path} = nan for all robots; allowed: numbers in SI units, NaN only for unknown values")
     return values
 
 

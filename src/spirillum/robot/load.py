@@ -306,8 +306,8 @@ def _floating(derived: Mapping[str, Derived]) -> tuple[str, ...]:
     if weight is None or weight.value > 0:
         return ()
     return (
-        f"the robot floats: its submerged weight is {weight.value:.3g} N; held motions rest on a robot that its "
-        "weight keeps on the channel's floor, and a free one rises",
+        f"the robot floats: its submerged weight is {weight.value:.3g} N; axial motion assumes "
+        "contact with the channel's floor; in free motion it rises",
     )
 
 

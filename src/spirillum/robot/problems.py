@@ -18,7 +18,7 @@ _OTHERWISE = {
     "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
 }
 """Derived quantities that are no fields of a robot file, and their remedies."""
-_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' turns the tail the other way"}
+_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
 """Remedies for out-of-range numbers whose meaning is expressed by another field."""
 _LONGEST_FIELD = 200
 """Characters of a field's name in a sentence, so that what is allowed has room."""

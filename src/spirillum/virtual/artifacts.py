@@ -79,7 +79,7 @@ class Degradation(Options):
         """
         if self.crf and self.crf not in {self.of(name).crf for name in _PRESETS}:
             raise InputError(
-                f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which lose nothing; "
+                f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which are lossless; "
                 "allowed: with a video (.mp4)"
             )
         return self.model_copy(update={"crf": 0})

@@ -312,7 +312,7 @@ def _files_of(folder: Path, planned: Planned) -> list[Path]:
 def _is_whole_film(path: Path) -> bool:
     """Whether a file is a complete MP4 video: its boxes, each with its length first, fill it."""
     size, place, kinds = path.stat().st_size, 0, set()
-    with opened(path, "a film of a trial", sys.maxsize) as file:
+    with opened(path, "a video of a trial", sys.maxsize) as file:
         while place < size:
             file.seek(place)
             head = file.read(16)

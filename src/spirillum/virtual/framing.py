@@ -112,7 +112,7 @@ def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualL
     rows = np.array([[middle, 0.0], [middle, lens.size[1] - 1.0]])
     edges = lens.points(rows, float(z[inside].mean()))[:, 1]
     if not np.any(inside & (y > edges.min() - radius) & (y < edges.max() + radius)):
-        raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its middle; {nearer}")
+        raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its centre; {nearer}")
 
 
 def _visible(lens: VirtualLens, height: float) -> tuple[float, float]:

@@ -26,7 +26,7 @@ _USUAL = 20.0
 """Length of a video of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
 """Largest turn of the tail between two samples of a run above which a note states the interpolation, rad."""
-_WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
+_WITHOUT_A_TABLE = f"--model {WALLED} needs none and takes some ten seconds of one core"
 """Alternative remedy to `spirillum prepare` for a video with walls, a clause."""
 
 
@@ -65,7 +65,7 @@ def steady_rates(
             idle = "model" if motion.friction is None else "friction"
             raise InputError(
                 f"{idle} = {str(getattr(motion, idle))[:40]!r} with a prescribed forward velocity, body and tail rate, "
-                "which leave nothing to compute; allowed: two of them at most"
+                "which determine the motion; allowed: at most two of them"
             )
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
@@ -95,7 +95,7 @@ def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[str, ...]:
     if robot.channel is None or find_swimmer_model(choice.model).placed:
         return ()
     named = f"model '{choice.model}' leaves out the channel's walls"
-    return (f"{named}: the film shows a faster robot than with model '{WALLED}'",)
+    return (f"{named}: the video shows a faster robot than with model '{WALLED}'",)
 
 
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:

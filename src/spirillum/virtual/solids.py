@@ -34,7 +34,7 @@ _WRAP, _BACK, _GREEN, _BLACK, _GREY = (
 def covered_body(robot: Robot, body: RobotMesh) -> list[RobotMesh]:
     """The opaque pieces of a body under a glass cover: its seal, a battery, a board."""
     if robot.seal is None:
-        raise InputError("glass_cover (--trouble glass-cover) requires a robot with a seal, which holds the cover")
+        raise InputError("glass_cover (--trouble glass-cover) requires a robot with a seal, which carries the cover")
     rear, nose, radius = robot.seal.length - 0.5 * robot.body.length, 0.5 * robot.body.length, 0.5 * robot.body.diameter
     low, high, width, height = _BATTERY
     start, end = rear + low * (nose - rear), rear + high * (nose - rear)

@@ -102,7 +102,7 @@ def seat_limits(
     """
     fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
     through = f"the tail would pass through the wall ({fields})"
-    resolved = f"the film under the wire is resolved down to {wire_film:g} of its radius, and below 0 "
+    resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     turned = _turned(batch)
     open_ended = batch.placement.ends == "open"
@@ -133,7 +133,7 @@ def seat_limits(
             "at least",
             _TIGHTEST * batch.body_diameter,
             "mm",
-            "a film all round the body is resolved down to a twentieth of its radius",
+            "an annular gap is resolved down to a twentieth of the body's radius",
             "gap-too-thin",
         ),
         Limit.of(
@@ -158,16 +158,16 @@ def seat_limits(
             "gap-too-wide",
         ),
         Limit.of(
-            "clearance of coupling and glass",
+            "clearance of coupling and wall",
             films.coupling,
             "at least",
             thinnest,
             "mm",
-            "the coupling would touch the glass (placement.pitch, placement.yaw, coupling.diameter)",
+            "the coupling would touch the wall (placement.pitch, placement.yaw, coupling.diameter)",
             "tail-in-wall",
         ),
         Limit.of(
-            f"clearance of tail and glass{films.where}",
+            f"clearance of tail and wall{films.where}",
             films.tail,
             "at least",
             wire_film * 0.5 * batch.wire_diameter,

@@ -296,7 +296,9 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
     if not radius > a:
         raise InputError("the body does not fit into the tube")
     if not body.half and length < _SHORTEST * a:
-        raise InputError(f"films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius")
+        raise InputError(
+            f"lubrication films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius"
+        )
     head = np.zeros(table.HEAD)
     head[:7] = radius, a, body.half, *body.rear, *body.front
     widest = min(2.0 * (radius - a), radius - a + np.sin(pitch) * reach)

@@ -61,7 +61,7 @@ class FilmBody:
             return cls(radius, 0.0, (float(ends[0]), rounded[0]), (float(ends[1]), rounded[1]))
         if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
             return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
-        raise InputError("the film of a body without a straight side is known for spheres and spheroids only")
+        raise InputError("the film of a body without a straight side is implemented for spheres and spheroids only")
 
 
 def frame(pitch: float, yaw: float) -> Samples:

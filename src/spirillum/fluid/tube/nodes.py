@@ -96,9 +96,9 @@ class Places:
         thin = self.thinnest / contact_offset(self.rings, self.radius, 0.0)
         if thin > _UPPER[0]:
             raise InputError(
-                f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the glass "
+                f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the wall "
                 f"of a tube with channel.diameter = {show(2.0 * self.radius, 'mm')}; allowed: a smaller amplitude, or "
-                "answers for one place at a time, without a table"
+                "single poses without a table"
             )
         found = []
         while thin * _SPACED < _UPPER[0]:
@@ -163,7 +163,7 @@ class Places:
 
     @cached_property
     def thinnest(self) -> float:
-        """Gap of the first node of a level robot, m: the tail, too, is as far from the glass as the model resolves."""
+        """Gap of the first node of a level robot, m: body and tail have the smallest resolved clearance."""
         body = 0.5 * self.geometry.body_diameter
         tail = float(np.max(self.swept[:, 1])) + 0.5 * self.geometry.wire_diameter
         return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * self.least_clearance)

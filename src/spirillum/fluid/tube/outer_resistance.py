@@ -102,7 +102,7 @@ def _solutions(
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
-    numbered, kept = list(enumerate(places)), "; what was solved is kept"
+    numbered, kept = list(enumerate(places)), "; completed nodes are saved"
     answers = imap_unordered(_solve_numbered, numbered, workers, besides=kept, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=1):
         found[number] = answer
@@ -120,7 +120,7 @@ def factor_of(matrix: Samples, where: str) -> Samples:
         factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            f"the flow in the tube is resolved too coarsely {where}: without its film the resistance is not positive "
+            f"the flow in the tube is resolved too coarsely {where}: the outer resistance is not positive "
             "definite; allowed: a finer tolerance"
         ) from error
     found = factor[..., _LOWER[0], _LOWER[1]]

@@ -73,8 +73,8 @@ class TabledTube(Tube):
 
     form = "table"
     error_against = (
-        f"solutions with finer wires: the largest error of {HELD_OUT} places between the nodes of its table, and that "
-        "of the wire and the solids"
+        f"solutions with finer wires: the largest error of {HELD_OUT} check poses between the nodes of its table, and "
+        "that of the wire and the solids"
     )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:

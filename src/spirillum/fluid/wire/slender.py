@@ -157,7 +157,7 @@ class Slender(SwimmerModel):
                 "more than",
                 0.5 * batch.wire_diameter,
                 "mm",
-                "the tail's root, coupling.length behind the body, would lie in the body",
+                "the tail's root, coupling.length behind the body, would be inside the body",
                 "tail-in-body",
             ),
             Limit.of(
@@ -166,7 +166,7 @@ class Slender(SwimmerModel):
                 "at least",
                 _SMALLEST_GAP * batch.amplitude,
                 "mm",
-                "the film between body and tail is resolved down to a hundredth of tail.amplitude",
+                "the gap between body and tail is resolved down to a hundredth of tail.amplitude",
                 "film-too-thin",
             ),
             Limit.of(
@@ -175,7 +175,7 @@ class Slender(SwimmerModel):
                 "at least",
                 _SMALLEST_CLEARANCE * batch.coupling_diameter,
                 "mm",
-                "the film between body and coupling is resolved down to a hundredth of coupling.diameter",
+                "the gap between body and coupling is resolved down to a hundredth of coupling.diameter",
                 "film-too-thin",
             ),
             Limit.of(

@@ -32,7 +32,7 @@ from spirillum.view.figures.style import label_of_model as label
 def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
     """Table III."""
     yield Claim(
-        "Body drag factors that stand for the walls (Table III)",
+        "Body drag factors that represent the walls (Table III)",
         "1.95 D_x wide, 3.6 D_x narrow; 0.6 E_x (SBT), 1 E_x (RFT)",
         "used as given, as named calibrations of the preset robots",
         "undecidable",
@@ -77,7 +77,7 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
             "order 1e-7 (text), 7e-7 (Table II)",
             f"{friction:.0e} N m s/rad, Table II's value",
             "undecidable",
-            "a measurement of the paper; 7e-7 lies nearer to 1e-6 than to 1e-7",
+            "a measurement of the paper; 7e-7 is closer to 1e-6 than to 1e-7",
         )
 
 

@@ -56,7 +56,7 @@ def drop_picture(shown: StudyView) -> Picture | None:
     fitted = [label_of_model(name) for name in evidence.confined if name not in evidence.computed]
     if fitted:
         notes.append(
-            f"In {', '.join(fitted)} Table III's factors stand for the walls; they were fitted to the same data."
+            f"In {', '.join(fitted)} Table III's factors represent the walls; they were fitted to the same data."
         )
     panels = min(shown.whole.sizes["wavelength"], _MOST_COLUMNS)
     alternative = (

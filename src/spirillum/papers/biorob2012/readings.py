@@ -106,17 +106,17 @@ class FrictionModelRuns:
             return Judgement("depends", self._nothing)
         low, high = float(known.min()), float(known.max())
         if np.all(np.abs(known / stated - 1.0) < _CLOSE):
-            return Judgement("predicted-agrees", f"all {known.size} readings lie within {100 * _CLOSE:.0f} %")
+            return Judgement("predicted-agrees", f"all {known.size} readings are within {100 * _CLOSE:.0f} %")
         if stated * (1.0 + _CLOSE) < low:
             return Judgement(
-                "predicted-disagrees", f"all readings lie above, by a factor of {low / stated:.2g} at least"
+                "predicted-disagrees", f"all readings are above, by a factor of {low / stated:.2g} at least"
             )
         if stated * (1.0 - _CLOSE) > high:
             by = f", by a factor of {stated / high:.2g} at least" if high > 0 else ""
-            return Judgement("predicted-disagrees", f"all readings lie below{by}")
+            return Judgement("predicted-disagrees", f"all readings are below{by}")
         names = self._movers(values)
         means = "; ".join(self._means(values, name, unit, scale) for name in names)
-        return Judgement("depends", f"{_joined(names)}: the readings lie on both sides, on average {means}")
+        return Judgement("depends", f"{_joined(names)}: the readings are on both sides, on average {means}")
 
     def claim(self, statement: str, paper: str, computed: str, judgement: Judgement) -> Claim:
         """A statement with its verdict."""

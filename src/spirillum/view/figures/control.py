@@ -55,7 +55,7 @@ def _subtitle(control: Control) -> str:
     return (
         f"model {control.model} · camera {show(control.lab.camera.latency, 's')} late · remote "
         f"{show(control.lab.remote.delay, 's')} late · friction times {control.drawn.friction:.3g} · {flow} · "
-        f"{'good' if control.score.good else 'not good'} enough · computed, nothing is measured"
+        f"{'good' if control.score.good else 'not good'} enough · computed, no measured data"
     )
 
 

@@ -71,8 +71,8 @@ def _subtitle(design: Design) -> str:
     if len(design.profiles) > 1:
         words.append("along each field the others at their best values")
     if design.uncertainty is not None:
-        words.append(f"{design.searched.drawn.number} draws of what is not known")
-    return " · ".join([*words, "computed, nothing is measured"])
+        words.append(f"{design.searched.drawn.number} draws of the unknown parameters")
+    return " · ".join([*words, "computed, no measured data"])
 
 
 def _legend(design: Design) -> list[Line2D]:

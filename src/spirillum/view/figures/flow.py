@@ -284,7 +284,7 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     motion, unit = flow.prediction, view.lengths
     frame = "lab frame" if flow.frame == "lab" else "frame of the swimming robot"
     plane = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
-    where = f"{plane}, origin at the body's middle"
+    where = f"{plane}, origin at the body's mid-length"
     yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
     speed = UnitPrefix.of(np.array([motion.forward_velocity]), "m/s")
     yield (
@@ -322,7 +322,7 @@ def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
 
 def _notes(flow: Flow, view: _View) -> Iterator[str]:
     oblique = flow.seat is not None and (view.name == "xy" or view.offset != 0)
-    lines = "velocity's part in the plane, ending at oblique glass" if oblique else _LINES
+    lines = "velocity component in the plane, ending at an oblique wall" if oblique else _LINES
     drawn = ["grey: robot where it is cut" if oblique else "grey: robot where the plane cuts it"]
     if view.first == "x":
         drawn.append("white band: tail")
@@ -334,4 +334,4 @@ def _notes(flow: Flow, view: _View) -> Iterator[str]:
         words = "Weight and contact push it sideways with" if flow.prediction.motion == "free" else _HELD
         held = f" {words} {flow.held_force / force.factor:.2g} {force.unit}."
     walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
-    yield f"{walls}{held} Computed, nothing is measured."
+    yield f"{walls}{held} Computed, no measured data."

@@ -31,7 +31,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         sheet = Sheet(
             f"{plain(dataset.attrs['robot'])} in a rotating field",
             f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
-            "computed, nothing is measured",
+            "computed, no measured data",
             width=PAGE,
             heights=[1.9, 1.9],
             columns=2,

@@ -43,9 +43,9 @@ def posterior_figure(found: Calibrated) -> Figure:
     count = len(names)
     colour = look_of_model(found.problem.model.name).colour
     with styled():
-        synthetic = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
+        synthetic = "synthetic, no measured data" if found.experiment.synthetic else "observed"
         words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
-        words += "; contours hold 50 and 95 % of the draws" if count > 1 else ""
+        words += "; contours contain 50 and 95 % of the draws" if count > 1 else ""
         words += f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
         sheet = Sheet(
             "Posterior of the fitted numbers",
@@ -149,7 +149,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     fit = found.least_squares
     held = " and ".join(
         f"{percent(share)} of the {name.replace('_', ' ')} "
-        f"({'middle of its prior' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
+        f"({'prior median' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
         for name, share in fit.discrepancy.items()
     )
     synthetic = " (synthetic)" if found.experiment.synthetic else ""

@@ -37,7 +37,7 @@ def settling_figure(settling: Settling) -> Figure:
             f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
             f"roughness {1e6 * settling.roughness:.3g} µm · friction {settling.friction_coefficient:.3g} · "
-            "computed, nothing is measured",
+            "computed, no measured data",
             width=PAGE,
             heights=[1.9],
             columns=3,
@@ -116,7 +116,7 @@ _SHOWN = {
     "body_rotation_rate": "body rate",
     "effective_friction": "inferred $B_{eff}$",
 }
-_KINDS = (("on the film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
+_KINDS = (("on the lubrication film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
 _MOST = 4
 """Robots of the figure."""
 
@@ -133,7 +133,7 @@ def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | N
     title = "What the conditions of a run change"
     caption = (
         "Size of each reading of runs that differ in gap, pitch, wait, roughness and dry friction, over the median of "
-        f"its robot; $B_{{eff}}$ as model {dataset['inferred_by'].values[0]} infers it. Computed: nothing is measured."
+        f"its robot; $B_{{eff}}$ as model {dataset['inferred_by'].values[0]} infers it. Computed, no measured data."
     )
     if len(robots) > len(shown):
         caption += f" Shown: the {len(shown)} fastest of {len(robots)} robots."

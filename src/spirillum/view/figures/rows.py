@@ -38,7 +38,7 @@ _SETTLED: Any = {
     "zorder": 6,
 }
 """Style of released robots, unlike any model's."""
-_SETTLED_WORDS = "Stars: in steady motion, let go in the tube on asperities and with dry friction that are assumed."
+_SETTLED_WORDS = "Stars: steady state after release in the tube, with assumed asperities and dry friction."
 Draw = Callable[[Axes, StudyView, Values], None]
 
 
@@ -264,7 +264,7 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelR
                 draw_curve(axes, x, y, look_of_model(model), ring=number > 0, joined=part.grid)
 
     words = ", rings: ".join(f"'{reading}'" for reading in inferring)
-    tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction reading of filled marks: {words}."
+    tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction model of filled marks: {words}."
     return PanelRow(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
 
 
@@ -284,7 +284,7 @@ def band_handles(shown: StudyView) -> list[Line2D]:
 
 def settled_handles(shown: StudyView) -> list[Line2D]:
     """Legend entry of released robots; none without such."""
-    return [Line2D([], [], **_SETTLED, label="let go, in steady motion")] if shown.settled else []
+    return [Line2D([], [], **_SETTLED, label="released, steady state")] if shown.settled else []
 
 
 def _model_entries(shown: StudyView) -> Iterator[Line2D]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
+NOTHING_MEASURED = "Computed only: this figure contains no measured data."
 
 
 class PaperFigure(NamedTuple):
@@ -154,7 +154,7 @@ class StudyView:
             )
         if reading == "rotor" and self.upper_bound:
             return f"rotor friction $B_m$ only{'' if self.shaded else ' (upper bound)'}"
-        return f"friction reading '{reading}'"
+        return f"friction model '{reading}'"
 
     @property
     def at_rate_reading(self) -> str:
@@ -230,12 +230,12 @@ class StudyView:
         if not self.with_intervals:
             return ""
         names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
-        return f"Shades: 95 % intervals of the posterior ({names}, friction reading '{reading}'), discrepancy included."
+        return f"Shades: 95 % intervals of the posterior ({names}, friction model '{reading}'), discrepancy included."
 
     @property
     def _words_of_first_reading(self) -> str:
         reading = self.own_drive_readings[0]
-        return "without friction" if reading == "none" else f"friction reading '{reading}'"
+        return "without friction" if reading == "none" else f"friction model '{reading}'"
 
     def _band_words(self) -> str:
         if not self.banded:
@@ -271,7 +271,7 @@ class StudyView:
             names[code].replace("-", " ") if code < len(names) else "other" for code, _ in missing.most_common(3)
         ]
         return (
-            f"Gaps: {missing.total()} of {codes.size} results (a robot with a model) have no answer "
+            f"Gaps: {missing.total()} of {codes.size} results (a robot with a model) have no result "
             f"({', '.join(reasons)}{', …' if len(missing) > 3 else ''})."
         )
 

@@ -149,7 +149,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
         rows = [*first, *[panel_height] * (-(-drawn // beside) - len(first))]
         sheet = Sheet(
             _headline(dataset, path, in_tube=tube is not None),
-            " · ".join([*_facts(dataset, in_tube=tube is not None), "computed, nothing is measured"]),
+            " · ".join([*_facts(dataset, in_tube=tube is not None), "computed, no measured data"]),
             width=COLUMNS[column],
             heights=rows,
             columns=beside,
@@ -227,7 +227,7 @@ def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
         found += [f"roughness {1e6 * float(attrs['roughness']):.3g} µm"] if "roughness" in attrs else []
         found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
     if "draws" in attrs:
-        found.append(f"the middle of {attrs['draws']} draws")
+        found.append(f"the median of {attrs['draws']} draws")
     return found
 
 

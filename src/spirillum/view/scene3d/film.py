@@ -286,7 +286,7 @@ def _channel_middle(dataset: xr.Dataset) -> float | None:
 
 def _even(size: tuple[int, int]) -> tuple[int, int]:
     if size[0] % 2 or size[1] % 2:
-        raise InputError(f"size = {size[0]}x{size[1]}; allowed: even numbers, as films want them")
+        raise InputError(f"size = {size[0]}x{size[1]}; allowed: even numbers, which the video encoder requires")
     return size
 
 
@@ -295,7 +295,9 @@ def _check_pace(fps: int, speed: float, suffix: str) -> None:
     if isinstance(fps, bool) or int(fps) != fps or not 1 <= fps <= most:
         raise InputError(f"fps = {fps}; allowed: a whole number of frames a second from 1 to {most} for {suffix}")
     if not _SLOWEST <= speed <= _FASTEST:
-        raise InputError(f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run a second of film")
+        raise InputError(
+            f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run per second of video"
+        )
 
 
 def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
@@ -330,8 +332,8 @@ def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[
         return turn, ()
     slower = _round_down(speed * _LARGEST_TURN / turn)
     sentence = (
-        f"the tail turns by up to {turn:.2g} turns from frame to frame, so that it may seem to stand still or turn "
-        f"backwards; a speed of {slower:g} shows it as it turns"
+        f"the tail turns by up to {turn:.2g} turns from frame to frame, so that aliasing may show it at rest or "
+        f"reversed; a speed of {slower:g} avoids this"
     )
     return turn, (sentence,)
 
