@@ -183,7 +183,7 @@ def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, m
     def interrupted(*_: object, **_more: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(study_run, "shared_out", interrupted)
+    monkeypatch.setattr(study_run, "map_tasks", interrupted)
     outcome = run("study", "-o", str(tmp_path / "out"))
     assert outcome.code == 130
     assert "interrupted" in outcome.err
@@ -203,7 +203,7 @@ def test_interrupt_that_a_library_has_caught_leaves_with_130(
         raise TypeError("unsupported operand")
 
     monkeypatch.setattr(cli, "_interrupts", [])
-    monkeypatch.setattr(study_run, "shared_out", interrupted)
+    monkeypatch.setattr(study_run, "map_tasks", interrupted)
     outcome = run("study", "-o", str(tmp_path / "out"))
     assert outcome.code == 130
     assert outcome.err.endswith("spirillum: interrupted; what was done is kept\n")

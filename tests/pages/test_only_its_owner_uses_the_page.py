@@ -314,7 +314,7 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     pytest.importorskip("av")
     pytest.importorskip("cv2")
     bench = MeasurementSession()
-    monkeypatch.setattr(server, "Bench", lambda: bench)
+    monkeypatch.setattr(server, "MeasurementSession", lambda: bench)
     guard = Guard("127.0.0.1", 1)
     where, _, query = path.partition("?")
     named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "content-length": "9"}
