@@ -44,7 +44,7 @@ def test_an_answer_beyond_the_yaws_at_which_its_table_was_checked_says_so_and_ha
     assert any(words.startswith("yaw = 7.1 deg; accurate: at most 6.8") for words in near.warnings)
     assert not any(words.startswith("yaw") for words in far.warnings)
     assert near.to_dict(others=False).get("error_estimate", {}).get("value") is None
-    with pytest.raises(InputError, match=r"clearance of tail and glass .* allowed: at least 0"):
+    with pytest.raises(InputError, match=r"clearance of tail and wall .* allowed: at least 0"):
         sp.predict(NARROW, placement={"gap": "0.3 mm", "pitch": "0 deg", "yaw": "7.3 deg"})
 
 

@@ -59,8 +59,8 @@ def test_what_the_field_cannot_show_is_refused() -> None:
 @pytest.mark.parametrize(
     ("view", "lateral", "words"),
     [
-        ("top", "1 m", "never in the picture, 1000 mm beside its middle; allowed: a lateral nearer to 0"),
-        ("top", "-20 mm", "never in the picture, -20 mm beside its middle; allowed: a lateral nearer to 0"),
+        ("top", "1 m", "never in the picture, 1000 mm beside its centre; allowed: a lateral nearer to 0"),
+        ("top", "-20 mm", "never in the picture, -20 mm beside its centre; allowed: a lateral nearer to 0"),
         ("side", "1 m", "under the floor|above the oil"),
         ("side", "-1 m", "under the floor|above the oil"),
     ],

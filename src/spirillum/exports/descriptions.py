@@ -114,7 +114,7 @@ def joint_friction(robot: Robot) -> float:
 
 
 def _link_masses(link: Link) -> dict[str, Any]:
-    """Of one link, at phase 0 of the tail; null where a mass is not known."""
+    """Inertia of one link, at phase 0 of the tail; null for an unknown mass."""
     return {
         "mass": quantity(link.mass, "kg"),
         "centre_of_mass": quantity(link.centre, "m"),

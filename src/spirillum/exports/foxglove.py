@@ -92,7 +92,7 @@ def turn(quaternion: Samples) -> Json:
 
 
 def pose_of(position: Samples, quaternion: Samples) -> Json:
-    """A place and an attitude (w, x, y, z)."""
+    """A position and an attitude (w, x, y, z)."""
     return {"position": place(position), "orientation": turn(quaternion)}
 
 

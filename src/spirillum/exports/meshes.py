@@ -104,7 +104,7 @@ class UnitedBody(NamedTuple):
 
 
 def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
-    """The union of closed pieces; what lies inside another piece is gone."""
+    """Union of closed pieces, without interior surfaces."""
     from manifold3d import Manifold, Mesh64, OpType
 
     chosen = list(pieces)
@@ -185,7 +185,7 @@ class MeshFile(NamedTuple):
     part: str
     """`body` or `rotor`."""
     colour: tuple[float, float, float] | None
-    """sRGB of a surface to look at; None for the closed body of the whole part."""
+    """sRGB of a visual surface; None for the closed body of the whole part."""
     triangles: int
     """Number of triangles."""
     data: bytes

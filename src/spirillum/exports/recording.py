@@ -1,4 +1,4 @@
-"""A run as a recording in the format MCAP, which Foxglove opens: poses, the robot, all numbers, events, a film."""
+"""MCAP recordings of runs for Foxglove: poses, the robot, all numbers, events, a video."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _FINENESS = 0.5
 _QUALITY = 85
 _SLOWEST, _FASTEST = 1e-6, 1e6
 _LONGEST_TUBE = 2.0
-"""A tube whose length is not known is drawn so many times as long as the robot's way and the robot together."""
+"""Length of a tube of unspecified length, over that of the robot's path and the robot together."""
 
 Message = tuple[str, str, float, dict[str, Any]]
 """Topic, name of the schema, time in s, content."""
@@ -47,7 +47,7 @@ Message = tuple[str, str, float, dict[str, Any]]
 
 @dataclass(frozen=True, repr=False)
 class Recording(DisplayMixin):
-    """What was written."""
+    """Summary of a recording file."""
 
     path: Path
     """The file."""
@@ -59,7 +59,7 @@ class Recording(DisplayMixin):
     """Number of messages by topic."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum export run.nc run.mcap --json`."""
+        """Content of `spirillum export run.nc run.mcap --json`."""
         content = {
             "robot": self.robot.name,
             "file": str(self.path),
@@ -228,10 +228,10 @@ def _events(dataset: xr.Dataset) -> Iterator[Message]:
 
 
 def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[Message]:
-    """Frames of a film while the run lasts."""
+    """Frames of a video during the run."""
     from spirillum.vision.video.frames import open_video
 
-    pictures = import_optional("PIL.Image", "a film in a recording", "video")
+    pictures = import_optional("PIL.Image", "a video in a recording", "video")
     for frame in open_video(film).frames():
         time = start + speed * frame.time
         if time > end + 1e-9:

@@ -119,11 +119,11 @@ class ExportFile(NamedTuple):
     data: bytes
     """Its bytes."""
     holds: str
-    """What it holds, in words."""
+    """Description of the content."""
 
 
 def check_masses(robot: Robot, target: Path) -> None:
-    """The masses that a robot description needs are known."""
+    """Require the masses that a robot description needs."""
     for table, name in (("body", "mass"), ("tail", "density")):
         if getattr(getattr(robot, table), name) is None:
             raise InputError(
@@ -210,21 +210,21 @@ class Written:
     """One file that was written."""
 
     path: Path
-    """Where it lies."""
+    """Path of the file."""
     holds: str
-    """What it holds, in words."""
+    """Description of the content."""
 
 
 @dataclass(frozen=True, repr=False)
 class Export(DisplayMixin):
-    """What was written, and the numbers of its geometry."""
+    """Summary of the exported files and their geometry."""
 
     robot: Robot
     """The robot."""
     phase: float
     """Phase of the tail, rad."""
     files: tuple[Written, ...]
-    """Files, the asked one first."""
+    """Files, the requested one first."""
     pieces: tuple[RobotMesh, ...]
     """Pieces of the robot, before they were joined or coloured."""
     links: Links
@@ -237,7 +237,7 @@ class Export(DisplayMixin):
     """Of an FMU: the equations in it."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum export --json`."""
+        """Content of `spirillum export --json`."""
         content: dict[str, Any] = {
             "robot": self.robot.name,
             "phase": quantity(self.phase, "rad"),
@@ -282,7 +282,7 @@ def export(
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> Export:
-    """Write the robot for another program; the ending of the file says for which.
+    """Export the robot for another program, selected by the ending of the file.
 
     `.stl` is one closed body for a printer, `.glb` a coloured scene, `.vtp` a surface for ParaView. `.urdf` and
     `.mjcf` (or `.xml`) are descriptions of two links with mesh files beside them in a folder `<name>-meshes`, and
@@ -386,7 +386,7 @@ def _equations(axial: AxialRobot) -> dict[str, Any]:
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:
-    """Make all files, then put them in place; the target itself comes last, so that what it refers to is there."""
+    """Write all files and rename them at the end; the target comes last, so that the files it refers to exist."""
     target = target.resolve()
     final = {target if name == target.name else target.parent / name: data for name, data in contents.items()}
     for folder in dict.fromkeys(path.parent for path in final):

@@ -67,7 +67,7 @@ class Flow(DisplayMixin):
     At a moment of a free run: weight, contact and a field; NaN where it is drawn `lifted`.
     """
     lifted: float = 0.0
-    """How much further off the wall than at that moment of its run a robot on a thin film is drawn, m."""
+    """Increase of the wall distance for the flow around a robot on a thin lubrication film in a run, m."""
 
     @property
     def robot(self) -> Robot:
@@ -76,7 +76,7 @@ class Flow(DisplayMixin):
 
     @property
     def seat(self) -> Seat | None:
-        """The tube and where in it the robot lies; None for unbounded fluid."""
+        """The tube and the robot's pose in it; None for unbounded fluid."""
         return _seat(self.prediction)
 
     @property
@@ -118,7 +118,7 @@ class Flow(DisplayMixin):
         return replace(self, held_force=float(np.linalg.norm(sideways)))
 
     def inside(self, points: Samples) -> np.ndarray:
-        """Whether each point lies inside body, coupling or tail, or outside the tube, (n,).
+        """Whether each point is inside body, coupling or tail, or outside the tube, (n,).
 
         Args:
             points: (n, 3), m.
@@ -310,7 +310,7 @@ def seat_in_tube(
     placement: Placement | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> Seat | None:
-    """The tube and where in it a robot will lie, before anything is solved; None with the model `slender`.
+    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`.
 
     Args:
         robot: the robot.
@@ -351,7 +351,7 @@ def box_around(
 
 
 def _attributes(flow: Flow) -> dict[str, Any]:
-    """How the flow came about, in what a file can hold."""
+    """Provenance of the flow, as attributes of a file."""
     motion = flow.prediction
     return {
         "title": f"Flow around {motion.robot.name}",

@@ -1,4 +1,4 @@
-"""The flow on planes and boxes as an answer: extremes with their places, flow rates, grids."""
+"""Summary of the flow on planes and boxes: extremes with their positions, flow rates, grids."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def flow_rate(plane: xr.Dataset) -> float:
 
 
 def extremes(dataset: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    """Largest speed, lowest and highest pressure on a grid, with their places; nothing where all of it is solid."""
+    """Largest speed, lowest and highest pressure on a grid, with their positions; empty if all of it is solid."""
     parts = [dataset[f"velocity_{axis}"] ** 2 for axis in "xyz"]
     speed = (parts[0] + parts[1] + parts[2]) ** 0.5
     if not bool(np.isfinite(speed).any()):

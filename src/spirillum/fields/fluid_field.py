@@ -27,7 +27,7 @@ class FluidField(ABC):
 
     @abstractmethod
     def part_at(self, points: Samples) -> np.ndarray:
-        """Name of the part in which each point lies, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
+        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
 
         Args:
             points: (n, 3), m.
@@ -46,7 +46,7 @@ class FluidField(ABC):
         """Force (N) and torque about the origin (N m) that hold the whole robot to its motion, body axes, (6,)."""
 
     def inside(self, points: Samples) -> np.ndarray:
-        """Whether each of the points (n, 3) lies inside a solid or outside the tube, (n,)."""
+        """Whether each of the points (n, 3) is inside a solid or outside the tube, (n,)."""
         return np.asarray(self.part_at(points) != "")
 
     def velocity(self, points: Samples) -> Samples:
@@ -72,7 +72,7 @@ class FluidField(ABC):
         return self.fields(points)[1]
 
     def in_fluid(self, points: Samples) -> Samples:
-        """Points that lie in the fluid, (n, 3).
+        """Return the points (n, 3) if they are all in the fluid.
 
         Raises:
             InputError: if one of them does not, or as `checked_points`.
@@ -82,7 +82,7 @@ class FluidField(ABC):
         if np.any(names != ""):
             first = int(np.argmax(names != ""))
             at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
-            raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
+            raise InputError(f"point {first} = ({at}) mm is inside the {names[first]}; allowed: points in the fluid")
         return places
 
 
@@ -95,7 +95,7 @@ def checked_points(points: Samples) -> Samples:
     if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
         raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
     if np.any(np.abs(places) > _FARTHEST):
-        raise InputError(f"points lie farther away than {_FARTHEST:g} m; allowed: nearer ones")
+        raise InputError(f"points are farther away than {_FARTHEST:g} m; allowed: nearer ones")
     return np.ascontiguousarray(places)
 
 

@@ -32,7 +32,7 @@ _WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
 
 @dataclass(frozen=True)
 class PointGrid:
-    """Evenly spaced points along x, y, z, m; an axis with one point is the place of a plane."""
+    """Evenly spaced points along x, y, z, m; an axis with one point is the position of a plane."""
 
     axes: tuple[Samples, Samples, Samples]
     """Coordinates along x, y, z."""
@@ -73,7 +73,7 @@ def plane_grid(
         low, high = _glass(box["x"], seat, seat.radius)[across]
         if not low < offset < high:
             raise InputError(
-                f"offset = {show(offset, 'mm')} with plane = '{plane}': the plane lies outside the tube; allowed: "
+                f"offset = {show(offset, 'mm')} with plane = '{plane}': the plane is outside the tube; allowed: "
                 f"between {show(low, 'mm')} and {show(high, 'mm')}"
             )
     sides = {axis: side for axis, side in box.items() if axis in plane}
@@ -211,7 +211,7 @@ def dataset_on(
         for place, (name, (unit, meaning)) in enumerate(columns.items())
     }
     solids = "body, coupling or tail" if seat is None else "body, coupling or tail, or outside the tube"
-    meaning = f"whether the point lies inside {solids}"
+    meaning = f"whether the point is inside {solids}"
     data["inside"] = (dims, solid.reshape(shape), {"units": "1", "long_name": meaning})
     return xr.Dataset(data, coords=dict(_coordinates(grid)))
 

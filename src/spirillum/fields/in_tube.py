@@ -35,9 +35,9 @@ _TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _FADE = 1.25
 """Steepest wave over that which matters: between them waves are faded out."""
 _CANCEL = 4.0
-"""How many times that range away forces are whose faded waves cancel."""
+"""Multiple of that range beyond which the waves of forces cancel."""
 _SHARES = 8
-"""Waves that come one after the other go to as many cores: flat ones cost most."""
+"""Consecutive waves are distributed over the cores: flat ones cost most."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class TubeFlowField(FluidField):
     held: Held = field(repr=False)
     """Tractions for unit motions, at this phase, viscosity 1."""
     seat: Seat
-    """The tube, and where in it the robot lies."""
+    """The tube and the robot's pose in it."""
     solids: tuple[tuple[str, Outline], ...]
     """Names and outlines of the solids of revolution."""
     twists: Samples
@@ -169,14 +169,14 @@ class _Sources(NamedTuple):
 
 @dataclass(frozen=True)
 class _Reflection:
-    """What the wall reflects: waves and their amplitudes, see `kernels.tube_field`."""
+    """Reflection at the wall: waves and their amplitudes, see `kernels.tube_field`."""
 
     radius: float
     """Of the tube, m."""
     waves: tuple[Samples, np.ndarray]
     """k, 1/m, and number of orders p of each."""
     classes: tuple[tuple[float, Any], ...]
-    """Smallest distance from the wall of some of the forces, m, twice that of those before, and a tree of their places.
+    """Smallest distance from the wall of a group of forces, m, twice that of the previous, and a tree of positions.
     """
     cut: float
     """Waves that are damped by exp(-cut) no longer matter."""
@@ -268,7 +268,7 @@ def _classes(columns: Sequence[_Sources], radius: float) -> tuple[tuple[float, A
 
 
 def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: float) -> Iterator[_Sources]:
-    """Point forces that stand for the tractions, and those along the wires."""
+    """Point forces equivalent to the tractions, and those along the wires."""
     seat = strengths.solids.seat
     if strengths.wires:
         points = seat.placed(np.concatenate([wire.points for wire in strengths.wires]))

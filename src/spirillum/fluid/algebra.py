@@ -62,7 +62,7 @@ def rotated(matrix: Matrix6, rotation: Tensors) -> Matrix6:
 
 
 def both_parts(body: Matrix6, rotor: Matrix6) -> Matrix12:
-    """The 12x12 of two parts that do not feel each other."""
+    """The 12x12 of two parts without hydrodynamic interaction."""
     body, rotor = np.broadcast_arrays(body, rotor)
     r = np.zeros((*body.shape[:-2], 12, 12))
     r[..., :6, :6] = body
@@ -81,7 +81,7 @@ def axial_entries(matrix: Matrix12) -> Axial:
 
 
 def two_parts_axial(body: tuple[PerRobot, PerRobot, PerRobot], rotor: tuple[PerRobot, PerRobot, PerRobot]) -> Axial:
-    """The axial 4x4 of two parts that do not feel each other, from (B11, B14, B44) of each."""
+    """The axial 4x4 of two parts without hydrodynamic interaction, from (B11, B14, B44) of each."""
     size = np.broadcast_shapes(*(np.shape(entry) for entry in (*body, *rotor)))
     r = np.zeros((*size, 4, 4))
     for first, (drag, coupling, rotation) in ((0, body), (2, rotor)):

@@ -1,4 +1,4 @@
-"""The one question that every hydrodynamic model answers.
+"""Interface of the hydrodynamic models.
 
 A model maps the twists of the two rigid parts, body and rotor, to the wrenches that the fluid exerts:
 (F_body, F_rotor) = -R (V_body, V_rotor), twists about the origin in body axes, R symmetric positive
@@ -33,26 +33,26 @@ class ResistanceModel(ABC):
     references: ClassVar[tuple[str, ...]]
     """Keys of its references, see `spirillum.citation`."""
     known_error: ClassVar[str]
-    """What it leaves out, and what that costs."""
+    """Neglected effects and their cost."""
     parts: ClassVar[tuple[str, ...]]
     """Parts whose matrix it can give."""
     closed_form: ClassVar[bool] = True
     """False for a model that solves for the flow, which takes a tenth of a second for each robot."""
     axial_only: ClassVar[bool] = False
-    """True where only the entries along and about the motor axis are known; the others are NaN."""
+    """True if the model gives only the entries along and about the motor axis; the others are NaN."""
     form: ClassVar[str | None] = None
-    """How the answer is found, for a model that has more than one way."""
+    """Solution method, for a model that has more than one."""
     error_against: ClassVar[str | None] = None
-    """What the error estimate comes from, where that is not another resolution."""
+    """Basis of the error estimate, if that is not another resolution."""
     placed: ClassVar[bool] = False
-    """Whether the answer depends on where in the channel the robot lies, `batch.placement`."""
+    """Whether the result depends on the pose in the channel, `batch.placement`."""
 
     def stated_error(self, options: ModelOptions) -> str:
-        """What the model leaves out with these options, and what that costs."""
+        """Neglected effects with these options, and their cost."""
         return self.known_error
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """What the model leaves out of a robot, and what that costs it.
+        """Neglected effects for a robot, and their cost.
 
         Args:
             batch: one robot.
@@ -62,7 +62,7 @@ class ResistanceModel(ABC):
 
     @abstractmethod
     def domain(self, batch: RobotBatch) -> list[Limit]:
-        """Requirements of the theory: outside them an answer is NaN in a batch and an `InputError` alone."""
+        """Requirements of the theory: if violated, the result is NaN in a batch and an `InputError` for one robot."""
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """Requirements on one part alone: those of the tail do not matter to body and coupling."""
@@ -80,11 +80,11 @@ class ResistanceModel(ABC):
             raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
-        """Requirements of the theory's accuracy: where they are broken, the answer carries a warning."""
+        """Requirements of the theory's accuracy: if violated, the result carries a warning."""
         return []
 
     def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
-        """Where the model places robots like the first of the batch: `kind` in words, and quantities."""
+        """Assumed pose of robots like the first of the batch: `kind` in words, and quantities."""
         return {"kind": "unbounded fluid"}
 
     @abstractmethod
@@ -102,7 +102,7 @@ class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
     known_speed_error: ClassVar[float | None] = None
-    """Relative error of the speed of a reference robot, see `docs/accuracy.md`; None where none is known."""
+    """Relative error of the speed of a reference robot, see `docs/accuracy.md`; None if there is no reference."""
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """This model at other resolutions, each of which differs from the one before in one respect.
@@ -113,11 +113,11 @@ class SwimmerModel(ResistanceModel):
         return ()
 
     def unchecked_error(self, batch: RobotBatch) -> float:
-        """Relative error of the forward velocity that the models of `checked_by` share, as far as it is known."""
+        """Relative error of the forward velocity that the models of `checked_by` share, where it is estimated."""
         return 0.0
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
-        """Relative error of the forward velocity at these places: the sum of what is known; NaN without a check."""
+        """Relative error of the forward velocity at these poses: the sum of the estimates; NaN without a check."""
         return float("nan")
 
     @abstractmethod

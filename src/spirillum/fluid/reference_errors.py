@@ -24,9 +24,9 @@ from spirillum.robot.batch import RobotBatch
 
 _WIRE, _LENGTH, _TAPER = 1.0, 60.0, 100.0  # mm, mm, c of the envelope
 _SHAPE = ("wavelength over amplitude", "wire diameter over amplitude", "length over amplitude", "mean envelope")
-"""What the errors of a tail depend on."""
+"""Parameters of the tail on which its errors depend."""
 _RESOLVED = 2
-"""How many of them the resolved tails resolve: all are 60 wire diameters long and have one taper."""
+"""Number of parameters that the reference tails vary: all are 60 wire diameters long and have one taper."""
 _SAME = 1e-6
 """Distance below which a tail is a resolved one, to rounding error."""
 
@@ -114,12 +114,12 @@ def speed_note(model: str) -> str:
 
 
 def what_is_fitted(fitted_by: str) -> str:
-    """What an answer has from observations, in half a sentence."""
+    """Clause on the fitted part of a result."""
     return f"what {fitted_by} has fitted is taken from it" if fitted_by else "nothing is fitted"
 
 
 def walls_left_out(batch: RobotBatch) -> str:
-    """That the walls of a robot's channel are left out, after a semicolon; empty for a robot without one."""
+    """Clause on neglected walls of a robot's channel, after a semicolon; empty without a channel."""
     return "; the walls of its channel are not computed" if math.isfinite(float(batch.channel_diameter[0])) else ""
 
 

@@ -35,7 +35,7 @@ def find_swimmer_model(name: str, *more: str) -> SwimmerModel:
 
 
 def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
-    """The form of a model that answers first: `tube` from tables where they are, unless a resolution is asked for."""
+    """Return the fastest variant of a model: `tube` from tables where available, unless a resolution is requested."""
     options = batch.options.tube
     if not isinstance(model, Tube) or options.form == "direct":
         return model
@@ -48,14 +48,14 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
     found = None if resolved else tabled(batch)
     if found is None and options.form == "table":
         raise InputError(
-            "model.tube.form = 'table': there is no table of this robot in this tube that holds at this place; "
+            "model.tube.form = 'table': no table of this robot in this tube covers this pose; "
             "allowed: 'direct', or after `spirillum prepare`"
         )
     return found or model
 
 
 def check_placement(placement: Placement, *models: ResistanceModel) -> None:
-    """Refuse a placement in the channel that none of the models asks for."""
+    """Refuse a placement in the channel that none of the models uses."""
     if not placement.is_given or any(model.placed for model in models):
         return
     unset = type(placement)()

@@ -46,7 +46,7 @@ class Resistance(DisplayMixin):
     phase: float
     """Phase of the tail, rad."""
     placement: dict[str, Any]
-    """Where the model places the robot."""
+    """Assumed pose of the robot."""
     matrix: Samples
     """B, 6x6, or 12x12 for body and rotor in this order, SI; NaN where the model does not know an entry."""
     warnings: tuple[Note, ...]
@@ -65,7 +65,7 @@ class Resistance(DisplayMixin):
         return f"{super().__str__()}\nmatrix, SI (forces N, torques N m, over m/s and rad/s):\n{rows}"
 
     def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum resistance --json`."""
+        """Content of `spirillum resistance --json`."""
         count = len(self.matrix) // 6
         units = [row * count for row in _UNITS] * count
         content = {

@@ -1,4 +1,4 @@
-"""What can be taken away from the page: the robot file, the lines that give the same numbers, the run as one file."""
+"""Downloads of the page: the robot file, commands that give the same numbers, the run as one file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def asset(name: str) -> str:
 
 
 def robot_file(lane: PageRobot) -> str:
-    """The robot as it stands, as the text of a robot file."""
+    """Text of a robot file of the current robot."""
     return robot_text(lane.predicted(), f"From the page of spirillum {own_version()}.")
 
 
@@ -46,7 +46,7 @@ def command_line(lane: PageRobot) -> str:
 
 
 def python_lines(lane: PageRobot) -> str:
-    """Lines of Python that give the numbers of a lane, by `predict` and `simulate`."""
+    """Lines of Python that give the numbers of a robot of the page, by `predict` and `simulate`."""
     settings, model = lane.told(), _model(lane)
     overrides = ", ".join(f"{field!r}: {value!r}" for field, value in _overrides(settings).items())
     placed = _placed(settings, model)
@@ -70,7 +70,7 @@ def _source(settings: Settings) -> str:
 
 
 def _overrides(settings: Settings) -> dict[str, str]:
-    """Fields that are set beside the robot's own: those of a robot file of the page stand in it."""
+    """Overridden fields of the robot, except those that a robot file of the page contains."""
     return dict(settings.overrides) if isinstance(settings.source, str) else {}
 
 

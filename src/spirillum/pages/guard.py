@@ -88,14 +88,14 @@ HEADERS: Mapping[str, str] = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Headers of every answer."""
+"""Headers of every response."""
 LARGEST_MESSAGE = 4096
 """Bytes of a message from a client."""
 _KEY_BYTES = 24
 
 
 class Guard:
-    """What a request has to show."""
+    """Checks of a request's credentials."""
 
     def __init__(self, host: str, port: int) -> None:
         """A new key."""

@@ -49,11 +49,11 @@ async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _A
 
 
 Tell = Callable[..., None]
-"""Called with what is told, by name."""
+"""Callback of progress messages, by name."""
 
 
 class BackgroundJob:
-    """A module at work: what it told last, and whether it goes on."""
+    """Running module: its last progress message, and its state."""
 
     def __init__(self, module: str, request: Mapping[str, Any], tell: Callable[[], None] = lambda: None) -> None:
         """Begin."""
@@ -71,11 +71,11 @@ class BackgroundJob:
 
     @property
     def running(self) -> bool:
-        """Whether it still goes on."""
+        """Whether it is still running."""
         return self._thread.is_alive()
 
     def progress(self) -> dict[str, Any]:
-        """What is being done, `done_places` of `places`; `done`, or `failed` with a sentence, at the end."""
+        """Current stage, `done_places` of `places`; `done`, or `failed` with a sentence, at the end."""
         return dict(self._said)
 
     def stop(self) -> None:
@@ -100,7 +100,7 @@ class BackgroundJob:
 
 
 def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
-    """Do what standard input asks for, and tell how it goes.
+    """Run the task of standard input and report its progress.
 
     The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
     """

@@ -17,11 +17,11 @@ from spirillum.robot.toml_writer import robot_text
 from spirillum.units import KINDS, parse_option, parse_quantity
 
 _SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
-"""What a sentence about a field says of where the robot comes from: here it stands at the knob."""
+"""Reference to the robot in messages about a field, which the page shows at the knob."""
 
 
 def robot_tables(source: Any) -> dict[str, Any]:
-    """A robot as its tables, which fields can be laid over, and which no longer depend on a file."""
+    """A robot as its tables, which can be overridden and do not depend on a file."""
     import tomllib
 
     return tomllib.loads(robot_text(load(source)))
@@ -42,7 +42,7 @@ def text_of(command: Mapping[str, Any], name: str, unset: str | None = None) -> 
 
 
 def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
-    """The number that a command asks for, within limits."""
+    """The number in a command, within limits."""
     value = command.get("value")
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
         raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
@@ -50,13 +50,13 @@ def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
 
 
 def report_fault(error: BaseException) -> None:
-    """Print the traceback of an internal error in a thread or process that goes on; the client gets a sentence."""
+    """Print the traceback of an internal error in a running thread or process; the client gets a sentence."""
     if not isinstance(error, (InputError, MemoryError)):
         traceback.print_exception(error)
 
 
 def refusal_of(command: Mapping[str, Any], sentence: str) -> str:
-    """What a client is sent whose command cannot be followed, JSON."""
+    """Response to an invalid command, JSON."""
     name = str(command.get("field") or command.get("do") or "")[:60]
     sentence = _SOURCE.sub("", sentence)
     return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})
@@ -73,22 +73,22 @@ class Knob:
     field: str
     """Dotted field of the robot file, or of the run (`run.gap`)."""
     label: str
-    """In words."""
+    """Text of the value."""
     group: str
-    """Heading under which it stands."""
+    """Heading of its group."""
     unit: str = ""
     """Unit in which it is shown; empty for a choice."""
     low: float = 0.0
     """Ends of its slider, in that unit; a value outside them can be typed."""
     high: float = 1.0
     choices: tuple[str, ...] = ()
-    """What can be chosen, for a choice."""
+    """Options of a choice."""
     note: str = ""
-    """What it means, in a sentence."""
+    """Description, a sentence."""
     logarithmic: bool = False
     """Whether its slider has equal steps of ratio."""
     unset: str = ""
-    """What an empty field means; empty: it has to have a value."""
+    """Meaning of an empty field; empty: a value is required."""
     needs: str = ""
     """Table of the robot without which it is not shown."""
 
@@ -128,15 +128,15 @@ KNOBS: tuple[Knob, ...] = (
     Knob("run.flow", "Flow", "Surroundings", "mm/s", -3.0, 3.0, unset="none", needs="channel",
          note="Mean flow imposed through the tube, along +x. Changes while the robot swims."),
     Knob("run.gap", "Gap", "Start", "mm", 0.05, 5.0, unset="reference", logarithmic=True, needs="channel",
-         note="Distance of body and glass where the robot is laid down."),
+         note="Initial gap between body and wall."),
     Knob("run.pitch", "Pitch", "Start", "deg", -3.0, 3.0, unset="level",
-         note="Angle by which the nose is raised where it is laid down."),
+         note="Initial angle by which the nose is raised."),
     Knob("magnetic.field", "Field", "Drive", "mT", 0.1, 10.0, needs="magnetic", logarithmic=True,
          note="Flux density of the rotating field."),
     Knob("magnetic.rotation_rate", "Field rate", "Drive", "Hz", 0.1, 10.0, needs="magnetic", logarithmic=True,
          note="Rate at which the field turns."),
 )  # fmt: skip
-"""All knobs, in their order; the model, the remote and the duty stand apart."""
+"""All knobs, in their order, without the model, the remote and the duty."""
 
 MODELS = ("auto", "tube", "slender", "rft")
 """Models that can move a free robot."""
@@ -146,7 +146,7 @@ _RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 
 @dataclass(frozen=True)
 class Settings:
-    """What is set on one robot of the page; frozen, so that undo is a list of them."""
+    """Settings of one robot of the page; frozen, so that undo is a list of them."""
 
     source: Any
     """Preset's name, file or checked robot that it starts from."""
@@ -155,14 +155,14 @@ class Settings:
     run: Mapping[str, str] = field(default_factory=dict)
     """`gap`, `pitch`, `flow` where they are set, with their unit."""
     model: str = "auto"
-    """Model that was asked for."""
+    """Requested model."""
 
     def robot(self) -> Robot:
         """The robot, checked."""
         return load(self.source, **self.overrides)
 
     def placement(self) -> Placement:
-        """Where it is laid down."""
+        """Initial placement."""
         return Placement.of(dict(self.run))
 
     def changed(self, name: str, value: str) -> Settings:

@@ -1,4 +1,4 @@
-"""Addresses of the bench: films and texts come in, pictures, state and results go out; no name becomes a path."""
+"""Routes of the measurement page: uploads of videos and texts, pictures, state and results; no name becomes a path."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _Handler = Callable[[Request], Awaitable[Response]]
 
 
 class _Doors:
-    """What the addresses do."""
+    """Handlers of the routes."""
 
     def __init__(self, bench: MeasurementSession, theatre: SimulationThread, uploads: Uploads) -> None:
         self._bench, self._theatre, self._uploads = bench, theatre, uploads
@@ -50,7 +50,7 @@ class _Doors:
         }
 
     def answering(self, act: Callable[[Mapping[str, Any]], Any]) -> _Handler:
-        """A handler of a message in JSON, which answers with what came of it and with the whole state."""
+        """Handler of a JSON message; responds with the outcome and the whole state."""
 
         async def handle(request: Request) -> Response:
             async with self._uploads.received(request, LARGEST_TEXT) as content:
@@ -110,7 +110,7 @@ class _Doors:
 
 
 def bench_routes(bench: MeasurementSession, theatre: SimulationThread, uploads: Uploads) -> list[Route]:
-    """The routes of the bench."""
+    """Routes of the measurement page."""
     doors = _Doors(bench, theatre, uploads)
     return [
         *[Route(f"/bench/{name}", doors.answering(act), methods=["POST"]) for name, act in doors.acts.items()],

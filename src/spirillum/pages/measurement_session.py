@@ -1,4 +1,4 @@
-"""The bench of the page: films that were dropped, their setup, and what is measured and calibrated.
+"""Measurement session of the page: uploaded videos, their setup, measurement and calibration.
 
 All files lie in one temporary folder, under names that the page gives, and are removed with it.
 """
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 ROBOT_FILE, _SETUP = "robot.toml", "setup.toml"
 _START: Mapping[str, Any] = {"robot.file": "biorob2012-wide", "robot.direction": "right", "camera.view": "top"}
 _SIZE_APART = 0.06
-"""Relative difference of a clicked body's length from that of its file which is told."""
+"""Relative difference between a clicked body's length and that of its file above which it is reported."""
 _MOST_STILLS = 4
 
 
 class SetupEditor:
-    """The setup of some films; its methods may be called from any thread."""
+    """Setup of some videos; its methods are thread-safe."""
 
     def __init__(self, folder: Path, films: VideoStore) -> None:
-        """Nothing is known yet."""
+        """Start without a setup."""
         self._folder, self._films = folder, films
         self._lock = threading.RLock()
         self._fields: dict[str, Any] = dict(_START)
@@ -90,11 +90,11 @@ class SetupEditor:
             return setup_file(self._fields)
 
     def robot_text(self) -> str:
-        """The robot file as it stands."""
+        """Text of the robot file."""
         return robot_text(self._robot())
 
     def fields(self) -> dict[str, Any]:
-        """The fields as they stand."""
+        """Values of the fields."""
         with self._lock:
             return dict(self._fields)
 
@@ -122,7 +122,7 @@ class SetupEditor:
         }
 
     def written(self) -> Path:
-        """The setup file, written as it stands."""
+        """Write the setup file."""
         path = self._folder / _SETUP
         path.write_text(self.setup_text(), encoding="utf-8")
         return path
@@ -179,7 +179,7 @@ class SetupEditor:
         if missing:
             raise InputError(
                 "no ruler of equally spaced lines is seen, so that the marks give a length per pixel: the heights "
-                f"({', '.join(missing)}) have to stand in the form first"
+                f"({', '.join(missing)}) have to be set in the form first"
             )
         heights = {name: parse_option(name, self._fields[name], KINDS["length or zero"]) for name in needed}
         surface, index = self._fields.get("tank.surface"), self._fields.get("tank.index", 1.4)
@@ -199,7 +199,7 @@ class SetupEditor:
         return f"no ruler of equally spaced lines is seen: {1e3 * scale:.4g} mm a pixel at the robot's axis"
 
     def _still(self, name: str) -> Samples:
-        """The static background of a film; the last ones are kept."""
+        """The static background of a video; the last ones are cached."""
         from spirillum.vision.camera.camera import samples_of
         from spirillum.vision.camera.ruler import still_picture
 
@@ -223,7 +223,7 @@ class SetupEditor:
         return lines_in(still, (0, 0, still.shape[1], still.shape[0]))
 
     def _size_seen(self, name: str, nose: tuple[float, float], rear: tuple[float, float]) -> str:
-        """How long the clicked body is, over that of its file, where the setup is whole and that is far from 1."""
+        """Clicked length of the body over that of its file, if the setup is complete and the ratio is far from 1."""
         if self.checked()["problems"]:
             return ""
         scale = self._sight(name).scale.length_per_pixel
@@ -254,7 +254,7 @@ class SetupEditor:
         return [{"name": one.name, "sentence": one.sentence, "confidence": one.confidence} for one in found]
 
     def look(self, name: str) -> dict[str, Any]:
-        """What a first look at a film finds: the strips of its ruler, and with a whole setup its scale."""
+        """Initial detection in a video: the strips of its ruler, and with a complete setup its scale."""
         import numpy as np
 
         lines = self._lines(name)
@@ -274,10 +274,10 @@ _MODELS = (AUTO, *CALIBRATED, WALLED)
 
 
 class MeasurementSession:
-    """Films, setup and results; its methods may be called from any thread."""
+    """Videos, setup and results; its methods are thread-safe."""
 
     def __init__(self) -> None:
-        """An empty bench."""
+        """Start without videos."""
         self._kept = ExitStack()
         self._folder = self._kept.enter_context(scratch_folder())
         atexit.register(self._kept.close)  # where the process ends before it has served
@@ -295,11 +295,11 @@ class MeasurementSession:
         self._kept.close()
 
     def measure(self) -> None:
-        """Begin to measure all films."""
+        """Start to measure all videos."""
         with self._lock:
             films = [str(path) for path in self.films.paths()]
             if not films:
-                raise InputError("no film is here; allowed: one at least")
+                raise InputError("no video is uploaded; allowed: at least one")
             problems = self.desk.checked()["problems"]
             if problems:
                 raise InputError(problems[0])
@@ -351,7 +351,7 @@ class MeasurementSession:
             self._job.stop()
 
     def state(self) -> dict[str, Any]:
-        """All of the bench, for the page."""
+        """State of the session, for the page."""
         with self._lock:
             job = self._progress()
             return {

@@ -1,4 +1,4 @@
-"""Films measured, or their observations calibrated, in a process of its own; run by `spirillum.pages.job`."""
+"""Measurement of videos, or calibration, in a process of its own; run by `spirillum.pages.job`."""
 
 from __future__ import annotations
 

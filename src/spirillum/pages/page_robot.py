@@ -37,7 +37,7 @@ _FASTEST = 0.98
 
 
 class Flowing(BackgroundJob):
-    """A flow on its way, and the plane once it is there."""
+    """Pending or completed computation of a flow plane."""
 
     def __init__(
         self, robot: Robot, model: str, run: Mapping[str, str], phase: float, tell: Callable[[], None]
@@ -55,13 +55,13 @@ class Flowing(BackgroundJob):
         super().__init__(__name__, asked, tell)
 
     def told(self) -> dict[str, Any]:
-        """How it goes, without the plane itself."""
+        """Progress, without the plane itself."""
         said = self.progress()
         return {name: said[name] for name in ("what", "failed", "done") if name in said}
 
 
 def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
-    """A plane of the flow as the page draws it: velocities along x and z in rows of rising z, m/s, NaN in solids.
+    """Flow plane for the page: velocities along x and z in rows of rising z, m/s, NaN in solids.
 
     Args:
         plane: what `Flow.plane` returns for `xz`.
@@ -110,7 +110,7 @@ _MOST_UNDO = 200
 
 
 _Shape = tuple[Any, dict[str, Any]]
-"""What decides a shape, and the shape."""
+"""Parameters of a shape, and the shape."""
 
 
 def _shaped(robot: Robot, before: _Shape | None) -> _Shape:
@@ -121,7 +121,7 @@ def _shaped(robot: Robot, before: _Shape | None) -> _Shape:
 
 @dataclass(frozen=True)
 class Built:
-    """A robot laid down, by which model, and what to be careful about."""
+    """Released robot, its model, and its warnings."""
 
     plant: Plant
     model: str
@@ -175,7 +175,7 @@ class PageRobot:
     preparing: dict[str, Any] | None = None
     """Progress of a table that is being made."""
     flowing: Flowing | None = None
-    """The flow that is shown around it, or on its way."""
+    """Displayed or pending flow."""
     _undo: list[Settings] = field(default_factory=list)
     _redo: list[Settings] = field(default_factory=list)
     _last: tuple[str, float] = ("", 0.0)
@@ -183,7 +183,7 @@ class PageRobot:
 
     @classmethod
     def of(cls, source: Any) -> PageRobot:
-        """A lane that starts from a preset, a file or a robot."""
+        """Create a robot of the page from a preset, a file or a robot."""
         robot = load(source)
         own = robot.drive.duty if robot.drive is not None else 1.0
         return cls(Settings(source), robot, duty=own)
@@ -213,7 +213,7 @@ class PageRobot:
         self.void_numbers()
 
     def undo(self, *, forward: bool = False) -> None:
-        """Go one change back, or forward again."""
+        """Undo one change, or redo it."""
         source, target = (self._redo, self._undo) if forward else (self._undo, self._redo)
         if source:
             target.append(self.settings)
@@ -223,7 +223,7 @@ class PageRobot:
             self.start_anew()
 
     def start_anew(self) -> None:
-        """Forget the run; the robot is laid down again once it is built."""
+        """Discard the run; the robot is released again once it is built."""
         self.generation += 1
         self.built = self.moment = None
         self.trouble = ""
@@ -252,7 +252,7 @@ class PageRobot:
         self.flowing = None
 
     def take(self, built: Built) -> None:
-        """The robot is laid down."""
+        """Take over the released robot."""
         self.built, self.trouble = built, ""
         self.moment = built.plant.observe()
         self.recording = SampleRecording()
@@ -272,7 +272,7 @@ class PageRobot:
         self.recording.add(self.moment, duty)
 
     def flow(self, value: str) -> bool:
-        """Another flow while it swims; False where the robot has to be laid down anew for it."""
+        """Change the imposed flow in motion; False if the robot has to be released anew for it."""
         before = self.settings
         self.settings = self.settings.changed("run.flow", value)
         if self.built is None or self.built.model != "tube":
@@ -304,7 +304,7 @@ class PageRobot:
         self._last = (name, now)
 
     def predicted(self) -> Robot:
-        """The robot whose steady swimming is told: at the duty of the remote."""
+        """The robot of the displayed prediction: at the duty of the remote."""
         drive = self.robot.drive
         if drive is None or self.duty == drive.duty:
             return self.robot
@@ -317,7 +317,7 @@ class PageRobot:
         return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": f"{self.duty:.6g}"})
 
     def scene(self) -> dict[str, Any]:
-        """What changes when something is set: shape, knobs, model, prediction."""
+        """State that changes with settings: shape, knobs, model, prediction."""
         self._shape = _shaped(self.robot, self._shape)
         built = self.built
         return {
@@ -348,7 +348,7 @@ class PageRobot:
         }
 
     def frame(self) -> dict[str, Any]:
-        """What changes all the time: where it is, and its numbers; SI."""
+        """State that changes with time: pose and quantities; SI."""
         moment = self.moment
         if moment is None:
             return {"generation": self.generation, "ready": False}

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LARGEST_RUN = 64 << 20
 """Bytes of a run that is dropped on the page."""
 _MOST = 6_000
-"""Samples of a replay; of a longer run some are left out, which the replay says."""
+"""Samples of a replay; longer runs are thinned, which the replay states."""
 
 
 def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def replay_of_upload(content: bytes) -> dict[str, Any]:
 
 
 def replay_of_lane(lane: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
-    """What a robot of the page has done so far, to replay.
+    """Replay of a robot of the page up to now.
 
     Args:
         lane: the robot.
@@ -95,11 +95,11 @@ _LONGEST = 120.0
 """Length of a run that is simulated beside a trial, s."""
 _TURN = 2.0 * np.pi
 _FROM_START = (("distance", "mm", 1e3), ("tail turns", "", 1.0 / _TURN), ("body turns", "", 1.0 / _TURN))
-"""What is compared, counted from the first frame: label, unit, and factor from SI."""
+"""Compared curves, relative to the first frame: label, unit, and factor from SI."""
 
 
 def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
-    """A replay of the trial's robot as it is simulated, with the trial's film and curves.
+    """Replay of the trial's simulated robot, with the trial's video and curves.
 
     The simulated robot starts from rest with the first measured frame, with the tail as its file says.
     """
@@ -120,7 +120,7 @@ def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
 
 
 def compared_series(trial: xr.Dataset, run: xr.Dataset) -> list[dict[str, Any]]:
-    """Way and turns of the simulated and of the tracked robot, both counted from their first sample; SI."""
+    """Distance and turns of the simulated and of the tracked robot, both from their first sample; SI."""
     first = float(trial["time"][0])
     sources = zip(_FROM_START, _progress(run, "tail_angle"), _progress(trial, "tail_phase"), strict=True)
     found = []
@@ -131,7 +131,7 @@ def compared_series(trial: xr.Dataset, run: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def _progress(dataset: xr.Dataset, tail: str) -> list[Samples]:
-    """Distance along the channel, m, and angles of tail and body in the lab, rad, from the first known sample."""
+    """Distance along the channel, m, and angles of tail and body in the lab, rad, from the first finite sample."""
     columns = [dataset["position"].values[:, 0], dataset[tail].values, dataset["body_angle"].values]
     return [column - next(iter(column[np.isfinite(column)]), np.nan) for column in columns]
 

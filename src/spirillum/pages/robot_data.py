@@ -27,7 +27,7 @@ _CREASE = np.radians(40.0)
 """Edges sharper than this stay sharp."""
 _FINENESS = 0.75
 _ALONG = np.linspace(0.0, 1.0, 7)
-"""Places along each piece of the body's outline."""
+"""Positions along each piece of the body's outline."""
 _METALS = ("shaft", "coupling", "stub", "arm", "tail")
 
 
@@ -115,7 +115,7 @@ SERIES = (
     "contact_force",
     "mean_flow",
 )
-"""Quantities of a run that are shown or drawn over time."""
+"""Quantities of a run that are displayed or plotted over time."""
 
 _LABELS = {
     "forward_velocity": "velocity",
@@ -125,7 +125,7 @@ _LABELS = {
     "electrical_power": "power",
     "hydrodynamic_efficiency": "efficiency, fluid",
     "overall_efficiency": "efficiency, overall",
-    "wall_gap": "film under the body",
+    "wall_gap": "lubrication film under the body",
     "tail_gap": "gap of the tail",
     "contact_force": "load on asperities",
     "tail_rotation_rate": "tail rate",
@@ -184,7 +184,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
 
 
 def forces_of(prediction: Prediction) -> list[dict[str, Any]]:
-    """Forces on a robot in steady swimming, N, each with the part of the robot at which it is drawn.
+    """Forces on a robot in steady swimming, N, each with its point of attack on the robot.
 
     Weight less buoyancy is vertical, where masses are known.
     """
@@ -232,7 +232,7 @@ class SampleRecording:
         return len(self._rows)
 
     def add(self, moment: Snapshot, duty: float) -> None:
-        """Keep a moment."""
+        """Store a snapshot."""
         self._count += 1
         if self._count % self._every:
             return
@@ -258,7 +258,7 @@ class SampleRecording:
         }
 
     def past(self) -> dict[str, Any]:
-        """What plots need of it, thinned."""
+        """Thinned samples for plots."""
         whole = self.data()
         every = slice(None, None, max(1, math.ceil(len(self) / _DRAWN)))
         path = [place[1:] for place in whole["position"][every]]

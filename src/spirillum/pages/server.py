@@ -1,4 +1,4 @@
-"""The server: fixed addresses, one websocket, and the guard before both. Nothing that a client sends names a file."""
+"""Server: fixed routes, one websocket, and the guard before both. No client data names a file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _OWN = (
     "icon.svg",
     *MODULES,
 )
-"""The page's files; nothing else is served."""
+"""Files of the page; no others are served."""
 _MISSING = "the key is missing: open the address that `spirillum page` has printed"
 
 
@@ -82,7 +82,7 @@ class _Guarded:
         headers, guard = Headers(scope=scope), self._guard
         host, origin = headers.get("host", ""), headers.get("origin")
         if not guard.own_host(host):
-            return "this server is not the host that was asked for"
+            return "this server is not the requested host"
         if origin is not None and not guard.own_origin(origin, host):
             return "another page has no business here"
         if origin is None and (scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")):
@@ -106,7 +106,7 @@ def _with_headers(send: Send) -> Send:
 
 
 class _Client:
-    """One tab: it is sent the newest state, and what it asked for in vain."""
+    """One tab: receives the newest state, and refusals of its commands."""
 
     def __init__(self) -> None:
         self.news = asyncio.Event()
@@ -116,7 +116,7 @@ class _Client:
 
 
 class _House:
-    """The theatre and those who look."""
+    """Simulation thread and its clients."""
 
     def __init__(self, source: Any) -> None:
         self.theatre = SimulationThread(source, self._publish)
@@ -229,7 +229,7 @@ async def _tell(socket: WebSocket, client: _Client, theatre: SimulationThread) -
 
 
 def _heard(text: str, client: _Client, theatre: SimulationThread, loop: asyncio.AbstractEventLoop) -> None:
-    """Hand on what a client asks for, if it is an object of JSON."""
+    """Dispatch a client's command, if it is a JSON object."""
 
     def refuse(sentence: str) -> None:
         def note() -> None:
@@ -312,7 +312,7 @@ def _first(run: dict[str, Any] | None) -> Handler:
 
 
 def _study(theatre: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
-    """A study's dataset is dropped on the page, or with nothing in it the paper's is computed; its picture."""
+    """Picture of an uploaded study's dataset, or of the paper's."""
 
     def picture(content: bytes) -> dict[str, Any]:
         from spirillum.results.study import study
@@ -325,7 +325,7 @@ def _study(theatre: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
 
 
 def _sent(read: Callable[[bytes], Any], largest: int, uploads: Uploads) -> Handler:
-    """A file is sent, and comes back as what is read from it; one at a time, since small ones may declare much."""
+    """Process an upload and return its content; one at a time, since small files may declare much."""
     one = asyncio.Lock()
 
     async def serve(request: Request) -> Response:

@@ -22,7 +22,7 @@ class Entry:
     label: str
     group: str
     example: str
-    """What stands in it while it is empty: what it means then, or an example."""
+    """Placeholder of an empty field: its meaning, or an example."""
     note: str
     choices: tuple[str, ...] = ()
     number: bool = False
@@ -105,7 +105,7 @@ FORM: tuple[Entry, ...] = (
         "From",
         "Time",
         "the beginning",
-        "Time in the film from which on to measure, as when the robot has started up.",
+        "Start of the measurement in the video, such as the end of the start-up.",
     ),
     Entry("end", "Until", "Time", "the end", "Time until which to measure."),
     Entry(
@@ -113,11 +113,11 @@ FORM: tuple[Entry, ...] = (
         "Frame rate",
         "Time",
         "the film's own",
-        "Frames a second, instead of the film's own time stamps, as in slow motion.",
+        "Frames per second, instead of the video's time stamps, for slow motion.",
         number=True,
     ),
 )
-"""The fields of the form; the robot's file stands apart."""
+"""Fields of the form, without the robot's file."""
 
 _NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
 _KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}
@@ -129,7 +129,7 @@ def form_list() -> list[dict[str, Any]]:
 
 
 def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, Any]:
-    """Fields of a setup from what stands in the form, or in a file; empty ones are left out."""
+    """Fields of a setup from a form or a file, without empty ones."""
     found: dict[str, Any] = {}
     for name, value in given.items():
         if name != "robot.file" and name not in _KNOWN:

@@ -1,4 +1,4 @@
-"""The one thread that moves the robots, and what it tells: the newest state, as text that clients are sent."""
+"""Simulation thread: moves the robots and publishes the newest state as text for clients."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from spirillum.robot.toml_writer import robot_text
 
 
 class Preparing(BackgroundJob):
-    """A table on its way; places that were solved for are kept when it is left off."""
+    """Table in preparation; completed nodes are cached when it is cancelled."""
 
     def __init__(self, robot: Robot, tell: Callable[[], None]) -> None:
         """Begin."""
@@ -51,7 +51,7 @@ _PAUSE = 0.2
 """Rest of the thread of the simulation after a fault, s."""
 
 Command = tuple[Mapping[str, Any], Callable[[str], None]]
-"""What a client asks for, and where to say why not."""
+"""Command of a client, and the callback for its refusal."""
 
 
 class SimulationThread:
@@ -111,13 +111,13 @@ class SimulationThread:
             refuse(refusal_of(command, "the page is busy; allowed: fewer changes at once"))
 
     def look(self, watched: bool) -> None:  # noqa: FBT001 - one thing to say
-        """Whether anybody looks; the robots wait for who does."""
+        """Set whether there are clients; without one the simulation pauses."""
         if watched != self._looked_at:
             self._looked_at = watched
             self.ask({"do": "wake"}, lambda _text: None)
 
     def past(self) -> str:
-        """What the robots have done so far, for a client that comes later."""
+        """Past samples of the robots, for a new client."""
         with self._lock:
             lanes = [{"generation": lane.generation, **lane.recording.past()} for lane in self._lanes]
         return json.dumps({"t": "past", "lanes": lanes})
@@ -161,7 +161,7 @@ class SimulationThread:
                 self._ending.wait(_PAUSE)
 
     def _go_on(self, last: float) -> float:
-        """Listen, move and tell once; the time of the last motion, which is returned."""
+        """Process commands, move and publish once; return the time of the last motion."""
         moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
         changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
         now = time.perf_counter()
@@ -193,7 +193,7 @@ class SimulationThread:
         return all(lane.built is not None or lane.trouble for lane in self._lanes)
 
     def _listen(self, wait: float) -> bool:
-        """Do what is asked; wait for something to come if there is nothing."""
+        """Process pending commands; block if there is nothing to do."""
         changed = self._receive()
         try:
             item = self._inbox.get(timeout=max(wait, 0.0)) if wait > 0 else self._inbox.get_nowait()
@@ -290,7 +290,7 @@ class SimulationThread:
 
     def _prepare(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None and self._preparing.running:
-            raise InputError("a table is being made already; allowed: one at a time")
+            raise InputError("another table is being computed; allowed: one at a time")
         self._preparing = Preparing(lane.robot, self._wake_up)
 
     def _leave_off(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
@@ -364,7 +364,7 @@ class SimulationThread:
         return changed
 
     def _look_at_table(self, preparing: Preparing) -> bool:
-        """Tell the progress of a table at the robots that it is for; whether it has changed."""
+        """Publish the progress of a table to the robots that it is for; whether it has changed."""
         said, running = preparing.progress(), preparing.running
         before = [lane.preparing for lane in self._lanes]
         for index, lane in enumerate(self._lanes):

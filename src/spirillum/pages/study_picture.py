@@ -38,7 +38,7 @@ class StudyPicture:
             reading = next((name for name in _READINGS if name in readings), readings[0])
             speed = speed.sel(friction=reading)
         if set(speed.dims) != set(needed):
-            raise InputError(f"this study goes over {', '.join(map(str, speed.dims))}; allowed: {_WHAT}")
+            raise InputError(f"this study varies {', '.join(map(str, speed.dims))}; allowed: {_WHAT}")
         self._speed = speed.transpose(*needed)
         numbers = [self._speed, *(self._speed[name] for name in ("wavelength", "amplitude"))]
         if any(item.dtype.kind not in "fiu" for item in numbers) or not all(

@@ -30,7 +30,7 @@ def plain(sentence: str, folder: Path) -> str:
 
 @contextmanager
 def plain_names(folder: Path) -> Iterator[None]:
-    """What is wrong is said in such a sentence."""
+    """Remove the folder from the messages of errors."""
     try:
         yield
     except InputError as error:
@@ -38,7 +38,7 @@ def plain_names(folder: Path) -> Iterator[None]:
 
 
 _LARGEST_TOGETHER = 128 << 20
-"""Bytes of all files and messages that are held in memory at once. Films go to the disk."""
+"""Bytes of all files and messages that are in memory at once. Videos are written to the disk."""
 
 
 class TooLargeError(InputError):
@@ -57,7 +57,7 @@ class Uploads:
     """Files and messages from when they are announced until they are read; used by the server's one thread."""
 
     def __init__(self) -> None:
-        """Nothing is sent yet."""
+        """Start with an empty budget."""
         self._left = _LARGEST_TOGETHER
 
     @asynccontextmanager
@@ -83,9 +83,9 @@ class Uploads:
 
 
 _LARGEST_FILM = 4 << 30
-"""Bytes of one film."""
+"""Bytes of one video."""
 _LARGEST_ALL = 16 << 30
-"""Bytes of all films."""
+"""Bytes of all videos."""
 _MOST_FILMS = 50
 _SPARE = 512 << 20
 """Bytes that stay free on the disk."""
@@ -99,10 +99,10 @@ class _Film:
 
 
 class VideoStore:
-    """Films by the names of their trials; its methods may be called from any thread."""
+    """Videos by the names of their trials; its methods are thread-safe."""
 
     def __init__(self, folder: Path) -> None:
-        """No film yet."""
+        """Start without videos."""
         self._folder = folder
         self._lock = threading.RLock()
         self._decoding = threading.Lock()  # one film at a time: a frame of many pixels takes much memory
@@ -111,7 +111,7 @@ class VideoStore:
         self._count = 0
 
     def room_for(self, kind: str, size: int) -> Path:
-        """A place for a film that is sent: an empty file. It counts with all its bytes as long as it is there.
+        """Reserve an empty file for an upload; its declared bytes count while it exists.
 
         Raises:
             TooLargeError: for too large a film, too many, or a full disk.
@@ -127,12 +127,12 @@ class VideoStore:
             written = self._written()
             self._stated = {path: self._stated[path] for path in written}
             if len(written) >= _MOST_FILMS:
-                raise TooLargeError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+                raise TooLargeError(f"{_MOST_FILMS} videos are uploaded already; allowed: to remove some first")
             stated = sum(self._stated.values())
             free = shutil.disk_usage(self._folder).free - (stated - sum(written.values())) - _SPARE
             if size > min(_LARGEST_FILM, _LARGEST_ALL - stated, free):
-                limits = f"{_LARGEST_FILM >> 30} GB a film, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
-                raise TooLargeError(f"a film of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
+                limits = f"{_LARGEST_FILM >> 30} GB per video, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
+                raise TooLargeError(f"a video of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
             self._count += 1
             path = self._folder / f"trial-{self._count}.{kind}"
             path.touch()
@@ -140,7 +140,7 @@ class VideoStore:
             return path
 
     def _written(self) -> dict[Path, int]:
-        """The films that are here or on their way, with the bytes that have come."""
+        """Complete and incomplete videos, with their received bytes."""
         found = {}
         for path in self._stated:
             with suppress(FileNotFoundError):
@@ -148,7 +148,7 @@ class VideoStore:
         return found
 
     def add(self, path: Path) -> str:
-        """Take a film that was sent; its name."""
+        """Add an uploaded video; return its name."""
         from spirillum.vision.video.frames import open_video
 
         try:
@@ -162,27 +162,27 @@ class VideoStore:
         return path.stem
 
     def remove(self, name: str) -> None:
-        """Take a film away."""
+        """Remove a video."""
         with self._lock:
             film = self._films.pop(name, None)
         if film is not None:
             film.path.unlink(missing_ok=True)
 
     def video(self, name: str) -> Video:
-        """A film, opened."""
+        """Open a video."""
         with self._lock:
             film = self._films.get(name)
         if film is None:
-            raise InputError(f"film {name[:40]!r}; allowed: one of those that are here")
+            raise InputError(f"film {name[:40]!r}; allowed: an uploaded video")
         return film.video
 
     def paths(self) -> list[Path]:
-        """The films' files, in the order in which they came."""
+        """Files of the videos, in the order of their upload."""
         with self._lock:
             return [film.path for film in self._films.values()]
 
     def told(self) -> list[dict[str, Any]]:
-        """The films as the page lists them."""
+        """Videos as the page lists them."""
         with self._lock:
             return [
                 {
@@ -196,13 +196,13 @@ class VideoStore:
             ]
 
     def picture(self, name: str, time: float) -> bytes:
-        """A frame of a film as JPEG."""
+        """A frame of a video as JPEG."""
         cv2 = import_optional("cv2", "measuring a video", "video")
         frame = self.frame(name, time)
         return bytes(cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])
 
     def frame(self, name: str, time: float) -> np.ndarray:
-        """A frame of a film, 8-bit RGB, (h, w, 3)."""
+        """A frame of a video, 8-bit RGB, (h, w, 3)."""
         if not (math.isfinite(time) and time >= 0.0):
             raise InputError(f"time = {time:g} s; allowed: 0 s or later")
         video = self.video(name)

@@ -8,7 +8,7 @@ from typing import Literal
 Verdict = Literal["agrees", "disagrees", "undecidable"]
 
 PredictedVerdict = Literal["predicted-agrees", "predicted-disagrees", "depends"]
-"""Of a third kind: what robots that are laid down and let go would do, with nothing fitted or observed."""
+"""Verdict of a third kind: from the predicted motion of released robots, with nothing fitted or observed."""
 
 
 @dataclass(frozen=True)

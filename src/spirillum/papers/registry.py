@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 
 class Paper(NamedTuple):
-    """What a paper adds to a study that names it."""
+    """Claims and figures of a paper for a study that names it."""
 
     claims: Callable[[xr.Dataset], list[Claim]]
     """Its statements, each with its verdict."""
     predictions: Callable[[xr.Dataset], list[Claim]]
-    """Its statements with verdicts from robots that were laid down and let go."""
+    """Its statements with verdicts from released robots."""
     layout: Mapping[str, PaperFigure]
     """Figures of its channels."""
     figures: Callable[[xr.Dataset], dict[str, Picture]]
-    """Figures that only this paper asks for."""
+    """Figures of this paper only."""
 
 
 _PAPERS = {"biorob2012": Paper(evaluated, foretold, PAPER_FIGURES, more_figures)}
@@ -47,7 +47,7 @@ def claims_of(dataset: xr.Dataset) -> list[Claim]:
 
 
 def predictions_of(dataset: xr.Dataset) -> list[Claim]:
-    """Statements of the paper with verdicts from robots that were laid down and let go; empty where none were."""
+    """Statements of the paper with verdicts from released robots; empty without such robots."""
     paper = _paper_of(dataset)
     return paper.predictions(dataset) if paper else []
 

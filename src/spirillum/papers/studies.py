@@ -12,7 +12,7 @@ _STUDIES: dict[str, Callable[[], dict[str, Any]]] = {"biorob2012": paper_study}
 
 
 def study_of(source: str | Path | Mapping[str, Any] | None) -> str | Path | Mapping[str, Any]:
-    """What a study is read from.
+    """Return the source of a study: a file, tables, or a paper's study.
 
     Args:
         source: a study file or its tables, which come back as they are; a paper's name; or None: the study of the first

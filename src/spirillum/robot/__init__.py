@@ -1,1 +1,1 @@
-"""What is built: robots as frozen, validated data, SI inside; their geometry and limits."""
+"""Robots as frozen, validated data, SI inside; their geometry and limits."""

@@ -20,7 +20,7 @@ from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables
 
 
 class Column(NamedTuple):
-    """Where a column of a batch comes from, and what its values may be."""
+    """Source of a column of a batch, and its allowed values."""
 
     path: str
     """Dotted field of the robot file."""
@@ -81,7 +81,7 @@ class Electrics:
 
     @property
     def joint_rotor_friction(self) -> Values:
-        """B_m G^2: friction of the motor's rotor as the joint feels it, N m s/rad."""
+        """B_m G^2: friction of the motor's rotor referred to the joint, N m s/rad."""
         return self.rotor_friction * self.gear_ratio**2
 
 
@@ -207,7 +207,7 @@ class RobotBatch:
 
     @validate_arguments
     def placed(self, placement: Placement) -> RobotBatch:
-        """Return the same robots placed otherwise."""
+        """Return the same robots with other placements."""
         return replace(self, placement=placement)
 
     @validate_arguments
@@ -225,7 +225,7 @@ class RobotBatch:
         known = {source.path: (name, source) for name, source in _columns("RobotBatch").items()}
         unknown = [path for path in values if path not in known]
         if unknown:
-            raise InputError(f"{unknown[0]} is not a number that a batch can vary; allowed: {', '.join(known)}")
+            raise InputError(f"{unknown[0]} cannot vary in a batch; allowed: {', '.join(known)}")
         arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
@@ -233,7 +233,7 @@ class RobotBatch:
 
     @validate_arguments
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
-        """Cut the batch into blocks of at most `size` robots; each comes with its place in the batch.
+        """Cut the batch into blocks of at most `size` robots, each with its position in the batch.
 
         Raises:
             InputError: for a size below 1.
@@ -323,7 +323,7 @@ def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float)
         least = "0 or more" if source.zero else "any sign" if source.signed else "above 0"
         raise InputError(f"{path} of robot {wrong} = {values[wrong]:.6g}; allowed: finite SI numbers, {least}")
     if not source.optional and np.all(np.isnan(values)):
-        raise InputError(f"{path} = nan for all robots; allowed: numbers in SI units, NaN only where one is not known")
+        raise InputError(f"{path} = nan for all robots; allowed: numbers in SI units, NaN only for unknown values")
     return values
 
 
@@ -372,7 +372,7 @@ def _shared(robot: RobotTables) -> tuple[object, ...]:
 
 
 def batches(robots: Sequence[RobotTables], placement: Placement | None = None) -> list[tuple[list[int], RobotBatch]]:
-    """Group a mixed list of robots into batches; each comes with the positions of its robots in the list."""
+    """Group a mixed list of robots into batches, each with the indices of its robots in the list."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, robot in enumerate(robots):
         groups.setdefault(_shared(robot), []).append(index)

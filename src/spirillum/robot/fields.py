@@ -67,7 +67,7 @@ __all__ = [
 
 
 def meanings(model: type[BaseModel]) -> dict[str, str]:
-    """Meanings of the fields of a table by their names; its own words replace those of what it is made from."""
+    """Meanings of the fields of a table by their names; its own docstrings override inherited ones."""
     ours = (part for part in reversed(model.__mro__) if part.__module__.startswith("spirillum."))
     return {name: words for part in ours for name, words in _words(part) if name in model.model_fields}
 
@@ -127,7 +127,7 @@ def quantity_schema(kind: Kind) -> JsonSchemaValue:
 
 
 def _quantity(name: str) -> tuple[Kind, BeforeValidator, WithJsonSchema]:
-    """What makes a float a quantity; the kind stays with the field, so that `field_values` knows its unit."""
+    """Metadata of a quantity field; the kind stays with the field, so that `field_values` has its unit."""
     kind = KINDS[name]
     return kind, BeforeValidator(_reader(kind)), WithJsonSchema(quantity_schema(kind))
 
@@ -168,13 +168,13 @@ def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
 
 
 def kind_of(section: Section, path: str) -> Kind | None:
-    """What kind of quantity a field is; None for anything else."""
+    """Kind of quantity of a field; None for anything else."""
     kinds = [item for item in _all_metadata(_info_of(section, path)) if isinstance(item, Kind)]
     return kinds[0] if kinds else None
 
 
 def default_of(section: Section, path: str) -> Any:
-    """What a field is where its file does not name it."""
+    """Default of a field."""
     return _info_of(section, path).default
 
 

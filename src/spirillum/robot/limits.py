@@ -1,4 +1,4 @@
-"""Requirements on robots, over arrays: each says field, value, what is allowed, and why."""
+"""Requirements on robots, over arrays: field, value, allowed range, reason."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Limit:
         why: str,
         flag: str,
     ) -> Limit:
-        """The requirement that `value` stands in `relation` to `bound`; equality is read to rounding error."""
+        """Require `value` in `relation` to `bound`; equality is tested to rounding error."""
         limit = np.atleast_1d(np.asarray(bound, dtype=float))
         slack = 1e-12 * np.abs(np.where(np.isinf(limit), 0.0, limit))
         if relation == "more than":
@@ -70,7 +70,7 @@ class Limit:
         return Note(caution_code(self.flag), self._said(index, "accurate"), (self.field,))
 
     def sentence(self, index: int = 0) -> str:
-        """The broken requirement in words, for robot number `index`."""
+        """Message about the violated requirement, for robot number `index`."""
         return self._said(index, "allowed")
 
     def bound_in_words(self) -> str:
@@ -106,12 +106,12 @@ def all_hold(limits: Iterable[Limit]) -> Flags:
 
 
 def assembly_limits(batch: RobotBatch) -> list[Limit]:
-    """What a robot needs so that it can be built and put into its channel."""
+    """Requirements on a robot that can be built and put into its channel."""
     return [*_body_limits(batch), *_tail_limits(batch), *_channel_limits(batch)]
 
 
 def within(batch: RobotBatch, limits: Iterable[Limit] = ()) -> list[int]:
-    """Numbers of the robots that are known, can be built and keep all limits."""
+    """Indices of the robots that are finite, can be built and satisfy all limits."""
     fit = batch.known & all_hold([*assembly_limits(batch), *limits])
     return [int(index) for index in np.flatnonzero(np.broadcast_to(fit, (batch.size,)))]
 

@@ -31,7 +31,7 @@ _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
 _MOST_LAYERS = 8
-"""Robot files that lie over each other."""
+"""Layered robot files."""
 _DENSEST = 22590.0
 """Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
 
@@ -55,7 +55,7 @@ def preset_names() -> tuple[str, ...]:
 
 
 def preset_text(name: str) -> str:
-    """The preset's robot file as it stands."""
+    """Unmodified text of the preset's robot file."""
     return (files("spirillum.robot") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 

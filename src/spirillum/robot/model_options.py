@@ -1,4 +1,4 @@
-"""How the models are to be evaluated, and the calibration factors of the paper's Table III."""
+"""Options of the models, and the calibration factors of the paper's Table III."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class ModelOptions(Section):
 
     @property
     def resolution(self) -> str:
-        """The first option that asks for a resolution of `tube` which no table has, with its value; empty for none."""
+        """The first option that requests a resolution of `tube` which no table has, with its value; empty for none."""
         usual = ModelOptions()
         for section, name in (("slender", "accuracy"), ("tube", "tolerance"), ("tube", "phases")):
             value = getattr(getattr(self, section), name)

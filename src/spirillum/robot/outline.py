@@ -81,7 +81,7 @@ class Outline:
         return np.concatenate(x), np.concatenate(rho)
 
     def contains(self, x: Samples, rho: Samples) -> np.ndarray:
-        """Whether points lie inside."""
+        """Whether points are inside."""
         radius = np.fmax.reduce([piece.radius(x) for piece in self.pieces])
         tips = [float(piece.points(np.full(1, t))[0][0]) for piece in self.pieces for t in (0.0, 1.0)]
         with np.errstate(invalid="ignore"):

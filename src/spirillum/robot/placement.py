@@ -1,4 +1,4 @@
-"""Where in the channel a robot lies, and what the fluid around it is made to do."""
+"""Pose of a robot in its channel, and the imposed flow."""
 
 from __future__ import annotations
 
@@ -88,16 +88,16 @@ class Placement(Options):
 
     @property
     def is_given(self) -> bool:
-        """Whether anything is known or asked for."""
+        """Whether any field is set."""
         return self != type(self)()
 
     @property
     def level(self) -> bool:
-        """Whether the robot's axis is known to be parallel to the channel's."""
+        """Whether the robot's axis is prescribed parallel to the channel's."""
         return self.eccentricity is not None or (self.pitch == 0 and self.yaw == 0)
 
     def ends_of(self, channel_length: float) -> Ends | None:
-        """Ends in force for a channel of that length, m (infinite or NaN: none is known); None with an imposed flow."""
+        """Effective ends for a channel of that length, m (infinite or NaN: unspecified); None with an imposed flow."""
         if self.flow is not None:
             return None
         return self.ends or ("open" if np.isfinite(channel_length) else "closed")

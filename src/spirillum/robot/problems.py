@@ -1,4 +1,4 @@
-"""What is wrong with a table, in our sentences: field, value, and what is allowed."""
+"""Validation messages of a table: field, value, and allowed values."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _OTHERWISE = {
     "tail.radius": "tail.amplitude is the radius of the helix's centreline",
     "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
 }
-"""What gives a field that a robot file has not, though the field's words know it."""
-_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' turns the tail the other way"}
-"""What is allowed where a number out of its range means something that another field says."""
+"""Derived quantities that are no fields of a robot file, and their remedies."""
+_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
+"""Remedies for out-of-range numbers whose meaning is expressed by another field."""
 _LONGEST_FIELD = 200
 """Characters of a field's name in a sentence, so that what is allowed has room."""
 _MOST_NAMED = 6
@@ -94,7 +94,7 @@ def _refused(problem: Mapping[str, Any], field: str) -> str:
 
 
 def _allowed(problem: Mapping[str, Any], field: str) -> str:
-    """What is allowed in place of a value, for the kinds of findings that name no fields."""
+    """Allowed values, for the kinds of errors that name no fields."""
     kind, context = problem["type"], problem.get("ctx", {})
     words = {
         "model_type": f"a [{field}] table",

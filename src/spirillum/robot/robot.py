@@ -112,7 +112,7 @@ class Robot(RobotTables):
         return f"{self.name}, tail {self._tail_size} mm"
 
     def derived(self) -> dict[str, Derived]:
-        """What follows from the fields: lengths, volumes, weight, centre of mass.
+        """Derived quantities: lengths, volumes, weight, centre of mass.
 
         Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. The
         centre of mass assumes that the measured mass is spread evenly over body and coupling.

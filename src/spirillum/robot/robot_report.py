@@ -1,4 +1,4 @@
-"""A robot, or the problems of its file, as answers."""
+"""Results of `robot show` and `robot check`."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class OutlinePoints(NamedTuple):
     rho: Samples
     """Distance from the axis, m; zero at both poles, (k,)."""
     flat: tuple[bool, ...]
-    """Whether each band, from a point to the next, lies in a plane perpendicular to the axis."""
+    """Whether each band, from a point to the next, is in a plane perpendicular to the axis."""
 
 
 def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> OutlinePoints:

@@ -102,7 +102,7 @@ class Motor(Section):
 
     @property
     def joint_rotor_friction(self) -> float:
-        """B_m G^2: friction of the rotor as the joint feels it, N m s/rad."""
+        """B_m G^2: friction of the rotor referred to the joint, N m s/rad."""
         return self.rotor_friction * self.gear_ratio**2
 
 

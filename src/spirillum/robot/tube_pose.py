@@ -1,4 +1,4 @@
-"""Seat of a robot in its tube: where its axis runs, and the distances between its surfaces and the wall.
+"""Pose of a robot in its tube: its axis, and the clearances between its surfaces and the wall.
 
 A `Placement` is what a user asks for; a `Seat` is the geometry that follows from it. The tube's axis is horizontal. The
 body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi about the vertical,
@@ -43,7 +43,7 @@ _STILL = 1e-9  # step at which it ends, rad: the distance is then exact
 
 @dataclass(frozen=True)
 class TailClearance:
-    """Where the wire comes closest to the wall."""
+    """Smallest clearance of the wire from the wall."""
 
     clearance: float
     """Smallest distance between the wire's surface and the wall, m; negative where it cuts into it."""
@@ -74,7 +74,7 @@ class Seat:
 
     @classmethod
     def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> Seat:
-        """The seat that follows from a placement; what it leaves open is level, and at the gap of `gap_of`.
+        """Return the pose of a placement; by default level, at the gap of `gap_of`.
 
         Args:
             placement: what is asked for.
@@ -91,7 +91,7 @@ class Seat:
     def at_gap(
         cls, body: Outline, radius: float, gap: float, pitch: float = 0.0, tail_drop: float = 0.0, yaw: float = 0.0
     ) -> Seat:
-        """The seat at which the body's smallest distance to the wall is `gap`: of two such seats the lower one.
+        """Return the pose at which the body's smallest distance to the wall is `gap`: the lower one of two.
 
         For a level body of largest radius a, e = R - a - gap. The offset is NaN where the gap is larger than
         `largest_gap`, as it is once the nose comes nearer to the top.
@@ -160,7 +160,7 @@ class Seat:
 
     @property
     def across(self) -> Samples:
-        """Up and right about the tube's axis in body axes, (2, 3): a body point p lies at `across @ p`, less e up."""
+        """Up and right about the tube's axis in body axes, (2, 3): a body point p is at `across @ p`, less e up."""
         along, up, right = self.rotation[1:].T
         return np.stack([along, -right, up], axis=1)
 
@@ -243,7 +243,7 @@ def _farthest_of_ellipses(
 
 
 def gap_of(placement: Placement, body_diameter: float, radius: float) -> float:
-    """Gap that a placement asks for, m; where it is open, `GAP_SHARE` of the body's radius, at most that on the axis.
+    """Gap of a placement, m; by default `GAP_SHARE` of the body's radius, at most that on the axis.
 
     Args:
         placement: what is asked for.
@@ -316,7 +316,7 @@ def contact_pitch(
     yaw: float = 0.0,
     nose_down: bool = False,
 ) -> float:
-    """Largest pitch at which tail and coupling keep a clearance from the wall while the body keeps its gap.
+    """Largest pitch at which tail and coupling have a given clearance from the wall while the body's gap is fixed.
 
     The nose is raised from level, or lowered, until the wire at any phase, or the coupling, comes to the clearance, or
     until the nose leaves the body no seat with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
@@ -350,7 +350,7 @@ def contact_pitch(
 
 
 def last_clear(spare: Callable[[float], float], most: float, steps: int, narrowest: float) -> float:
-    """Largest angle up to which nothing touches, rad; `most` where nothing does.
+    """Largest angle up to which nothing touches the wall, rad; at most `most`.
 
     Args:
         spare: what is left of a clearance at an angle; at 0 it is there.

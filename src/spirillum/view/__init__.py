@@ -1,1 +1,1 @@
-"""Figures, three-dimensional pictures and films, annotated videos."""
+"""Figures, three-dimensional pictures and videos, annotated videos."""

@@ -1,4 +1,4 @@
-"""Tracking results drawn over the frames: outline of the body, axis, stripe pointer, fitted wire, numbers."""
+"""Tracking results overlaid on frames: outline of the body, axis, stripe pointer, fitted wire, numbers."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _TEXT, _SMALLEST_TEXT = 0.45, 0.4
 _DIAL = 16.0
 """Radius of a dial in a picture 480 pixels high, pixels."""
 _MOST_OF_HEIGHT = 0.25
-"""Largest share of a picture's height that words cover."""
+"""Largest share of a picture's height that text covers."""
 _SHIFT = 4
-"""Lines are drawn at sixteenths of a pixel."""
+"""Subpixel resolution of lines: sixteenths."""
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
 _LARGEST = 1920
@@ -64,7 +64,7 @@ class AnnotatedFrame(Protocol):
 
 
 class Annotator:
-    """Draws tracking results over frames of one robot."""
+    """Overlay of tracking results on frames of one robot."""
 
     def __init__(self, robot: Robot, period: float = 2.0 * math.pi) -> None:
         """Prepare the outline and the wire.
@@ -85,7 +85,7 @@ class Annotator:
         self._first: float | None = None
 
     def draw(self, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
-        """A copy of a frame with the tracking result drawn on it, reduced to at most 1920 pixels.
+        """Return a copy of a frame with the tracking result, reduced to at most 1920 pixels.
 
         Args:
             image: RGB bytes, (h, w, 3).
@@ -176,7 +176,7 @@ class Annotator:
         self._cv2.polylines(picture, [whole], closed, colour, 1, self._cv2.LINE_AA, _SHIFT)
 
     def _write(self, picture: np.ndarray, words: tuple[str, ...]) -> None:
-        """Write words into the upper left corner, beside the dials, in a few lines; leave out what does not fit."""
+        """Write text into the upper left corner, beside the dials, in a few lines; omit what does not fit."""
         unit = _unit(picture)
         font, size = self._cv2.FONT_HERSHEY_SIMPLEX, _TEXT * unit
 
@@ -196,12 +196,12 @@ class Annotator:
 
 
 def _unit(picture: np.ndarray) -> float:
-    """Size of words and dials over that in a picture 480 pixels high; letters stay large enough to be read."""
+    """Size of text and dials over that in a picture 480 pixels high; letters stay legible."""
     return max(int(picture.shape[0]) / 480.0, _SMALLEST_TEXT / _TEXT)
 
 
 def _lines_of(words: tuple[str, ...], width: Callable[[str], int], room: float) -> list[str]:
-    """Words put into as few lines as they need; what does not fit into a line by itself is left out."""
+    """Break text into as few lines as possible; an entry wider than a line is omitted."""
     lines: list[str] = []
     for word in words:
         if lines and width(longer := f"{lines[-1]}  {word}") <= room:
@@ -225,7 +225,7 @@ def _turned(points: Samples, angle: float) -> Samples:
 
 
 def _degrees(angle: float, period: float = 2.0 * math.pi) -> str:
-    """An angle in degrees; where it is known up to multiples of a period only, with these."""
+    """Format an angle in degrees, with its period if it is ambiguous."""
     if not math.isfinite(angle):
         return "not read"
     known = f"{math.degrees(angle % period):.1f} deg"
@@ -242,7 +242,7 @@ def annotated_film(
     period: float = 2.0 * math.pi,
     waiting: int = 8,
 ) -> Iterator[Callable[[int, np.ndarray, AnnotatedFrame], None]]:
-    """A film of annotated frames at their true times, drawn and encoded by a thread of its own.
+    """Video of annotated frames at their true times, rendered and encoded by a thread of its own.
 
     Args:
         path: the file, `.mp4`.
@@ -296,7 +296,7 @@ _Frame = tuple[int, np.ndarray, AnnotatedFrame]
 
 
 class _Writer:
-    """Draws frames and writes them to H.264; the film starts with the first frame's time."""
+    """Thread that renders frames and encodes them (H.264); the video starts with the first frame's time."""
 
     def __init__(
         self,

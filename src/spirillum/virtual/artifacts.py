@@ -27,7 +27,7 @@ _TURN = 2e-4
 
 
 class Degradation(Options):
-    """How much of each disturbance a video has; the defaults are a clean one's."""
+    """Amounts of the disturbances of a video; the defaults are a clean one's."""
 
     argument: ClassVar[str] = "degradation"
 
@@ -72,14 +72,14 @@ class Degradation(Options):
         return super().of(given)
 
     def uncompressed(self) -> Self:
-        """The degradation of frames that are written as PNG files, which lose nothing.
+        """The degradation of frames that are written as PNG files, without compression.
 
         Raises:
             InputError: if it has a compression of its own, which no preset has.
         """
         if self.crf and self.crf not in {self.of(name).crf for name in _PRESETS}:
             raise InputError(
-                f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which lose nothing; "
+                f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which are lossless; "
                 "allowed: with a video (.mp4)"
             )
         return self.model_copy(update={"crf": 0})
@@ -93,7 +93,7 @@ _PRESETS: dict[str, dict[str, Any]] = {
 
 
 class Troubles(Options):
-    """How much of each trouble a film has; the defaults are none."""
+    """Amounts of the artifacts of a video; the defaults are none."""
 
     argument: ClassVar[str] = "troubles"
 
@@ -120,13 +120,13 @@ class Troubles(Options):
 
     @property
     def uses_seed(self) -> bool:
-        """Whether anything of these troubles is drawn at random."""
+        """Whether any of these artifacts is random."""
         usual = Troubles()
         return any(getattr(self, name) != getattr(usual, name) for name in _RANDOM)
 
 
 _RANDOM = ("lost_frames", "handheld", "uneven_stripes", "cables", "mirrored_lamps")
-"""Troubles that are drawn at random; the others are alike for all seeds."""
+"""Random artifacts; the others are equal for all seeds."""
 
 _USUAL: dict[str, dict[str, Any]] = {
     "lost-frames": {"lost_frames": 0.03},
@@ -140,7 +140,7 @@ _USUAL: dict[str, dict[str, Any]] = {
     "grid-paper": {"grid_paper": True},
     "glass-cover": {"glass_cover": True},
 }
-"""The usual size of each trouble: 7 frames of 240; 2 s; 3 pixels; 4 degrees; a fifth; one pixel; two; two."""
+"""Typical size of each artifact: 7 frames of 240; 2 s; 3 pixels; 4 degrees; a fifth; one pixel; two; two."""
 _DISTURBANCES: dict[str, dict[str, Any]] = {
     "noise": {"noise": 8.0},
     "lamp": {"lamp_drift": 0.2},
@@ -152,15 +152,15 @@ _DISTURBANCES: dict[str, dict[str, Any]] = {
     "bubbles": {"bubbles": 8},
     "hand": {"hand": True},
 }
-"""Troubles that are disturbances of the picture (`Degradation`), and their usual size."""
+"""Artifacts that are disturbances of the picture (`Degradation`), and their typical size."""
 NAMES = (*_USUAL, *_DISTURBANCES)
-"""Of all troubles that a rendered film may have."""
+"""All artifacts that a rendered video may have."""
 
 
 def with_troubles(
     value: str | Troubles | Mapping[str, Any] | None, degradation: str | Degradation | Mapping[str, Any] | None
 ) -> tuple[Troubles, Degradation]:
-    """Troubles from what a caller may give, and the degradation with those among them that disturb the picture.
+    """Artifacts from a caller's value, and the degradation with those among them that disturb the picture.
 
     Args:
         value: names of troubles with commas between them, at their usual size, `Troubles`, its fields by name, or None.
@@ -183,7 +183,7 @@ def with_troubles(
 
 
 def counted_frames(troubles: Troubles, kept: np.ndarray, fps: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frames that are left after further ones were lost, and the numbers by which the film states their times.
+    """Remaining frames after further ones were lost, and the numbers from which the video computes their times.
 
     Args:
         troubles: of the film.
@@ -233,7 +233,7 @@ def repainted(robot: Robot, vertices: Samples, edges: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class Shake:
-    """How a camera is held: rolled, and swaying."""
+    """Camera shake: roll and sway."""
 
     troubles: Troubles
     seed: int
@@ -255,7 +255,7 @@ class Shake:
         return float(u), float(v), self.troubles.rolled + _TURN * float(turn)
 
     def moved(self, light: np.ndarray, time: float) -> np.ndarray:
-        """A picture as the camera sees it; what lies beyond the borders goes on as they are."""
+        """Return a picture in the moving camera; its borders are extended."""
         if not (self.troubles.handheld or self.troubles.rolled):
             return light
         cv2 = import_optional("cv2", "a camera that is not still", "video")
@@ -274,7 +274,7 @@ _CABLE_LIGHT = 0.02
 
 
 class ViewArtifacts:
-    """What lies between the robot and a picture of it: mirrored lamps, cables, a camera held or out of focus."""
+    """Artifacts between the robot and a picture of it: mirrored lamps, cables, a moving or unfocused camera."""
 
     def __init__(self, troubles: Troubles, seed: int, size: tuple[int, int]) -> None:
         """Prepare."""

@@ -27,7 +27,7 @@ def tilt_of(degradation: Degradation, seed: int) -> tuple[float, float]:
 
 
 class Disturbances:
-    """The disturbances of one video, drawn from its seed; each kind from random numbers of its own."""
+    """Disturbances of one video, sampled from its seed; each kind from an independent stream."""
 
     @classmethod
     def of_robot(
@@ -90,7 +90,7 @@ class Disturbances:
         """Standard deviation of the noise, bytes."""
         self._grain_rng = np.random.default_rng([seed, _GRAIN])
         self.grain = self._grain_rng.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
-        """A pool of normal noise; every row of every picture starts at a random place of it."""
+        """A pool of normal noise; every row of every picture starts at a random index of it."""
 
     def kept(self, count: int) -> np.ndarray:
         """Whether each of a number of frames is kept, (count,); the first and the last always are."""

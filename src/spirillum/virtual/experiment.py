@@ -56,7 +56,7 @@ _RATES = ["forward_velocity_mm_s", "tail_rate_Hz", "body_rate_Hz", "motor_rate_H
 
 
 class _Plan(Seeded):
-    """How many trials of each robot, how long, and how they differ."""
+    """Number of trials of each robot, their duration and variation."""
 
     trials: Annotated[int, BeforeValidator(whole(1, 1000))] = 5
     spread: Annotated[float, BeforeValidator(in_range(0.0, 0.3))] = 0.02
@@ -215,7 +215,7 @@ def virtual_experiment(
 
 
 class _Filmed(NamedTuple):
-    """What an experiment films."""
+    """Content of an experiment: robots and trials."""
 
     robots: dict[str, Robot]
     """By the names of their folders."""
@@ -228,7 +228,7 @@ class _Filmed(NamedTuple):
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
-    """What a study has filmed; None: the paper's robots."""
+    """Robots of a study; None: the paper's robots."""
     if study is None:
         return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None, ())
     from spirillum.studies.study_loader import load_study
@@ -250,7 +250,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
 
 
 def _gap(robot: Robot, placement: Placement | None) -> float | None:
-    """Gap at which a robot is drawn, m; None for that of the reference place."""
+    """Displayed gap of a robot, m; None for that of the reference pose."""
     if placement is None or robot.channel is None:
         return None
     return gap_of(placement, robot.body.diameter, 0.5 * robot.channel.diameter)
@@ -265,7 +265,7 @@ def _planned(
     place: int,
     gap: float | None = None,
 ) -> list[Planned]:
-    """The trials of the robot at a place in the study."""
+    """The trials of the robot at an index of the study."""
     planned = []
     low, high = swimming_range(robot, camera)
     for number in range(1, plan.trials + 1):
@@ -311,9 +311,9 @@ def _files_of(folder: Path, planned: Planned) -> list[Path]:
 
 
 def _is_whole_film(path: Path) -> bool:
-    """Whether a file is an MP4 film that is not cut off: its boxes, each of which begins with its length, fill it."""
+    """Whether a file is a complete MP4 video: its boxes, each with its length first, fill it."""
     size, place, kinds = path.stat().st_size, 0, set()
-    with opened(path, "a film of a trial", sys.maxsize) as file:
+    with opened(path, "a video of a trial", sys.maxsize) as file:
         while place < size:
             file.seek(place)
             head = file.read(16)
@@ -328,7 +328,7 @@ def _is_whole_film(path: Path) -> bool:
 
 
 def _first_bytes(path: Path) -> bytes:
-    """The eight bytes that tell a kind of file."""
+    """The first eight bytes, which identify the kind of file."""
     with opened(path, "a file of a trial", sys.maxsize) as file:
         return file.read(8)
 

@@ -1,4 +1,4 @@
-"""What of the channel is in the picture: the camera's optics, and whether and where the robot is seen."""
+"""Field of view of the virtual camera: its optics, and the visibility of the robot."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FOCAL = 740.0 / 640.0
 _SHORTEST, _LONGEST = 24, 2.0
 """Shortest robot in pixels, longest in widths of the picture."""
 _LOOKS = 1001
-"""Moments at which it is asked whether the robot is in the picture."""
+"""Times at which the visibility of the robot is checked."""
 
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:
@@ -116,7 +116,7 @@ def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: VirtualL
     rows = np.array([[middle, 0.0], [middle, lens.size[1] - 1.0]])
     edges = lens.points(rows, float(z[inside].mean()))[:, 1]
     if not np.any(inside & (y > edges.min() - radius) & (y < edges.max() + radius)):
-        raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its middle; {nearer}")
+        raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its centre; {nearer}")
 
 
 def _visible(lens: VirtualLens, height: float) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from spirillum.virtual.truth import setup_text
 _LAMP_TIME = 20.0
 """Time over which the lamp drifts once, s, as in a trial's usual length."""
 _SHARE = 0.1
-"""Where in the picture the robot is at first, as a share of the way on which it is seen whole."""
+"""Initial position of the robot, as a share of the path on which it is fully visible."""
 
 
 class Shot(NamedTuple):
@@ -104,7 +104,7 @@ class VirtualCamera:
         return Shot(middle, frames.image(middle))
 
     def setup(self, path: str | Path) -> Path:
-        """Write the setup file, as an experimenter would know it; a robot that is no preset lies beside it.
+        """Write the setup file as an experimenter would; the file of a robot that is no preset is beside it.
 
         Args:
             path: the file (`.toml`).
@@ -119,7 +119,7 @@ class VirtualCamera:
         return path
 
     def x_of(self, pose: RobotPose) -> float:
-        """Place of a robot's mid-length along the channel from below the lens, as the tracker counts it, m."""
+        """Position of a robot's mid-length along the channel from below the lens, in the tracker's convention, m."""
         return float(pose.position[0]) + self._shift
 
     def _trajectory(self, before: float, first: RobotPose, now: float, last: RobotPose) -> TrialTrajectory:

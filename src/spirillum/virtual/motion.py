@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _USUAL = 20.0
-"""Length of a film of steady swimming, s."""
+"""Length of a video of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
 """Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
 
@@ -64,7 +64,7 @@ def steady_rates(
             idle = "model" if motion.friction is None else "friction"
             raise InputError(
                 f"{idle} = {str(getattr(motion, idle))[:40]!r} with a prescribed forward velocity, body and tail rate, "
-                "which leave nothing to compute; allowed: two of them at most"
+                "which determine the motion; allowed: at most two of them"
             )
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict

@@ -153,7 +153,7 @@ class Tank:
 
 
 def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False) -> Tank:
-    """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls."""
+    """Tank of a robot: its tube is on the floor; in a side view it is midway between the walls."""
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
@@ -173,7 +173,7 @@ def _reach(robot: Robot) -> float:
 
 
 def spots(side: int) -> Samples:
-    """Places of side^2 samples in each of 4 x 4 neighbouring pixels, -0.5 to 0.5, (16, side^2, 2).
+    """Positions of side^2 samples in each of 4 x 4 neighbouring pixels, -0.5 to 0.5, (16, side^2, 2).
 
     In every pixel one sample lies in each of side x side cells and in each of side^2 rows and columns (multi-jittered
     samples: K. Chiu, P. Shirley, C. Wang, Graphics Gems IV, 1994). The neighbours differ, and are shifted against each
@@ -245,7 +245,7 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
 
 
 def _line_share(places: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
-    """Share of pixels that parallel lines cover, whose middles lie at multiples of the spacing.
+    """Share of each pixel that parallel lines cover, centred at multiples of the spacing.
 
     Args:
         places: of the pixels' middles across the lines, m.

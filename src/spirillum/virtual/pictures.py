@@ -24,9 +24,9 @@ _WALL = 0.11
 _AMBIENT = 0.85
 """Light of the room beside the picture over the picture's mean; assumed."""
 _SIDEWAYS = float(np.cos(np.radians(75.0)))
-"""Cosine of the angle to the vertical from which on light comes from the room instead of the floor."""
+"""Cosine of the angle to the vertical above which light comes from the room instead of the floor."""
 _ENCODED = 2.0
-"""What is added to a component of a normal where it is drawn as a colour, which is positive."""
+"""Offset of a normal's components in its encoding as a colour, which is positive."""
 _EMPTY = -1e30
 _NEAREST, _FARTHEST = 1e-9, 0.9999
 _FAR = np.linspace(_NEAREST, _FARTHEST, 501)
@@ -80,7 +80,7 @@ class Cover:
         return Shading(self._red, self._green, *(np.ascontiguousarray(normals[..., k]) for k in (0, 1)))
 
     def decoded(self, depth: Samples, samples: Samples) -> Glass:
-        """The cover in a window of samples that were drawn with the colours of `encoded`; the samples are cleared.
+        """Cover in a window of samples with the colours of `encoded`; the samples are cleared.
 
         Args:
             depth: height of what each sample has met, (rows, columns, k).
@@ -93,7 +93,7 @@ class Cover:
         return Glass(hit.mean(axis=(2, 3)), np.where(count > 0, across, 0.0))
 
     def refract(self, picture: Samples, glass: Glass, left: int, top: int, height: float) -> None:
-        """Replace what lies behind the cover by what is seen through it.
+        """Replace the background of the cover by its refracted image.
 
         Args:
             picture: linear light, (rows, columns, 3); changed.
@@ -176,7 +176,7 @@ def _mirrored(inside: Samples, outside: Samples) -> Samples:
 
 
 _STILL = 0.1
-"""Motion blur below which an exposure is drawn at one time, pixels."""
+"""Motion blur below which an exposure is rendered at one time, pixels."""
 _STEP = 0.8
 """Motion blur between two times of an exposure, pixels."""
 _MAX_TIMES = 8
@@ -196,7 +196,7 @@ _FEW = 13
 
 
 class Painter:
-    """Draws the robot before its tank. One painter serves one video: it keeps its buffers between frames."""
+    """Renderer of the robot in its tank. One painter serves one video: it reuses its buffers between frames."""
 
     def __init__(
         self, robot: Robot, tank: Tank, lens: VirtualLens, edges: Samples | None = None, *, covered: bool = False
@@ -282,7 +282,7 @@ class Painter:
         return found
 
     def _window(self, seen: list[Samples]) -> tuple[int, int, int, int]:
-        """Columns and rows around all that is drawn: left, top, right, bottom."""
+        """Columns and rows around the rendered content: left, top, right, bottom."""
         low = np.min([pixels[:, :2].min(axis=0) for pixels in seen], axis=0)
         high = np.max([pixels[:, :2].max(axis=0) for pixels in seen], axis=0)
         width, height = self.lens.size
@@ -300,7 +300,7 @@ class Painter:
         return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
 
     def _shadow(self, pose: CameraFramePose) -> Shadow:
-        """The soft shadow; the lamp stands a little to one side."""
+        """Soft shadow; the lamp is a little to one side."""
         half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
         x, y, z = (float(value) for value in pose.position)
         drop = (-0.1 if self.lens.leftwards else 0.1) * z

@@ -34,7 +34,7 @@ _WRAP, _BACK, _GREEN, _BLACK, _GREY = (
 def covered_body(robot: Robot, body: RobotMesh) -> list[RobotMesh]:
     """The opaque pieces of a body under a glass cover: its seal, a battery, a board."""
     if robot.seal is None:
-        raise InputError("glass_cover (--trouble glass-cover) requires a robot with a seal, which holds the cover")
+        raise InputError("glass_cover (--trouble glass-cover) requires a robot with a seal, which carries the cover")
     rear, nose, radius = robot.seal.length - 0.5 * robot.body.length, 0.5 * robot.body.length, 0.5 * robot.body.diameter
     low, high, width, height = _BATTERY
     start, end = rear + low * (nose - rear), rear + high * (nose - rear)
@@ -86,7 +86,7 @@ def _box(along: tuple[float, float], half: Samples, colour: tuple[float, float, 
 _LONGEST = 5e-3
 """Longest edge of a triangle, m."""
 _CREASE = float(np.radians(35.0))
-"""Angle between triangles above which an edge is drawn sharp, rad."""
+"""Angle between triangles above which an edge is sharp, rad."""
 MATERIALS: dict[str, tuple[float, float, float, float]] = {
     "body": (0.34, 0.70, 0.45, 60.0),
     "shaft": (0.25, 0.55, 0.70, 25.0),
@@ -181,7 +181,7 @@ def joined(pieces: list[RobotMesh]) -> RenderedSolid:
 
 
 def _shortened(points: Samples, faces: Faces) -> tuple[Samples, Faces, Faces]:
-    """Triangles without long edges, on the same surface; and the triangle that each of them comes from."""
+    """Triangles without long edges, on the same surface; and the original triangle of each."""
     origin = np.arange(len(faces))
     while True:
         edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)  # (m, 3, 2)

@@ -183,7 +183,7 @@ class VirtualTrial(DisplayMixin):
 
 
 def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
-    """Refuse what a run says itself: all of a motion, and of a trial all but its length and where it starts."""
+    """Refuse options that a run determines: all of a motion, and of a trial all but its length and start position."""
     for options in given:
         usual = type(options)()
         for name in type(options).model_fields:
@@ -310,7 +310,7 @@ def render(
 
 
 def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles, seed: int) -> Painter:
-    """What draws the robot, with uneven stripes and a cover of glass where the troubles have them."""
+    """Painter of the robot, with uneven stripes and a cover of glass among the artifacts."""
     stripes = len(robot.seal.stripes) if robot.seal is not None else 0
     edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
     return Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
@@ -339,7 +339,7 @@ def _stated_height(height: float, error: float, surface: float) -> float:
 def _facts(
     trial: VirtualTrial, camera: CameraOptions, degradation: Degradation, troubles: Troubles, lens: VirtualLens
 ) -> dict[str, Any]:
-    """What the truth says of a trial besides its rates."""
+    """Facts of the truth file besides rates."""
     return {
         "robot": trial.robot.name,
         "model": trial.model,
@@ -371,7 +371,7 @@ def _write_frames(
     fps: float,
     tell: Callable[[str, int, int], None],
 ) -> None:
-    """Draw a frame while the one before it is encoded; `numbers`: as recorded, and as the film counts them."""
+    """Render frames in parallel with the encoding; `numbers`: as recorded, and as the video counts them."""
     kept, counted = numbers
     with ThreadPoolExecutor(1) as encoder:
         before: Future[None] | None = None

@@ -142,7 +142,7 @@ class SetupErrors(Options):
 
 
 class Seeded(Options):
-    """What depends on random numbers."""
+    """Options with a random seed."""
 
     seed: Annotated[int, BeforeValidator(whole(0, 2**31 - 1))] = 0
     """Of all random numbers."""

@@ -80,7 +80,7 @@ def setup_text(
 
 
 def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
-    """Forward velocity and rates as quantities of an answer."""
+    """Forward velocity and rates as quantities of a result."""
     return {name: quantity(value, _UNITS[name]) for name, value in rates.items()}
 
 

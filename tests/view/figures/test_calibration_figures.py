@@ -46,7 +46,7 @@ def test_all_figures_are_written_and_say_that_the_data_are_synthetic(
     names = ("observed-40mm", "residuals", "posterior", "profiles")
     assert written >= {f"{name}.png" for name in names} | {"calibration.toml", "predictions.csv", "posterior.nc"}
     for figure in drawn.values():
-        assert "synthetic, nothing is measured" in _texts(figure)
+        assert "synthetic, no measured data" in _texts(figure)
 
 
 def test_panels_draw_observed_and_predicted_speeds(found: Any, drawn: dict[str, Any]) -> None:

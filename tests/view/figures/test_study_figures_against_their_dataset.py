@@ -309,7 +309,7 @@ def test_speeds_with_a_band_are_no_upper_bound_and_settled_ones_are_drawn(tmp_pa
     figure = picture.figure()
     assert not any("upper bound" in text for text in [*texts(figure), picture.caption, picture.alternative])
     assert any("no contact friction" in axes.get_ylabel() for axes in figure.axes)
-    assert "let go, in steady motion" in legend_entries(figure)
+    assert "released, steady state" in legend_entries(figure)
     (stars,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "*"]
     np.testing.assert_allclose(stars.get_ydata(), dataset["forward_velocity_settled"] / MM)
     save(figure, tmp_path / "robots.png")

@@ -105,7 +105,7 @@ def test_events_are_marked_and_named(run: Any) -> None:
     words = " ".join(text.get_text() for text in figure.findobj(Text)).replace("\u00a0", " ")
     assert "1: motor off (1 s)" in words
     assert "after the end" not in words
-    assert "computed, nothing is measured" in words
+    assert "computed, no measured data" in words
     for axes in figure.axes[2:]:
         assert [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2] == [1.0]
 

@@ -56,7 +56,7 @@ def spheroid_drag(viscosity: PerRobot, a: PerRobot, b: PerRobot) -> SpheroidDrag
 
 
 def semi_axes(batch: RobotBatch) -> tuple[PerRobot, PerRobot]:
-    """Semi-axes (a, b) of the spheroid that stands for each body, m.
+    """Semi-axes (a, b) of the equivalent spheroid of each body, m.
 
     `inscribed` takes L_b/2 and D_b/2; `equal-volume` keeps L_b/2 and widens b to the body's own volume.
     """

@@ -1,4 +1,4 @@
-"""Resistive force theory, eqs (8)-(16): every piece of wire feels a force of its own, F = -C u.
+"""Resistive force theory, eqs (8)-(16): local force per length on each piece of wire, F = -C u.
 
 With c_n = c_b the local matrix R C R' of (12) is c_n I + (c_t - c_n) t t', so no Frenet frame is needed.
 The tail's matrix is constant in a frame that turns with it. Body and tail do not feel each other.
@@ -69,7 +69,7 @@ def lighthill(batch: RobotBatch) -> LocalCoefficients:
 
 
 def axis_height(batch: RobotBatch) -> PerRobot:
-    """Height h of the tail's axis above the floor, m; unset: the body lies on the floor, h = D_b/2."""
+    """Height h of the tail's axis above the floor, m; unset: the body rests on the floor, h = D_b/2."""
     return np.where(np.isnan(batch.axis_height), 0.5 * batch.body_diameter, batch.axis_height)
 
 
@@ -313,7 +313,7 @@ class Rft(SwimmerModel):
         )
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`; sets other than the printed one were held against one tail only."""
+        """See `ResistanceModel.own_error`; sets other than the printed one were compared with one tail only."""
         if batch.options.rft.coefficients != "printed":
             return self.stated_error(batch.options) + walls_left_out(batch)
         return f"{validation_note(batch, CHECKED['rft'])}; {speed_note('rft')}{walls_left_out(batch)}"

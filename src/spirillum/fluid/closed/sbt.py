@@ -164,7 +164,7 @@ def helix_functions(batch: RobotBatch) -> HelixFunctions:
 
 
 def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """(B11, B14, B44) of the tail: 4 pi mu l diag(1, B_o) M^-1 diag(1, B_o), and the wire's own spin if asked for."""
+    """(B11, B14, B44) of the tail: 4 pi mu l diag(1, B_o) M^-1 diag(1, B_o), optionally with the wire's own spin."""
     f = helix_functions(batch)
     towed = f.Psi / 1.5
     mixed = f.alpha * np.sqrt(1.0 - f.alpha**2) * f.q

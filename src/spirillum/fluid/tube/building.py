@@ -1,4 +1,4 @@
-"""Tables are made: the flow is solved for at their places, and what is left without the film is packed.
+"""Computation of tables: solve for the flow at all nodes, pack the outer resistance and the lubrication film.
 
 Robots that differ in their tails have places in common: wall and body are solved for once for all of them.
 
@@ -144,7 +144,7 @@ def built_tables(
 
 
 def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
-    """Number of places that are solved for on their own, and how many of them are kept."""
+    """Number of nodes that are solved for separately, and how many of them are cached."""
     shared = solved_as_one(places)
     return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
 
@@ -195,7 +195,7 @@ def _tabulated_film(body: Outline, radius: float, yaws: int) -> Samples:
 
 
 def _nodes(places: Places) -> list[NodeSolution]:
-    """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
+    """Nodes without yaw, then those with yaw, of the robot and of its mirror image."""
 
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
         return places.geometry, even_phases(place.phases)
@@ -319,19 +319,19 @@ def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> t
 
 
 def _yawed_seats(places: Places) -> list[Seat]:
-    """Seats of all nodes with yaw, without it."""
+    """Poses of all nodes with yaw, with their yaw set to zero."""
     return [places.seat(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
 
 
 def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
-    """Fourier coefficients of the factor of the rest, as the table without yaw has them at a seat."""
+    """Fourier coefficients of the factor of the outer resistance, interpolated from the table without yaw."""
     out = np.empty((count, kernel.PARAMETERS))
     kernel.rest_coefficients(straight, seat.offset, seat.pitch, out)
     return out
 
 
 def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
-    """Random places of a table that are no nodes, each with a random phase of the tail."""
+    """Random check poses of a table between its nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
     chosen: list[NodeSolution] = []
     while len(chosen) < places.stage.held_out:

@@ -1,4 +1,4 @@
-"""Answers of the model `tube` kept on disk, by the content of the question and of the code that answers it.
+"""Disk cache of solutions of the model `tube`, keyed by the request and the source code of the solver.
 
 The folder is the user's cache folder, or what SPIRILLUM_CACHE names (`off` for none). It is safe to delete, and
 several runs may share it: files are written whole, and one that is damaged is computed anew.
@@ -35,12 +35,12 @@ _Q = TypeVar("_Q", bound=tuple[object, ...])
 
 
 def cache_folder() -> Path | None:
-    """Where answers are kept; None for nowhere."""
+    """Folder of the cache; None if caching is off."""
     return _folder(os.environ.get("SPIRILLUM_CACHE", ""))
 
 
 def check_cache_folder() -> None:
-    """Refuse a folder that SPIRILLUM_CACHE names and in which nothing can be kept."""
+    """Refuse a folder in SPIRILLUM_CACHE that is not writable."""
     named = os.environ.get("SPIRILLUM_CACHE", "")
     folder = cache_folder()
     if not named or named.lower() == "off" or (folder is not None and os.access(folder, os.W_OK | os.X_OK)):
@@ -67,7 +67,7 @@ def _folder(named: str) -> Path | None:
 
 
 def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
-    """The answer to a question, (13, 13), from the folder or computed and kept there."""
+    """Return the solution of a request, (13, 13), from the cache, or compute and cache it."""
     path = _path(question, compute)
     if path is None:
         return compute(question)
@@ -84,13 +84,13 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
 
 
 def is_kept(question: _Q, compute: Callable[[_Q], Samples]) -> bool:
-    """Whether the answer to a question is in the folder, so that `kept_or_computed` computes nothing."""
+    """Whether the solution of a request is cached, so that `kept_or_computed` computes nothing."""
     path = _path(question, compute)
     return path is not None and _kept(path) is not None
 
 
 def _path(question: _Q, compute: Callable[[_Q], Samples]) -> Path | None:
-    """Where the answer to a question is kept; None for nowhere."""
+    """Cache file of a request; None if caching is off."""
     folder = cache_folder()
     code = None if folder is None else digest_of(compute.__module__)
     if folder is None or code is None:
@@ -100,7 +100,7 @@ def _path(question: _Q, compute: Callable[[_Q], Samples]) -> Path | None:
 
 
 def _kept(path: Path) -> Samples | None:
-    """A kept answer; None if there is none, or its checksum does not fit."""
+    """Cached solution; None if there is none or its checksum is wrong."""
     try:
         stored = read_bytes(path, "a kept answer", 1 << 16)
     except InputError:
@@ -124,7 +124,7 @@ def unsealed(stored: bytes) -> bytes | None:
 
 @lru_cache(maxsize=8)
 def digest_of(module: str) -> str | None:
-    """What stands for the code behind a module, once per process; None where its source is not at hand."""
+    """Digest of the source of a module and its imports, once per process; None if the source is not available."""
     sources = imported_sources(module)
     if module not in sources:
         return None

@@ -28,7 +28,7 @@ _EIGHT_PI = 8.0 * np.pi
 
 @dataclass(frozen=True)
 class Strengths:
-    """What solids and wires do to the fluid, for each of the 12 unit twists and the flow held back; viscosity 1."""
+    """Source strengths on solids and wires for each of the 12 unit twists and the imposed flow; viscosity 1."""
 
     solids: Solids
     """Solids, with the unknowns of `tractions`."""
@@ -42,7 +42,7 @@ class Strengths:
 
 @dataclass(frozen=True)
 class Held:
-    """What the robot feels for each of the 12 unit twists, and in the flow of unit mean velocity; viscosity 1."""
+    """Wrenches on the robot for each of the 12 unit twists, and in the flow of unit mean velocity; viscosity 1."""
 
     matrix: Samples
     """R for zero net flux, 12x12, made symmetric; zero for a part that is not there."""
@@ -51,9 +51,9 @@ class Held:
     drag: float
     """Work of the tractions at rest in that flow against it, over the mean velocity squared."""
     asymmetry: float
-    """What the matrix lacked in symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
+    """Deviation of the matrix from symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
     strengths: Strengths = field(repr=False)
-    """Where it comes from."""
+    """Underlying source strengths."""
 
 
 def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
@@ -137,7 +137,7 @@ class _Link:
     sent: list[Samples]
     """Fields on the solids from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""
     answers: tuple[Answers, ...]
-    """Of the solids to those fields; nothing without solids."""
+    """Response of the solids to those fields; empty without solids."""
 
     @classmethod
     def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:
@@ -194,7 +194,7 @@ def _reduced(solids: Solids, sources: Sources) -> Reduced:
 
 
 def _near_wall(wire: Wire, seat: Seat) -> Samples:
-    """What a line of forces lacks of a wire of finite thickness at a wall, (3 n, 3 n), robot axes.
+    """Correction of a line of forces for the finite thickness of a wire at a wall, (3 n, 3 n), robot axes.
 
     A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
     2 log(2 h/a) - 2 along itself, sideways and towards the plane, without the factor 1/(8 pi mu); a cylinder has

@@ -1,4 +1,4 @@
-"""Seat of a robot in its tube, and what it has to fulfil so that the flow around it can be resolved."""
+"""Pose of a robot in its tube and its limits, within which the flow can be resolved."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from spirillum.robot.tube_pose import Seat, gap_of, largest_gap
 from spirillum.units import show
 
 WIRE_FILM = 0.75
-"""Thinnest film between the wire's surface and the wall over the wire's radius: thinner ones are not resolved."""
+"""Smallest resolved clearance between the wire's surface and the wall, over the wire's radius."""
 _THINNEST_GAP = 1e-3
-"""Thinnest film between a solid and the wall over the body's diameter: thinner ones are not resolved."""
+"""Smallest resolved clearance between a solid and the wall, over the body's diameter."""
 _TIGHTEST = 1.05
 """Diameter of the tightest tube over the body's."""
 _WIDEST = 1e3
@@ -27,7 +27,7 @@ _WIDEST = 1e3
 
 
 def seat_of(batch: RobotBatch, index: int = 0) -> Seat:
-    """Seat of robot number `index`; what the placement leaves open is level, and at a gap of `GAP_SHARE`."""
+    """Pose of robot number `index`; by default level, at a gap of `GAP_SHARE`."""
     radius, diameter = tube_radius(batch, index), number_of(batch.body_diameter, index)
     return Seat.of(batch.placement, RobotGeometry.of(batch, index).body, diameter, radius)
 
@@ -39,7 +39,7 @@ def tube_radius(batch: RobotBatch, index: int = 0) -> float:
 
 @lru_cache(maxsize=4096)
 def _tail_clearance(g: RobotGeometry, seat: Seat) -> tuple[float, str]:
-    """Smallest clearance of the tail over a turn, m, and where it is, in words."""
+    """Smallest clearance of the tail over a turn, m, and its position in words."""
     wire = g.wire()
     found = seat.tail_clearance(wire.points, wire.radius)
     behind = show(-float(wire.points[found.index, 0]), "mm")
@@ -47,7 +47,7 @@ def _tail_clearance(g: RobotGeometry, seat: Seat) -> tuple[float, str]:
 
 
 def placement_answer(batch: RobotBatch) -> dict[str, Any]:
-    """Where the first robot of a batch lies, for answers."""
+    """Pose of the first robot of a batch, for results."""
     seat = seat_of(batch)
     room = seat.radius - 0.5 * number_of(batch.body_diameter, 0)
     found: dict[str, Any] = {
@@ -71,13 +71,13 @@ class _Films(NamedTuple):
     """Distances between the parts of robots and the wall, m; infinite for parts that do not matter."""
 
     asked: PerRobot
-    """Gap asked for."""
+    """Requested gap."""
     largest: PerRobot
     """Largest gap that there is room for."""
     coupling: PerRobot
     tail: PerRobot
     where: str
-    """Where the last tail comes closest."""
+    """Position of the smallest clearance of the last tail."""
 
 
 def seat_limits(
@@ -88,7 +88,7 @@ def seat_limits(
     thinnest_gap: float = _THINNEST_GAP,
     wire_film: float = WIRE_FILM,
 ) -> list[Limit]:
-    """Requirements on the seat in the tube for one of `PIECES`, after those that do not depend on it.
+    """Requirements on the pose in the tube for one of `PIECES`, after those that do not depend on it.
 
     No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine
     for the memory.
@@ -102,7 +102,7 @@ def seat_limits(
     """
     fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
     through = f"the tail would pass through the wall ({fields})"
-    resolved = f"the film under the wire is resolved down to {wire_film:g} of its radius, and below 0 "
+    resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     turned = _turned(batch)
     open_ended = batch.placement.ends == "open"
@@ -133,7 +133,7 @@ def seat_limits(
             "at least",
             _TIGHTEST * batch.body_diameter,
             "mm",
-            "a film all round the body is resolved down to a twentieth of its radius",
+            "an annular gap is resolved down to a twentieth of the body's radius",
             "gap-too-thin",
         ),
         Limit.of(
@@ -158,16 +158,16 @@ def seat_limits(
             "gap-too-wide",
         ),
         Limit.of(
-            "clearance of coupling and glass",
+            "clearance of coupling and wall",
             films.coupling,
             "at least",
             thinnest,
             "mm",
-            "the coupling would touch the glass (placement.pitch, placement.yaw, coupling.diameter)",
+            "the coupling would touch the wall (placement.pitch, placement.yaw, coupling.diameter)",
             "tail-in-wall",
         ),
         Limit.of(
-            f"clearance of tail and glass{films.where}",
+            f"clearance of tail and wall{films.where}",
             films.tail,
             "at least",
             wire_film * 0.5 * batch.wire_diameter,

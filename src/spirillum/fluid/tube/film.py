@@ -1,4 +1,4 @@
-"""Reynolds film between a body of revolution and the wall of a circular tube.
+"""Lubrication film (Reynolds' equation) between a body of revolution and the wall of a circular tube.
 
 Lubrication with the body's true normal n and the true distance h between body and wall, the geometric mean of those
 along the normals of either; lengths are those midway. The pressure p of a rigid motion v = U + Omega x r (viscosity 1,
@@ -45,7 +45,7 @@ _ROUNDING = 1e-13
 """What is added to the stiffness's diagonal, over it: where mobilities differ by 1e15 in one element, rounding leaves
 it without a Cholesky factor."""
 _SHEARED = 0.2
-"""Thickness, over the body's radius, above which what shears in the tube is no film: its shear is left out there."""
+"""Thickness over the body's radius above which the shear of the gap is left out: it is no lubrication film."""
 _THINNEST, _INTERVALS, _YAWS = 2e-5, 15, 5
 """Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
 _LEAST_YAW = 0.03
@@ -126,7 +126,7 @@ _STANDARD = _Resolution()
 def film_resistance(
     outline: Outline, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0
 ) -> Matrix6:
-    """Resistance of the film between a body and the wall of a tube, per unit of viscosity, m, m^2 and m^3.
+    """Resistance of the lubrication film between a body and a tube's wall, per viscosity, m, m^2 and m^3.
 
     Args:
         outline: outline of the body.
@@ -143,7 +143,7 @@ def film_resistance(
 
 
 def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0) -> Matrix6:
-    """Resistance of the film of a body that was read already; arguments and answer of `film_resistance`."""
+    """Resistance of the lubrication film of a preprocessed body; arguments and result of `film_resistance`."""
     place = Place(body, radius, e, frame(p, psi))
     grid = _STANDARD._replace(along=round(fineness * _STANDARD.along), around=round(fineness * _STANDARD.around))
     along, around = _element(grid.along), _halves(grid.around)
@@ -224,10 +224,10 @@ def _tested(density: Samples, one: Samples, other: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class FilmTable:
-    """Resistance of a body's film in a tube, tabulated over offset, pitch and yaw."""
+    """Resistance of a body's lubrication film in a tube, tabulated over offset, pitch and yaw."""
 
     packed: Samples
-    """What `kernels.film_table.film_at` takes: a head, then the splines' coefficients in single precision."""
+    """Packed form for `kernels.film_table.film_at`: a head, then the spline coefficients in single precision."""
 
     @classmethod
     def of(
@@ -241,7 +241,7 @@ class FilmTable:
         yaws: int = _YAWS,
         step: Callable[[float], None] | None = None,
     ) -> FilmTable:
-        """Tabulate the film of a body, in half a minute of one core.
+        """Tabulate the lubrication film of a body, in half a minute of one core.
 
         Args:
             outline: outline of the body.
@@ -280,13 +280,13 @@ class FilmTable:
         return cls(np.concatenate([head, np.pad(found, (0, found.size % 2)).view(np.float64)]))
 
     def at(self, e: float, p: float, psi: float) -> tuple[Matrix6, float]:
-        """Resistance at a place, as of `film_resistance`, and the body's smallest gap, m."""
+        """Resistance at a pose, as of `film_resistance`, and the body's smallest gap, m."""
         out = np.empty((6, 6))
         return out, float(table.film_at(self.packed, e, p, psi, out))
 
 
 def _yaw_nodes(count: int) -> Samples:
-    """Coordinates of yaw at which a film is solved for, the smallest next to 0: most films are level."""
+    """Yaw coordinates of the nodes, clustered at 0: most robots are level."""
     found = np.cos((np.arange(count) + 0.5) * 0.5 * np.pi / (count - 0.5))
     found[-1] = _LEAST_YAW
     return np.asarray(found)
@@ -299,7 +299,9 @@ def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: in
     if not radius > a:
         raise InputError("the body does not fit into the tube")
     if not body.half and length < _SHORTEST * a:
-        raise InputError(f"films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius")
+        raise InputError(
+            f"lubrication films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius"
+        )
     head = np.zeros(table.HEAD)
     head[:7] = radius, a, body.half, *body.rear, *body.front
     widest = min(2.0 * (radius - a), radius - a + np.sin(pitch) * reach)
@@ -355,7 +357,7 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
 
 
 def _off_the_wall(body: FilmBody, radius: float, e: float, p: float, psi: float) -> tuple[float, float, float]:
-    """A place of a table, less inclined where the body would touch: some clearances at largest angles are no body's.
+    """Node of a table, less inclined where the body would touch the wall: some nodes are geometrically impossible.
 
     Robots do not come there: only the splines know these nodes.
     """
@@ -386,7 +388,7 @@ def _factors(resistance: Matrix6, a: float, angle: float) -> Samples:
 
 
 def _collocated(places: Samples, low: float, high: float) -> Samples:
-    """B-splines (columns) at places (rows)."""
+    """B-splines (columns) at nodes (rows)."""
     count = places.size
     matrix, weights = np.zeros((count, count)), np.empty(4)
     for row, place in enumerate(places):

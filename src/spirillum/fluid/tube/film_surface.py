@@ -1,4 +1,4 @@
-"""The surface under the film between a body of revolution and a tube's wall, in coordinates that stretch thin places.
+"""Surface under the lubrication film of a body of revolution in a tube, in stretched coordinates.
 
 Frame F: x' along the body's axis, y' level, z' = x' x y', origin at the body's middle, which lies at the offset e below
 the tube's axis. The body's axis is (cos p cos psi, cos p sin psi, sin p) in (along the tube, to the side, towards the
@@ -17,11 +17,11 @@ from spirillum.errors import InputError
 from spirillum.robot.outline import Arc, Outline, Segment
 
 ROUNDED = 0.7
-"""Angle of a rounded end that belongs to the film, rad."""
+"""Angle of a rounded end that belongs to the lubrication film, rad."""
 PATCH = 1.2
 """Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
 _LEAST = 1e-12
-"""Thinnest film over the tube's radius."""
+"""Smallest film thickness over the tube's radius."""
 _FADE = 0.3
 """Depth of the body's axis below the tube's, over the room, at which no side is nearer to the wall any more."""
 _TURNED = (0.62, 0.14)
@@ -34,7 +34,7 @@ _AXIS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class FilmBody:
-    """What a film knows of a body of revolution about its mid-length; lengths in m."""
+    """Geometry of a body of revolution for its lubrication film, about its mid-length; lengths in m."""
 
     radius: float
     """a."""
@@ -61,7 +61,7 @@ class FilmBody:
             return cls(radius, 0.0, (float(ends[0]), rounded[0]), (float(ends[1]), rounded[1]))
         if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
             return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
-        raise InputError("the film of a body without a straight side is known for spheres and spheroids only")
+        raise InputError("the film of a body without a straight side is implemented for spheres and spheroids only")
 
 
 def frame(pitch: float, yaw: float) -> Samples:
@@ -86,7 +86,7 @@ class FilmSurface(NamedTuple):
 
 
 class Cuts(NamedTuple):
-    """Points on [-1, 1] at which the surface is asked for, and the number of equal elements that they fill."""
+    """Points on [-1, 1] at which the surface is evaluated, and the number of equal elements that they fill."""
 
     side: Samples
     """Along the straight side."""
@@ -135,7 +135,7 @@ def _gathered_twice(unit: Samples, marks: tuple[tuple[float, float], tuple[float
 
 @dataclass(frozen=True)
 class Place:
-    """A body at a place in a tube."""
+    """Pose of a body in a tube."""
 
     body: FilmBody
     tube: float
@@ -213,7 +213,7 @@ class Place:
 
 
 def film_surface(place: Place, cuts: Cuts) -> FilmSurface:
-    """Surface under the film, from the rear to the front.
+    """Surface under the lubrication film, from the rear to the front.
 
     `along` is the derivative by a coordinate that runs from -1 to 1 in every element.
     """
@@ -221,7 +221,7 @@ def film_surface(place: Place, cuts: Cuts) -> FilmSurface:
 
 
 def _with_side(place: Place, cuts: Cuts) -> FilmSurface:
-    """The film of a body with a straight side, from the rear to the front."""
+    """Film surface of a body with a straight side, from the rear to the front."""
     body = place.body
     a = body.radius
     reduced = a * place.tube / (place.tube - a)
@@ -288,7 +288,7 @@ def _revolved(
 
 
 def _spheroid(place: Place, cuts: Cuts) -> FilmSurface:
-    """The film of a spheroid: a patch of the stretched unit sphere about its nearest point."""
+    """Film surface of a spheroid: a patch of the stretched unit sphere about its nearest point."""
     body = place.body
     stretch = np.array([body.half, body.radius, body.radius])
     facing = -place.axes[2]

@@ -25,9 +25,9 @@ from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
 
 _THINNEST_REST = 0.08
-"""Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
+"""Gap of the first nodes over the body's radius: the outer resistance is smooth below it."""
 CHECKED_FROM = 0.4
-"""Least gap of the places against which a table is checked over that of the first nodes."""
+"""Least gap of a table's check poses over that of the first nodes."""
 _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
 _GROWTH = 2.0
@@ -35,10 +35,10 @@ _GROWTH = 2.0
 _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
 LARGEST_YAW = float(np.radians(11.0))
-"""Largest yaw of a table, rad: at most places the glass holds the tail before."""
+"""Largest yaw of a table, rad: at most nodes the wall limits the tail to a smaller one."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
 _SWEPT = 121
-"""Points along the tail between which it is asked how near it comes to the glass."""
+"""Points along the tail at which its clearance from the wall is computed."""
 _LEAST_PITCH = np.radians(0.2)
 _SEARCH_YAW = (float(np.radians(44.0)), 45, 1e-6)
 """Largest yaw that is tried, steps, and accuracy of the search for the tail's contact, rad."""
@@ -60,7 +60,7 @@ def rings_of(outline: Outline) -> Samples:
 
 @dataclass(frozen=True)
 class Places:
-    """The places of one robot's table in one tube; m and rad."""
+    """Nodes of one robot's table in one tube; m and rad."""
 
     geometry: RobotGeometry
     radius: float
@@ -96,9 +96,9 @@ class Places:
         thin = self.thinnest / contact_offset(self.rings, self.radius, 0.0)
         if thin > self.stage.upper[0]:
             raise InputError(
-                f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the glass "
+                f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the wall "
                 f"of a tube with channel.diameter = {show(2.0 * self.radius, 'mm')}; allowed: a smaller amplitude, or "
-                "answers for one place at a time, without a table"
+                "single poses without a table"
             )
         found = []
         while thin * _SPACED < self.stage.upper[0]:
@@ -118,13 +118,13 @@ class Places:
 
     @cached_property
     def yaw_gaps(self) -> Samples:
-        """Nodes t of yawed places."""
+        """Coordinates t of the nodes with yaw."""
         last = len(self.gaps) - 1
         return self.gaps[sorted({0, min(2, last - 1), last - 1, last})]
 
     @property
     def yaw_pitches(self) -> Samples:
-        """Nodes of signed f of yawed places."""
+        """Coordinates of signed f of the nodes with yaw."""
         return np.array(_YAW_PITCHES)
 
     @cached_property
@@ -141,11 +141,11 @@ class Places:
 
     @cached_property
     def most_yaw(self) -> Samples:
-        """Largest yaw at the yawed places, (yaw gaps, yaw pitches), rad."""
+        """Largest yaw at the nodes with yaw, (yaw gaps, yaw pitches), rad."""
         return np.array([[self.largest_yaw(float(t), float(f)) for f in self.yaw_pitches] for t in self.yaw_gaps])
 
     def largest_yaw(self, t: float, f: float) -> float:
-        """Largest yaw at a place, rad."""
+        """Largest yaw at a node, rad."""
         seat = self.seat_between(t, f)
         return limited_yaw(self.yaw_limit, seat.offset / self.radius, seat.pitch)
 
@@ -155,20 +155,20 @@ class Places:
         return np.array([[self._steepest(float(t), sign) for sign in (1.0, -1.0)] for t in self.gaps])
 
     def seat(self, t: float, f: float, yaw: float = 0.0) -> Seat:
-        """The seat at a place; negative f is nose down."""
+        """Pose at a node; negative f is nose down."""
         row = int(np.argmin(np.abs(self.gaps - t)))
         pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
         return self._seat(t, pitch, yaw)
 
     def seat_between(self, t: float, f: float, yaw: float = 0.0) -> Seat:
-        """The seat at any t; its largest pitch is that of the next node below."""
+        """Pose at any t; its largest pitch is that of the next node below."""
         row = max(int(np.searchsorted(self.gaps, t, side="right")) - 1, 0)
         pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
         return self._seat(t, pitch, yaw)
 
     @cached_property
     def thinnest(self) -> float:
-        """Gap of the first node of a level robot, m: the tail, too, is as far from the glass as the model resolves."""
+        """Gap of the first node of a level robot, m: body and tail have the smallest resolved clearance."""
         body = 0.5 * self.geometry.body_diameter
         tail = float(np.max(self.swept[:, 1])) + 0.5 * self.geometry.wire_diameter
         return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * self.least_clearance)
@@ -194,7 +194,7 @@ class Places:
         return max(float(_LEAST_PITCH), last_clear(spare, STEEPEST[0 if sign > 0 else 1], *_SEARCH))
 
     def _widest(self, seat: Seat) -> float:
-        """Largest yaw of a seat, also beyond the largest of a table."""
+        """Largest yaw of a pose, also beyond the largest of a table."""
 
         def spare(yaw: float) -> float:
             return self.tail_clearance(replace(seat, yaw=yaw)) - self.least_clearance

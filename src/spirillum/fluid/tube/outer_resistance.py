@@ -1,4 +1,4 @@
-"""What is left of a robot's resistance in its tube without the film under its body, at the places of a table.
+"""Outer resistance of a robot in its tube (without the lubrication film) at the nodes of a table.
 
 The flow is solved for at every place and phase (`tube`), the film is taken away, and what is left, which is smooth up
 to contact, is kept as a Cholesky factor with logarithms on the diagonal.
@@ -23,7 +23,7 @@ from spirillum.robot.tube_pose import Seat
 from spirillum.units import show
 
 HARMONICS = 4
-"""Harmonics of the tail's phase that a table keeps."""
+"""Harmonics of the tail's phase that a table stores."""
 PHASES = 2 * HARMONICS + 1
 """Phases of the tail that give them all."""
 
@@ -36,7 +36,7 @@ _RATES[9, 6] = _RATES[12, 7] = 1.0
 
 
 class NodeSolution(NamedTuple):
-    """One place to solve for."""
+    """Node to solve for."""
 
     tails: tuple[tuple[RobotGeometry, tuple[float, ...]], ...]
     """Robots that differ in their tails, each with the phases of its tail, rad."""
@@ -51,7 +51,7 @@ def matrix_of(full: Samples) -> Samples:
 
 
 def _solve(place: NodeSolution) -> list[Samples]:
-    """(phases, 8, 8) of every tail at one place, viscosity 1."""
+    """Solve for every tail at one node: (phases, 8, 8), viscosity 1."""
     return [matrix_of(full) for full in solved_together(place.tails, place.seat, place.fineness)]
 
 
@@ -62,7 +62,7 @@ def _solve_numbered(numbered: tuple[int, NodeSolution]) -> list[Samples]:
 def solutions(
     places: Sequence[NodeSolution], what: str, progress: Progress | None = None, workers: int = 2
 ) -> list[list[Samples]]:
-    """The 8x8 at every place, of every tail, (phases, 8, 8).
+    """Return the 8x8 at every node, of every tail, (phases, 8, 8).
 
     What was solved before is read from the cache. Places that differ in their tails only are solved for together.
     """
@@ -80,7 +80,7 @@ def solutions(
 
 
 def solved_as_one(places: Sequence[NodeSolution]) -> list[list[int]]:
-    """Numbers of the places that differ in their tails only, and are solved for together."""
+    """Indices of nodes that differ in their tails only and are solved for together."""
     shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
     for number, place in enumerate(places):
         bodies = {g.without_tail for g, _ in place.tails}
@@ -89,7 +89,7 @@ def solved_as_one(places: Sequence[NodeSolution]) -> list[list[int]]:
 
 
 def all_kept(places: Sequence[NodeSolution]) -> bool:
-    """Whether nothing is left to solve for at some places: all phases of all their tails are kept from before."""
+    """Whether the solutions at some nodes are cached for all phases of all their tails."""
     return all(
         is_solved(g, place.seat, place.fineness, p) for place in places for g, phases in place.tails for p in phases
     )
@@ -98,11 +98,11 @@ def all_kept(places: Sequence[NodeSolution]) -> bool:
 def _solutions(
     places: Sequence[NodeSolution], what: str, progress: Progress | None, workers: int
 ) -> list[list[Samples]]:
-    """As `solutions`, place by place."""
+    """As `solutions`, node by node."""
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
-    numbered, kept = list(enumerate(places)), "; what was solved is kept"
+    numbered, kept = list(enumerate(places)), "; completed nodes are saved"
     answers = imap_unordered(_solve_numbered, numbered, workers, besides=kept, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=1):
         found[number] = answer
@@ -120,7 +120,7 @@ def factor_of(matrix: Samples, where: str) -> Samples:
         factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            f"the flow in the tube is resolved too coarsely {where}: without its film the resistance is not positive "
+            f"the flow in the tube is resolved too coarsely {where}: the outer resistance is not positive "
             "definite; allowed: a finer tolerance"
         ) from error
     found = factor[..., _LOWER[0], _LOWER[1]]
@@ -176,7 +176,7 @@ def seen_in_mirror(matrices: Samples) -> Samples:
 
 
 def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
-    """Fourier coefficients of the factor of what is left without the film, (`PHASES`, 36).
+    """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36).
 
     Args:
         matrices: at evenly spread phases from 0, as many as matter there, (phases, 8, 8).

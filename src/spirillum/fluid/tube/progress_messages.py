@@ -1,4 +1,4 @@
-"""What is said before work that takes minutes, which nobody has asked for by name."""
+"""Progress messages of computations that take minutes and start implicitly."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def progress_message(places: int, workers: int, kept: int, seconds: tuple[float,
     remaining = places - kept
     least, most = (max(round(remaining * each / max(workers, 1) / 60.0), 1) for each in seconds)
     minutes = f"about {least} min" if least == most else f"{least} to {most} min"
-    before = f", {kept} of them kept from before, {remaining} still to solve for" if kept else ""
+    before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
     return (
-        f"{ANNOUNCED}: it is made now, once, from {places} places{before}, in {minutes} with "
+        f"{ANNOUNCED}: it is computed once from {places} nodes{before}, in {minutes} with "
         f"{'1 process' if workers == 1 else f'{workers} processes'}"
     )
 
 
 def kept_after(places: int, kept: int) -> str:
-    """What is kept of a preparation that was interrupted, and how it resumes."""
-    return f"{kept} of {places} places are kept, and the same command resumes from there"
+    """Describe the saved state of an interrupted preparation, and how to resume it."""
+    return f"{kept} of {places} nodes are saved; the same command resumes the computation"

@@ -1,4 +1,4 @@
-"""What wires send to the solids in a tube, and what they answer, at any phase: a reduced basis.
+"""Reduced basis for the coupling of wires and solids in a tube at any phase.
 
 Over a turn, all that a wire sends to the solids lies in the span of some hundred fields: those of its ring forces in
 unbounded fluid, mode by mode, and those that the wall reflects. The solids answer them once. A phase then needs only
@@ -36,16 +36,16 @@ _SKETCH, _WALL_SKETCH = 96, 128
 
 @dataclass(frozen=True)
 class Answers:
-    """One system of the solids' unknowns: the basis, fields in unbounded fluid first, and the answers to it."""
+    """Solids' response for one system of unknowns: the basis, fields in unbounded fluid first, and responses to it."""
 
     tractions: Samples
-    """That answer unit fields, (unknowns, fields)."""
+    """Responses to unit fields, (unknowns, fields)."""
     work: Samples
     """Of those tractions against the fields, (fields, fields)."""
     drag: Samples
     """Work of the moving solids' tractions against the fields, (fields, motions)."""
     push: Samples
-    """Work of the answers against the solids' motions, (motions, fields)."""
+    """Work of the responses in the solids' motions, (motions, fields)."""
     free: tuple[tuple[int, int, Samples], ...]
     """Parity, mode, and coefficients from ring sources, (fields, sources)."""
     wall: tuple[Samples, ...]
@@ -64,7 +64,7 @@ class Answers:
 
 @dataclass(frozen=True)
 class Reduced:
-    """What wires send to the solids at any phase, and what these answer."""
+    """Coupling of wires and solids at any phase in the reduced basis."""
 
     sources: Sources
     """The wires, at any phase."""
@@ -205,7 +205,7 @@ def _duals(system: System) -> Samples:
 def _answers(
     solids: Solids, number: int, crossing: list[Samples], wall: Samples, coefficients: list[Samples]
 ) -> Answers:
-    """Answers of one system.
+    """Solids' response of one system.
 
     Args:
         solids: solids and wall.

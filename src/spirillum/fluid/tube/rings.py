@@ -26,7 +26,7 @@ class Rows(NamedTuple):
     of_mode: tuple[np.ndarray, ...]
     """For each mode."""
     dual: Samples
-    """What makes an integral over the surface of an unknown, (unknowns,)."""
+    """Quadrature weights of the unknowns over the surface, (unknowns,)."""
 
     @property
     def starts(self) -> np.ndarray:
@@ -49,7 +49,7 @@ System = tuple[Rows, ...]
 
 
 class Rings(ABC):
-    """What the wall does to solids of revolution: their rings see its waves as Fourier modes about their own axis."""
+    """Coupling of solids of revolution with the wall: its waves as Fourier modes about their own axis."""
 
     @abstractmethod
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
@@ -113,7 +113,7 @@ def projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Sample
 
 
 def finer(panels: Panels, times: int) -> tuple[Samples, Samples, Samples]:
-    """Places x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q)."""
+    """Positions x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q)."""
     places, gauss = np.polynomial.legendre.leggauss(times * panels.order)
     cardinal = panels.cardinals(places)
     x, rho = panels.x @ cardinal.T, panels.rho @ cardinal.T

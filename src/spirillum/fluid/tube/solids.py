@@ -28,12 +28,12 @@ from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import Seat
 
 MOTIONS = 13
-"""Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, held back."""
+"""Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, opposed."""
 
 
 @dataclass(frozen=True)
 class Fineness:
-    """How finely the flow in a tube is resolved."""
+    """Resolution of the flow in a tube."""
 
     wire: Accuracy = "standard"
     """Form of the wires."""
@@ -76,7 +76,7 @@ class Solids:
     def __init__(
         self, solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples | None = None
     ) -> None:
-        """Cut into panels and count modes; nothing is solved for yet.
+        """Cut into panels and count modes, without solving.
 
         Args:
             solids: outlines, and the part (0 body, 1 rotor) with which each moves; none for wires alone.
@@ -97,7 +97,7 @@ class Solids:
 
     @property
     def none(self) -> bool:
-        """Whether there are no solids: then there is nothing but `seat` and `fineness`."""
+        """Whether there are no solids; then only `seat` and `fineness` are defined."""
         return self.parts.size == 0
 
     @property
@@ -128,7 +128,7 @@ class Solids:
 
     @cached_property
     def rows(self) -> tuple[Rows, Rows]:
-        """Unknowns, even and odd: mode 0 of the even ones does not swirl, that of the odd ones does nothing else."""
+        """Unknowns, even and odd: mode 0 of the even ones has no swirl, that of the odd ones has only swirl."""
         area = np.repeat(self.panels.area, 3)
         swirls = np.tile([False, False, True], self.panels.size)
         found = []
@@ -147,7 +147,7 @@ class Solids:
 
     @cached_property
     def rings(self) -> Rings:
-        """How the rings of the solids meet the wall's waves."""
+        """Coupling of the solids' rings with the wall's waves."""
         if self.seat.level:
             return LevelRings(self.panels, self.seat.offset, self.modes)
         return TiltedRings(self.panels, self.seat, self.counts, self.fineness.precision)
@@ -280,7 +280,7 @@ def check_fits(memory: float) -> None:
 
 
 def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples) -> np.ndarray:
-    """Number of modes to keep at each node; 0 and 1 hold all rigid motions.
+    """Number of modes at each node; 0 and 1 represent all rigid motions.
 
     What a ring of radius rho at a distance e from the axis sends to the wall and back in mode m falls off as
     exp(-2 m zeta), cosh(zeta) = (R^2 - rho^2 - e^2)/(2 e rho), where the film's thickness vanishes at complex angles;
@@ -302,13 +302,13 @@ def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples)
 
 _MOST_MODES = 64
 _SQUEEZED = 1.4
-"""Modes over what their exponential decay asks for: the normal resistance at 0.2 mm is then good to half a percent."""
+"""Factor on the number of modes from their decay: the normal resistance at 0.2 mm is then good to 0.5 %."""
 
 
 def _longest(
     solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples
 ) -> Callable[[int, Samples, Samples], Samples]:
-    """Longest panels allowed at (x, rho): against other solids, the film at the wall, and wires."""
+    """Longest panels allowed at (x, rho): close to other solids, the film at the wall, and wires."""
 
     def longest(solid: int, x: Samples, rho: Samples) -> Samples:
         found: Samples = np.full(np.shape(x), np.inf)

@@ -36,11 +36,11 @@ from spirillum.kernels import tube_table as kernel
 
 _REST = 3e-6
 _FILM = np.where(np.arange(film_table.ENTRIES) < len(film_table.ORDER), 2e-5, 1e-6)
-"""What numbers are multiples of."""
+"""Quantum of the stored numbers."""
 _MOST_STEPS = 2.0**31 - 1.0
-"""Coefficients of a film beyond it belong to angles at which no robot fits into its tube."""
+"""Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
 _FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
-"""Single bytes, whose place in a word says nothing: those of a plane follow each other."""
+"""Single bytes, regrouped by their position in a word: those of a plane follow each other."""
 _LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
 
 
@@ -97,7 +97,7 @@ class _Reader:
         return found.astype(np.float64)
 
     def _whole(self, shape: tuple[int, ...]) -> Samples:
-        """What `_coded` has coded."""
+        """Decode the result of `_coded`."""
         planes = np.frombuffer(self._taken(4 * int(np.prod(shape))), np.uint8).reshape(4, -1)
         changes = np.ascontiguousarray(planes.T).view("<i4").reshape(shape[-1], *shape[:-1])
         whole = np.moveaxis(changes, 0, -1).astype(np.int32)
@@ -143,7 +143,7 @@ def _steps(rows: Samples) -> Samples:
 
 
 def _film_of(film: Samples) -> tuple[Samples, Samples]:
-    """Head and coefficients of a packed film."""
+    """Unpack head and coefficients of a lubrication film."""
     head, shape = film[: film_table.HEAD], film_table.shape_of(film)
     values = film[film_table.HEAD :].copy().view(np.float32)[: int(np.prod(shape))]
     return head, values.reshape(shape).astype(np.float64)
@@ -164,11 +164,11 @@ class TubeTable:
     packed: Samples = field(repr=False)
     """For `spirillum.kernels.tube_table.resistance_at`."""
     error: Mapping[str, float]
-    """Largest relative error at places that were not used, all yawed: `forward_velocity`, `body_rotation_rate`, ..."""
+    """Largest relative error at check poses with yaw: `forward_velocity`, `body_rotation_rate`, ..."""
     error_without_yaw: Mapping[str, float]
-    """Largest relative error at other such places, none of them yawed."""
+    """Largest relative error at check poses without yaw."""
     places: int
-    """Number of places that were solved."""
+    """Number of nodes that were solved for."""
     seconds: float
     """Time that it took."""
     wire: float | None = None
@@ -178,11 +178,11 @@ class TubeTable:
 
     @property
     def key(self) -> str:
-        """What names the table: a digest of robot and tube."""
+        """Key of the table: a digest of robot and tube."""
         return key_of(self.geometry, self.radius)
 
     def at(self, offset: float, pitch: float = 0.0, yaw: float = 0.0, phase: float = 0.0) -> tuple[Samples, int]:
-        """The 8x8 at a place, viscosity 1, and how the table's range was left, see `resistance_at`.
+        """The 8x8 at a pose, viscosity 1, and how it leaves the table's range, see `resistance_at`.
 
         Args:
             offset: e of the body's mid-length from the tube's axis, m.
@@ -195,7 +195,7 @@ class TubeTable:
         return out, int(left)
 
     def error_at(self, yaw: float) -> Mapping[str, float]:
-        """Largest relative errors at places with or without a yaw.
+        """Largest relative errors at poses with or without a yaw.
 
         Args:
             yaw: nose to the side, rad.
@@ -284,5 +284,5 @@ def key_of(geometry: RobotGeometry, radius: float) -> str:
 
 
 def least_checked_gap(packed: Samples) -> float:
-    """Smallest gap of the places against which a packed table was checked, m."""
+    """Smallest gap of a packed table's check poses, m."""
     return CHECKED_FROM * float(kernel.range_of(packed).gaps[0])

@@ -21,11 +21,11 @@ RESPONSES = {
     "yawing_torque": 0.03,
     "normal_resistance": 0.05,
 }
-"""What a table is judged by, and the largest relative error that it should have."""
+"""Quantities by which a table is judged, and the largest relative error that each should have."""
 
 
 def response_of(matrix: Samples) -> Samples:
-    """What a place does to a robot whose tail turns at 1 rad/s, held sideways and in tilt, closed ends, viscosity 1.
+    """Response to a tail turning at 1 rad/s, constrained laterally and in tilt, closed ends, viscosity 1.
 
     Returns:
         Forward velocity, body rate, forces y and z, torques y and z of the fluid, and the normal resistance, (7,).
@@ -58,11 +58,11 @@ def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None)
 
 
 _PLACES = 1.1
-"""Largest error at other places, pitched by up to 3 degrees and at gaps from 0.3 mm up to the axis, over that one."""
+"""Largest error at other poses, pitched by up to 3 degrees and at gaps from 0.3 mm up to the axis, over that one."""
 SOLIDS_ERROR = 2e-4
 """Relative error of the drag of a body in a tube at the coarsest tolerance of a table; see `docs/accuracy.md`."""
 _LEAST = 0.005
-"""Least relative error there: where errors of thrust and drag nearly cancel, their sum depends on the place more."""
+"""Least relative error there: where errors of thrust and drag nearly cancel, their sum depends more on the pose."""
 _LENGTH, _WIRE = 60.0, 1.0  # of all that were measured, mm
 _MEASURED: dict[float, dict[tuple[float, float], float]] = {
     40.0: {
@@ -106,7 +106,7 @@ _MEASURED: dict[float, dict[tuple[float, float], float]] = {
 
 
 def at_any_place(compared: float) -> float:
-    """Relative error that is stated of all places, from that at the one at which both wires were compared."""
+    """Relative error for all poses, from that at the one pose at which both wires were compared."""
     return _PLACES * max(abs(compared), _LEAST)
 
 

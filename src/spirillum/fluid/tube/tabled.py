@@ -26,9 +26,9 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 
 THINNEST_GAP = 1e-5
-"""Thinnest gap over the body's diameter: the thinnest film that is tabulated."""
+"""Smallest gap over the body's diameter of the tabulated lubrication films."""
 _HELD = [0, 1, 3, 4]
-"""Places of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
+"""Indices of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
 
 
 def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
@@ -48,7 +48,7 @@ def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
 
 
 def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: Samples) -> Samples:
-    """Resistance along the tube at places, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
+    """Resistance along the tube at poses, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
 
     Args:
         tables: packed tables of the robots, one in each row.
@@ -78,7 +78,7 @@ class TabledTube(Tube):
     )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
-        """Answer from tables."""
+        """Evaluate from tables."""
         super().__init__()
         self._tables = tables
 
@@ -87,7 +87,7 @@ class TabledTube(Tube):
         return self._tables[_key(batch, index)]
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
-        """None: the error of a table is known, see `stated_speed_error`."""
+        """None: the error of a table is stored, see `stated_speed_error`."""
         return ()
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
@@ -97,7 +97,7 @@ class TabledTube(Tube):
         return table.speed_error_at(seat.yaw) if known else float("nan")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
-        """No nearer to the glass, and no further to the side, than where the table's errors are known."""
+        """Limits of the poses for which the table's errors were estimated."""
         gaps, least, yaws, most = np.full((4, batch.size), np.nan)
         for index in range(batch.size):
             table, seat = self.table_of(batch, index), seat_of(batch, index)
@@ -137,7 +137,7 @@ def tables_of(batch: RobotBatch) -> list[TubeTable | None]:
 
 
 def tabled(batch: RobotBatch) -> TabledTube | None:
-    """The model `tube` from the tables of a batch; None unless every robot has one that holds where it lies."""
+    """The model `tube` from the tables of a batch; None unless every robot has a valid one at its pose."""
     if batch.placement.tail_drop:
         return None
     found: dict[str, TubeTable] = {}

@@ -22,11 +22,11 @@ _TIER = 1.6
 _AVERAGED_TIERS = 3
 """Tiers near the wall in which waves are averaged over panels."""
 _MOST_VALUES = 500_000
-"""Values of waves around rings that are held at a time: they stay in the cache, and their memory is used again."""
+"""Number of waves around rings that are evaluated at once: they fit into the cache, and their memory is reused."""
 
 
 def _add_product(left: Samples, right: Samples, total: Samples) -> None:
-    """Add left @ right.T to a matrix in column-major order, in place: products of few columns cost their memory."""
+    """Add left @ right.T in place to a matrix in column-major order; memory-bound for few columns."""
     from scipy.linalg.blas import dgemm, sgemm
 
     if total.size:

@@ -46,7 +46,7 @@ END_LOSS = 1.09
 _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
 _COARSER = 10.0
-"""Tolerance of the resolution that gives the error estimate, over that of the answer."""
+"""Tolerance of the resolution that gives the error estimate, over that of the result."""
 _COARSEST = 0.05
 """Coarsest tolerance of Fourier modes."""
 _MOST_WAVES = 1_000_000
@@ -79,7 +79,7 @@ def _solid_key(g: RobotGeometry, part: str, seat: Seat, fineness: Fineness) -> _
 
 @lru_cache(maxsize=1)
 def _solids(key: _SolidKey) -> Solids:
-    """The last one is kept: tails in one seat come one after the other, and factors take memory."""
+    """Solids of a pose; the last one is cached, for consecutive tails share a pose and factorizations are large."""
     return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
 
 
@@ -108,7 +108,7 @@ def _turned(wire: Wire, phase: float) -> Wire:
 
 
 class _Question(NamedTuple):
-    """All that decides an answer, but for the viscosity and the ends."""
+    """Request of a solution: all parameters but the viscosity and the ends."""
 
     geometry: RobotGeometry
     part: str
@@ -155,7 +155,7 @@ def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float
 
 
 def is_solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> bool:
-    """Whether the answer of `solved` is kept from before."""
+    """Whether the result of `solved` is cached."""
     return is_kept(_Question(geometry, "robot", seat, fineness, phase), _computed)
 
 
@@ -180,7 +180,7 @@ def solved_together(
 
 
 def check_solvable(geometry: RobotGeometry, seat: Seat, fineness: Fineness) -> None:
-    """Refuse a place at which the flow around a whole robot does not fit into memory."""
+    """Refuse a pose at which the flow around a whole robot does not fit into memory."""
     check_fits(_memory(_solid_key(geometry, "robot", seat, fineness)))
 
 
@@ -227,7 +227,7 @@ class Tube(SwimmerModel):
         self._coarser, self._first, self._wire = coarser, 0.5 if between else 0.0, wire
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """See `ResistanceModel.own_error`: the numerics state theirs; what is left is the place that nobody gave."""
+        """See `ResistanceModel.own_error`: numerical errors are estimated; the remaining one is an assumed pose."""
         placement = batch.placement
         unknown = ["the gap under the body"] if placement.gap is None and placement.eccentricity is None else []
         unknown += ["the body's pitch"] if placement.pitch is None else []
@@ -241,13 +241,13 @@ class Tube(SwimmerModel):
         return f"walls are computed, {what_is_fitted(fitted_by)}; {place}{wire}"
 
     def fineness(self, options: ModelOptions) -> Fineness:
-        """How finely the flow is resolved with these options."""
+        """Resolution of the flow with these options."""
         return Fineness(
             self._wire or options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST)
         )
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
-        """See `SwimmerModel.checked_by`: other phases tell what the mean over a turn misses, too."""
+        """See `SwimmerModel.checked_by`: other phases give the error of the mean over a turn, too."""
         coarser = Tube(_COARSER, between=True)
         if batch.options.slender.accuracy == "high" or not _has_finest_wire(batch):
             return (coarser,)
@@ -264,7 +264,7 @@ class Tube(SwimmerModel):
         return placement_answer(batch)
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
-        """What `slender` asks for, and a place in a tube where the flow can be resolved."""
+        """Requirements of `slender`, and a pose in a tube at which the flow can be resolved."""
         return self.part_domain(batch, "robot")
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
@@ -322,7 +322,7 @@ class Tube(SwimmerModel):
         return answers, flows
 
     def _with_ends(self, batch: RobotBatch, full: Samples) -> tuple[Samples, Samples]:
-        """Ends condensed: (n, k, k) with the flow as last row and column, and the mean flow that goes with motions."""
+        """Condense the ends: (n, k, k) with the flow as last row and column, and the mean flow due to motions."""
         flow = np.zeros(full.shape[:2])
         if batch.placement.flow is not None:
             flow[:, -1] = batch.placement.flow
@@ -346,7 +346,7 @@ class Tube(SwimmerModel):
         return self._with_ends(batch, self._full(batch, "robot", phase))[0][:, :-1, :-1]
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
-        """See `ResistanceModel.part_matrix`; that part alone in the channel, where the robot lies."""
+        """See `ResistanceModel.part_matrix`; that part alone in the channel, at the robot's pose."""
         self.check_part(batch, part)
         return joint_locked(self._with_ends(batch, self._full(batch, part, phase))[0][:, :-1, :-1])
 

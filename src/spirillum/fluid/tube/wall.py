@@ -21,7 +21,7 @@ import numpy as np
 from spirillum.arrays import Samples
 
 _DECAY = 2.5
-"""Rate, times the radius, at which the flow of a force dies out along the tube: images in the sum over k lie beyond."""
+"""Decay rate of a force's flow along the tube, times the radius: images in the sum over k are beyond it."""
 _LOWEST = 1e-5
 """First node in k, over the step."""
 _CROWD = 1.5
@@ -209,7 +209,7 @@ def distances_of(points: Samples, radius: float) -> Samples:
 
 
 def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.ndarray]:
-    """Points with the nearest to the wall first, their distances from it, and the places of components to undo that.
+    """Sort points by their distance from the wall; return them, their distances, and the inverse permutation.
 
     What waves reach are then the first of the points: sums over them need no index.
     """

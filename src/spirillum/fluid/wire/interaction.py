@@ -30,7 +30,7 @@ _EIGHT_PI = 8.0 * np.pi
 
 @dataclass(frozen=True)
 class Discretisation:
-    """How finely the flow is resolved."""
+    """Resolution of the flow."""
 
     wire: Accuracy = "standard"
     """Form of the wires."""
@@ -51,7 +51,7 @@ class UnitTwistSolution:
     matrix: Samples
     """R, 12x12, made symmetric; zero for a part that is not there."""
     asymmetry: float
-    """What it lacked in symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
+    """Deviation from symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
     panels: Panels | None = field(repr=False)
     """Nodes on the solids."""
     wires: tuple[Wire, ...] = field(repr=False)
@@ -165,7 +165,7 @@ def _longest(
 
 
 def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Discretisation) -> list[int]:
-    """Number of modes to keep on each solid; 0 and 1 hold all rigid motions.
+    """Number of modes on each solid; 0 and 1 represent all rigid motions.
 
     With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
     falls off as exp(-2 m zeta).
@@ -201,12 +201,12 @@ def surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
 
 @dataclass(frozen=True)
 class _Images:
-    """What the solids, held or moving, do to the wires; all without the factor 1/(8 pi)."""
+    """Images: velocity at the wires due to the solids at rest or in motion; all without the factor 1/(8 pi)."""
 
     resistance: Samples
     """Of the solids alone, (12, 12)."""
     mobility: Samples
-    """What the wires' forces and moments lose to the held solids; as A of `WireSystem`."""
+    """Reduction of the wires' mobility by the solids at rest; as A of `WireSystem`."""
     drift: Samples
     """Velocities and gradients at the stations from the solids' motion; as S of `WireSystem`."""
     drag: Samples
@@ -217,7 +217,7 @@ class _Images:
     """For each mode the rows (3 nodes of the solids that bear it), and the densities there for ring sources at the
     stations, (rows, stations of 3 forces or 3 forces and 3 torques)."""
     sources: Sources
-    """What the stations send out."""
+    """Sources at the stations."""
 
     @classmethod
     def of(

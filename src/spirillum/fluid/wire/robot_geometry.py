@@ -61,7 +61,7 @@ class RobotGeometry(NamedTuple):
 
     @property
     def without_tail(self) -> RobotGeometry:
-        """Body, coupling and wire, with 0 in place of the tail's sizes: equal for robots that differ in these alone."""
+        """Body, coupling and wire, with 0 for the tail's sizes: equal for robots that differ in these alone."""
         return self._replace(wavelength=0.0, amplitude=0.0, tail_length=0.0, taper=0.0, hand=0.0)
 
     @property

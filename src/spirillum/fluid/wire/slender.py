@@ -74,7 +74,7 @@ def _slimness(batch: RobotBatch) -> list[Limit]:
 
 
 def _apart(batch: RobotBatch, limits: list[Limit]) -> Limit:
-    """No part of the wire touches another, the arm at its root included; asked of robots that keep the other limits."""
+    """Require that no part of the wire touches another, for robots that satisfy the other limits."""
     nearest = np.full(batch.size, np.inf)
     for index in within(batch, limits):
         nearest[index] = _closest(RobotGeometry.of(batch, index))
@@ -120,7 +120,7 @@ class Slender(SwimmerModel):
     closed_form = False
 
     def __init__(self, resolution: Discretisation | None = None) -> None:
-        """Resolve the flow as each robot's `model.slender.accuracy` says, or in one way for all."""
+        """Resolve the flow by each robot's `model.slender.accuracy`, or with one resolution for all."""
         self._resolution = resolution
 
     def stated_error(self, options: ModelOptions) -> str:
@@ -157,7 +157,7 @@ class Slender(SwimmerModel):
                 "more than",
                 0.5 * batch.wire_diameter,
                 "mm",
-                "the tail's root, coupling.length behind the body, would lie in the body",
+                "the tail's root, coupling.length behind the body, would be inside the body",
                 "tail-in-body",
             ),
             Limit.of(
@@ -166,7 +166,7 @@ class Slender(SwimmerModel):
                 "at least",
                 _SMALLEST_GAP * batch.amplitude,
                 "mm",
-                "the film between body and tail is resolved down to a hundredth of tail.amplitude",
+                "the gap between body and tail is resolved down to a hundredth of tail.amplitude",
                 "film-too-thin",
             ),
             Limit.of(
@@ -175,7 +175,7 @@ class Slender(SwimmerModel):
                 "at least",
                 _SMALLEST_CLEARANCE * batch.coupling_diameter,
                 "mm",
-                "the film between body and coupling is resolved down to a hundredth of coupling.diameter",
+                "the gap between body and coupling is resolved down to a hundredth of coupling.diameter",
                 "film-too-thin",
             ),
             Limit.of(

@@ -92,7 +92,7 @@ class Panels:
         return np.stack([self.rho @ derivative.T, -self.x @ derivative.T], axis=-1).reshape(-1, 2)
 
     def cardinals(self, places: Samples) -> Samples:
-        """Lagrange polynomials of a panel's nodes at places in [-1, 1] that are no nodes, (places, p)."""
+        """Lagrange polynomials of a panel's nodes at points in [-1, 1] that are no nodes, (points, p)."""
         nodes, barycentric = _rule(self.order)[:2]
         terms: Samples = barycentric / (places[:, None] - nodes)
         values: Samples = terms / terms.sum(axis=1, keepdims=True)
@@ -199,7 +199,7 @@ _STEP = 1e-3  # of the differences that make couples from forces, over the blob 
 
 @dataclass(frozen=True)
 class Sources:
-    """Forces and torques at the wires' stations, in cylindrical components, as solids feel them.
+    """Forces and torques at the wires' stations, in cylindrical components, as sources for the solids.
 
     Torques are those of the first moments; the moments' strains fade so fast that solids do not feel them.
     """
@@ -248,7 +248,7 @@ class Sources:
         return turns
 
     def columns(self, matrix: Samples) -> Samples:
-        """Turn columns that stand for sources into columns for the stations' forces, then moments."""
+        """Convert columns of sources into columns for the stations' forces, then moments."""
         stations, kinds = len(self.x), self.torques.shape[2]
         if stations == 0:
             return matrix

@@ -47,7 +47,7 @@ class Wire:
     tangents: Samples
     """Unit tangents, (n, 3)."""
     lengths: Samples
-    """Arc length that each station stands for, m, (n,)."""
+    """Arc length of each station, m, (n,)."""
     radius: float
     """Radius a of the wire, m."""
 
@@ -126,7 +126,7 @@ def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> 
 
 
 def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
-    """Cut a curve that is known to make a wire into stations; it may touch itself.
+    """Cut a curve of valid wire geometry into stations; it may touch itself.
 
     Args:
         curve: (n, 3) centreline, m.
@@ -172,7 +172,7 @@ def closest_approach(wire: Wire, *, closed: bool = False) -> float:
 
 
 def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:
-    """Arc lengths of the stations, and what each stands for."""
+    """Positions of the stations along the arc, and the arc length of each."""
     step = _SPACING * spacing * blob
     if closed:
         count = int(np.ceil(length / step))

@@ -15,7 +15,7 @@ const PLOTS_OTHERWISE = ["forward_velocity", "tail_rotation_rate", "body_rotatio
 const TABS = ["swim", "compare", "replay", "measure"];
 const HEADLINE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"];
 const EACH = 110; // ms between two drawings of numbers and plots: faster is not read
-const BEHIND = 0.12; // s; beyond it the page says that it is slower than asked
+const BEHIND = 0.12; // s; beyond it the page says that it is slower than requested
 const $ = (id) => document.getElementById(id);
 const state = { scene: null, lanes: [], past: null, chosen: 0, tab: "swim", socket: null };
 
@@ -252,8 +252,8 @@ function setFrame(frame) {
     state.told = performance.now();
     numbers.now(first.values);
   }
-  if (frame.playing && frame.behind > BEHIND) $("behind").textContent = "slower than asked";
-  else if ($("behind").textContent === "slower than asked") $("behind").textContent = "";
+  if (frame.playing && frame.behind > BEHIND) $("behind").textContent = "slower than requested";
+  else if ($("behind").textContent === "slower than requested") $("behind").textContent = "";
 }
 
 // Tabs, time, keys

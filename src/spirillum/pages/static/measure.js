@@ -5,7 +5,7 @@ import { capital } from "./plots.js";
 import { Pointing } from "./pointing.js";
 
 const POINTED = {
-  ruler: { name: "Ruler", count: 2, words: "Click two marks of the ruler, far apart, and say what length lies between them." },
+  ruler: { name: "Ruler", count: 2, words: "Click two marks of the ruler, far apart, and enter the distance between them." },
   body: { name: "Body", count: 2, words: "Click the nose, then the rear end of the body." },
   stripes: { name: "Stripes", count: 0, words: "Click every stripe that is seen across the body, once each; then take them." },
 };
@@ -123,14 +123,14 @@ export class Measure {
     });
   }
 
-  // What the film tells by itself is filled in where it is clear.
+  // Values that are detected reliably are filled in.
   propose() {
     const film = this.film;
     this.tell("films", "Looking for ruler and robot \u2026");
     this.attempt("films", async () => {
       const found = await this.act("propose", { film });
       const robot = found.find((one) => one.name === "robot");
-      this.found.replaceChildren(element("summary", { text: "What the film tells by itself" }),
+      this.found.replaceChildren(element("summary", { text: "Detected in the video" }),
         ...found.map((one) => element("p", { text: `${capital(one.name.replace("_", " "))} (${one.confidence}): ${one.sentence}.` })));
       this.found.hidden = false;
       return robot.confidence === "not found" ? robot.sentence : "the robot is found; what is clear of it stands in the setup";
@@ -179,10 +179,10 @@ export class Measure {
     this.stageHolder = element("div", { class: "stage film" });
     this.pointer = new Pointing(this.stageHolder, (point) => this.clicked(point));
     this.video = element("video", { controls: true, playsinline: true, hidden: true, id: "annotated" });
-    this.empty = element("label", { class: "drop inside", for: "film-files" }, element("h2", { text: "Measure a film" }),
+    this.empty = element("label", { class: "drop inside", for: "film-files" }, element("h2", { text: "Measure a video" }),
       element("p", { text: "Drop films of a robot here, one a trial, or choose them. They stay on this machine." }), element("span", { class: "plain", text: "Choose films" }));
     this.stageHolder.append(this.video, this.empty);
-    this.slider = element("input", { type: "range", id: "frame-time", min: 0, max: 1, step: 0.01, value: 0, "aria-label": "Time in the film" });
+    this.slider = element("input", { type: "range", id: "frame-time", min: 0, max: 1, step: 0.01, value: 0, "aria-label": "Time in the video" });
     this.slider.addEventListener("input", () => { this.time = Number(this.slider.value); this.clock.textContent = clock(this.time); clearTimeout(this.soon); this.soon = setTimeout(() => this.frame(), 80); });
     this.clock = element("output", { class: "clock" });
     this.chips = element("div", { class: "chips", role: "group", "aria-label": "Films" });
@@ -206,7 +206,7 @@ export class Measure {
     this.resultsCard = element("section", { class: "card", id: "measured", "aria-label": "Results", hidden: true }, this.results);
     this.holder.replaceChildren(
       element("section", { class: "theatre", "aria-label": "Film" }, this.stageHolder,
-        element("div", { class: "transport" }, element("label", { class: "plain calm", for: "film-files", text: "Add films" }), input, this.chips, this.slider, this.clock)),
+        element("div", { class: "transport" }, element("label", { class: "plain calm", for: "film-files", text: "Add videos" }), input, this.chips, this.slider, this.clock)),
       element("aside", { class: "panel", "aria-label": "Setup and results" }, this.resultsCard,
         element("section", { class: "card", "aria-label": "Point" }, element("h2", { text: "Point" }), this.lines.look, this.lines.films, this.found, ...steps),
         element("section", { class: "card knobs", "aria-label": "Setup" }, element("h2", { text: "Setup" }),

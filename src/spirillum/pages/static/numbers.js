@@ -39,7 +39,7 @@ export class Numbers {
       element("thead", {}, element("tr", {},
         element("th", { scope: "col", text: "" }),
         element("th", { scope: "col", text: "now", title: "at this moment of the run" }),
-        element("th", { scope: "col", text: "held", title: "steady swimming of a robot that is held at its place, as predict gives it" }),
+        element("th", { scope: "col", text: "held", title: "steady swimming in axial motion at a fixed pose, as predicted by predict" }),
         element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
       )), body);
     this.table = table;
@@ -74,7 +74,7 @@ function words(numbers, lane) {
   const error = numbers.error === null ? "" : `Error of the speed ${figure(100 * numbers.error, 2)} %${numbers.against ? `, against ${numbers.against}` : ""}. `;
   list.append(element("p", {}, element("b", { text: "How sure: " }), error + capital(numbers.statement) + (numbers.statement ? "." : "")));
   const more = [lane.caution, ...lane.warnings, ...numbers.warnings].filter((text, k, all) => text && all.indexOf(text) === k);
-  if (numbers.band) more.push("held and range are of a robot that is held at a place; the one in the picture sinks, tilts and yaws, and may come to swim outside the range");
+  if (numbers.band) more.push("held and range are for axial motion at a fixed pose; the robot in the picture sinks, tilts and yaws, and may swim outside the range");
   if (numbers.others) more.push(numbers.others);
   if (more.length) {
     list.append(element("details", {}, element("summary", { text: `To be careful about (${more.length})` }), ...more.map((text) => element("p", { text: sentence(text) }))));

@@ -52,7 +52,7 @@ class Replay {
         element("div", { class: "transport" }, this.button, this.slider, this.clock,
           element("button", { class: "quiet", text: "\u2212", "aria-label": "Slower", onclick: slower(-1) }), this.paceWord,
           element("button", { class: "quiet", text: "+", "aria-label": "Faster", onclick: slower(1) }),
-          leave ? element("label", { class: "quiet wordy file", for: "beside-film", text: "Add film" }) : null,
+          leave ? element("label", { class: "quiet wordy file", for: "beside-film", text: "Add video" }) : null,
           leave ? this.filmInput() : null,
           leave ? element("button", { class: "quiet wordy", text: "Another run", onclick: leave }) : null),
         element("div", { class: "strip" }, element("figure", { class: "card section" }, section, this.sectionWords),
@@ -75,12 +75,12 @@ class Replay {
   filmPane(data, live) {
     if (!live && !data.film) return null;
     const pane = element("div", { class: "film-pane", hidden: !data.film });
-    this.video = element("video", { playsinline: true, "aria-label": "The film" });
+    this.video = element("video", { playsinline: true, "aria-label": "The video" });
     this.video.muted = true;
-    this.start = element("input", { type: "text", id: "film-start", value: "0", inputmode: "decimal", autocomplete: "off", "aria-label": "Time of the film at which the run begins, s" });
+    this.start = element("input", { type: "text", id: "film-start", value: "0", inputmode: "decimal", autocomplete: "off", "aria-label": "Time of the video at which the run begins, s" });
     this.start.addEventListener("change", () => this.seek(this.sample));
-    pane.append(this.video, element("label", { class: "film-start" }, "the run begins in the film at", element("span", { class: "field" }, this.start, element("span", { class: "unit", text: "s" })),
-      data.compared ? element("span", { text: "dashed: tracked in the film" }) : null));
+    pane.append(this.video, element("label", { class: "film-start" }, "the run begins in the video at", element("span", { class: "field" }, this.start, element("span", { class: "unit", text: "s" })),
+      data.compared ? element("span", { text: "dashed: tracked in the video" }) : null));
     this.pane = pane;
     if (data.film) {
       this.video.src = data.film.url;

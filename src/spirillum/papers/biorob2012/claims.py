@@ -35,7 +35,7 @@ def evaluated(dataset: xr.Dataset) -> list[Claim]:
 
 
 def foretold(dataset: xr.Dataset) -> list[Claim]:
-    """What robots that were laid down say of the statements, verdicts of a third kind; empty where none were."""
+    """Evaluate the statements for released robots, verdicts of a third kind; empty without such robots."""
     return claims_predicted.predicted(Evidence(dataset)) if _of_this_paper(dataset) else []
 
 

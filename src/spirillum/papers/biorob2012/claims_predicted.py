@@ -32,7 +32,7 @@ from spirillum.view.figures.style import label_of_model as label
 def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
     """Table III."""
     yield Claim(
-        "Body drag factors that stand for the walls (Table III)",
+        "Body drag factors that represent the walls (Table III)",
         "1.95 D_x wide, 3.6 D_x narrow; 0.6 E_x (SBT), 1 E_x (RFT)",
         "used as given, as named calibrations of the preset robots",
         "undecidable",
@@ -77,7 +77,7 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
             "order 1e-7 (text), 7e-7 (Table II)",
             f"{friction:.0e} N m s/rad, Table II's value",
             "undecidable",
-            "a measurement of the paper; 7e-7 lies nearer to 1e-6 than to 1e-7",
+            "a measurement of the paper; 7e-7 is closer to 1e-6 than to 1e-7",
         )
 
 
@@ -126,7 +126,7 @@ _EQUAL = 0.05
 
 
 def predicted(evidence: Evidence) -> list[Claim]:
-    """The verdicts of a study whose robots were laid down; empty for one without."""
+    """Verdicts of a study with released robots; empty for one without."""
     if "forward_velocity_at_run" not in evidence.dataset:
         return []
     readings = FrictionModelRuns(evidence)
@@ -145,7 +145,7 @@ def predicted(evidence: Evidence) -> list[Claim]:
 
 
 def _range(values: Values, unit: str, scale: float = 1.0) -> str:
-    """Least and largest in words."""
+    """Format the smallest and largest value."""
     known = scale * values[np.isfinite(values)]
     if not known.size:
         return "not computed"

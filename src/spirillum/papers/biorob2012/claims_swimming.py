@@ -190,7 +190,7 @@ def _holds_for_any_weights(losses: Values) -> Verdict:
 
 
 def trends(evidence: Evidence) -> Iterator[Claim]:
-    """How speed and load depend on wavelength and amplitude."""
+    """Dependence of speed and load on wavelength and amplitude."""
     for claim, axis, sign, variable in (
         ("Forward velocity increases with wavelength", 1, 1.0, "wavelength"),
         ("Forward velocity decreases with amplitude, except at lambda = 25 mm", 2, -1.0, "amplitude"),
@@ -238,7 +238,7 @@ def _share(steps: Values) -> str:
 
 
 def _always(steps: Values) -> Verdict:
-    """Whether a trend holds in every step of the grid; a grid without steps does not tell."""
+    """Whether a trend is satisfied in every step of the grid; undecided for a grid without steps."""
     if steps.size == 0:
         return "undecidable"
     return "agrees" if bool(np.all(steps > 0)) else "disagrees"

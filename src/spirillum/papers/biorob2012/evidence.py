@@ -78,7 +78,7 @@ NO_RATES = "the observed rates are lost; give an observations file to decide"
 
 
 class Evidence:
-    """What a study's dataset can say, in the words of the paper (channels `wide` and `narrow`, tails in mm)."""
+    """Quantities of a study's dataset in the notation of the paper (channels `wide` and `narrow`, tails in mm)."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self.dataset = dataset
@@ -94,7 +94,7 @@ class Evidence:
         self.computed: tuple[str, ...] = tuple(computed)
         """Models that compute the channel's walls."""
         self.confined: tuple[str, ...] = tuple(name for name in self.models if name in computed or name in fitted)
-        """Models to which the channel makes a difference: those, and models with factors that stand for the walls."""
+        """Models that depend on the channel: those with walls, and those with factors that represent the walls."""
 
     def free(self, name: str, model: str, channel: str | None = None) -> Values:
         """A quantity of free swimming at the friction-free bound, (wavelength, amplitude) or both channels first."""
@@ -123,7 +123,7 @@ class Evidence:
         return f"it speaks of all tails in both channels; the observations have {', '.join(counts)}"
 
     def tail(self, wavelength_mm: float, amplitude_mm: float) -> tuple[int, int] | None:
-        """Place of a tail in the grid, if it is there."""
+        """Indices of a tail in the grid, if it is there."""
         places = []
         for name, value in (("wavelength", wavelength_mm), ("amplitude", amplitude_mm)):
             near = np.flatnonzero(np.isclose(self.dataset[name].values, value * 1e-3, rtol=1e-6))
@@ -144,7 +144,7 @@ class Evidence:
         return loss
 
     def drops_of_the_band(self, model: str) -> Values | None:
-        """Relative losses at equal motor rates, of the reference place and of a band (last axis)."""
+        """Relative losses at equal motor rates, of the reference pose and of a band (last axis)."""
         if model not in self.computed or "forward_velocity_at_place" not in self.dataset:
             return None
         return np.concatenate(
@@ -153,7 +153,7 @@ class Evidence:
 
     @property
     def place(self) -> str:
-        """Where robots lie for the models that compute the walls, in words."""
+        """Poses of the models that compute the walls, in words."""
         return reference_place(self._settings)
 
 

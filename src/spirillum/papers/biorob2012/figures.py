@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _TITLE = "Loss of speed from the wide to the narrow channel"
 _MOST_COLUMNS = 5
 _STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0}
-"""Look of what the paper states."""
+"""Style of the paper's values."""
 
 
 def drop_picture(shown: StudyView) -> Picture | None:
@@ -56,7 +56,7 @@ def drop_picture(shown: StudyView) -> Picture | None:
     fitted = [label_of_model(name) for name in evidence.confined if name not in evidence.computed]
     if fitted:
         notes.append(
-            f"In {', '.join(fitted)} Table III's factors stand for the walls; they were fitted to the same data."
+            f"In {', '.join(fitted)} Table III's factors represent the walls; they were fitted to the same data."
         )
     panels = min(shown.whole.sizes["wavelength"], _MOST_COLUMNS)
     alternative = (
@@ -124,7 +124,7 @@ _SIGHT = np.array([0.56, 0.76, -0.34])
 """Direction in which the picture is seen: from the side, from behind and from above."""
 _POINTS = 1200
 _MARKED = (0.215, 0.415, 0.63, 0.83)
-"""Places of the frames, shares of the axial length."""
+"""Positions of the frames, shares of the axial length."""
 _SHADES = ("#4a2410", "#c2763a", "#ffd9b0")
 
 
@@ -228,7 +228,7 @@ def frenet_figure(robot: Robot) -> Figure:
 
 
 def _draw_wire(axes: Axes, path: Samples, depth: Samples, width: float) -> None:
-    """A round wire: dark rim, body, light; what is farther away is drawn first and darker."""
+    """Plot a round wire: dark rim, body, light; farther parts first and darker."""
     pieces = np.stack([path[:-2], path[2:]], axis=1)
     far = (depth[1:-1] - depth.min()) / max(float(np.ptp(depth)), 1e-12)
     shades = np.array([to_rgb(colour) for colour in _SHADES])
@@ -291,7 +291,7 @@ PAPER_FIGURES = {
 
 
 def more_figures(dataset: xr.Dataset) -> dict[str, Picture]:
-    """Figures that only this paper asks for: `drop`, the loss of speed from the wide to the narrow channel."""
+    """Figures of this paper only: `drop`, the loss of speed from the wide to the narrow channel."""
     if "channel" not in dataset.dims:
         return {}
     drop = drop_picture(StudyView.of(dataset, PAPER_FIGURES))

@@ -1,4 +1,4 @@
-"""What robots that were laid down and let go say about a statement, and how that becomes a verdict.
+"""Predictions of released robots for a statement, and the verdict that follows.
 
 Nothing is fitted and nothing is observed: a robot's readings differ by how it was laid down, how long it waited, how
 rough and how slippery its wall is, and over what its run is read. A statement that holds in all readings is predicted
@@ -37,15 +37,15 @@ class FrictionModelRuns:
     """Readings of a study's robots, one for each run and window of the design."""
 
     def __init__(self, evidence: Evidence) -> None:
-        """Read a study whose robots were laid down."""
+        """Read a study with released robots."""
         self.evidence = evidence
         self._dataset = evidence.dataset
         self._levels = levels_of_readings()
         speeds = self.of("forward_velocity")
         self.known: Flags = np.asarray(np.isfinite(speeds).any(axis=-1))
-        """Whether a robot was laid down, (channel, wavelength, amplitude)."""
+        """Whether a robot was released, (channel, wavelength, amplitude)."""
         self.both: Flags = np.asarray(self.known.all(axis=0))
-        """Whether a tail was laid down in both channels, (wavelength, amplitude)."""
+        """Whether a tail was released in both channels, (wavelength, amplitude)."""
 
     def of(self, name: str, inferred_by: str | None = None) -> Values:
         """A quantity, (channels wide and narrow, wavelength, amplitude, readings)."""
@@ -57,12 +57,12 @@ class FrictionModelRuns:
 
     @property
     def missing(self) -> str:
-        """Which robots were not laid down, in words; empty if all were."""
+        """List the robots that were not released; empty if all were."""
         lacking = int(np.count_nonzero(~self.known))
         return f"{lacking} of {self.known.size} robots have no table of their tube" if lacking else ""
 
     def holds(self, steps: Values) -> Values:
-        """Whether all steps are positive, in each reading: 1, 0, or NaN where none is known, (readings,)."""
+        """Whether all steps are positive, in each reading: 1, 0, or NaN if none is finite, (readings,)."""
         flat = steps.reshape(-1, steps.shape[-1])
         known = np.isfinite(flat)
         found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
@@ -106,17 +106,17 @@ class FrictionModelRuns:
             return Judgement("depends", self._nothing)
         low, high = float(known.min()), float(known.max())
         if np.all(np.abs(known / stated - 1.0) < _CLOSE):
-            return Judgement("predicted-agrees", f"all {known.size} readings lie within {100 * _CLOSE:.0f} %")
+            return Judgement("predicted-agrees", f"all {known.size} readings are within {100 * _CLOSE:.0f} %")
         if stated * (1.0 + _CLOSE) < low:
             return Judgement(
-                "predicted-disagrees", f"all readings lie above, by a factor of {low / stated:.2g} at least"
+                "predicted-disagrees", f"all readings are above, by a factor of {low / stated:.2g} at least"
             )
         if stated * (1.0 - _CLOSE) > high:
             by = f", by a factor of {stated / high:.2g} at least" if high > 0 else ""
-            return Judgement("predicted-disagrees", f"all readings lie below{by}")
+            return Judgement("predicted-disagrees", f"all readings are below{by}")
         names = self._movers(values)
         means = "; ".join(self._means(values, name, unit, scale) for name in names)
-        return Judgement("depends", f"{_joined(names)}: the readings lie on both sides, on average {means}")
+        return Judgement("depends", f"{_joined(names)}: the readings are on both sides, on average {means}")
 
     def claim(self, statement: str, paper: str, computed: str, judgement: Judgement) -> Claim:
         """A statement with its verdict."""
@@ -124,13 +124,13 @@ class FrictionModelRuns:
 
     @property
     def _nothing(self) -> str:
-        """Why no reading tells, in words."""
+        """Reason why no reading decides."""
         if self.missing:
             return f"no table: {self.missing}"
         return "the study's tails: they do not show it, or no run reaches so far"
 
     def _movers(self, values: Values) -> list[str]:
-        """The factors that move an answer most."""
+        """Factors with the largest effect on a result."""
         effects = np.abs(np.nan_to_num(main_effects(values, self._levels)))
         return [READ[number] for number in np.argsort(-effects) if effects[number] >= _AS_MUCH * effects.max()][:2]
 
@@ -154,7 +154,7 @@ class FrictionModelRuns:
         return " and ".join(word.replace("  ", " ") for word in words)
 
     def _level(self, name: str, high: bool | int) -> str:  # noqa: FBT001 - which of two
-        """A level of a factor in words."""
+        """Format a level of a factor."""
         if name == "window":
             return f"the {WINDOWS[int(high)]}"
         if name == "pitch":

@@ -1,4 +1,4 @@
-"""Pictures by matplotlib, drawn with the settings of `style` whatever the user's are."""
+"""Matplotlib figures, with the settings of `style` whatever the user's are."""
 
 from __future__ import annotations
 

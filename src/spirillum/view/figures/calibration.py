@@ -50,7 +50,7 @@ def calibration_figures(found: Calibrated) -> dict[str, Figure]:
 
 
 def _source(found: Calibrated) -> str:
-    what = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
+    what = "synthetic, no measured data" if found.experiment.synthetic else "observed"
     return f"{plain(found.experiment.source, 40)} ({what})"
 
 
@@ -97,9 +97,7 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
         if any(np.any(np.isfinite(row["low"])) for row in rows):
             notes.append("Shades: 95 % of a tail's own mean as the fit expects it, the model's discrepancy included.")
         if found.friction:
-            notes.append(
-                f"$B_{{eff}}$ follows from (18) at the observed motor rate, friction reading '{found.reading}'."
-            )
+            notes.append(f"$B_{{eff}}$ follows from (18) at the observed motor rate, friction model '{found.reading}'.")
         if len(columns) < amplitudes.size:
             notes.append(f"Drawn are {len(columns)} of {amplitudes.size} amplitudes.")
         sheet = Sheet(
@@ -143,7 +141,7 @@ def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
 
 
 def _rows(found: Calibrated) -> list[dict[str, Any]]:
-    """What each row shows, in its unit: observed, half width, predicted with limits."""
+    """Content of each row, in its unit: observed, half width, predicted with limits."""
     experiment, rows = found.experiment, []
     rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
     if "advance" in found.predicted:

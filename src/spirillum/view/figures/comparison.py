@@ -39,7 +39,7 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
     lines = f" Lines: {ENDS[ranking.kind]}." if ranking.kind else ""
     walls = f" {_NO_WALLS}." if ranking.walls else ""
     caption = (
-        f"{which}, by model {ranking.model} with friction reading {ranking.friction}; filled: the best of its column."
+        f"{which}, by model {ranking.model} with friction model {ranking.friction}; filled: the best of its column."
         f"{lines}{walls}"
     )
     title = ranking.message[:1].upper() + ranking.message[1:]
@@ -167,7 +167,7 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
 
 
 def _label(comparison: ModelComparison, name: str) -> str:
-    """A model's name, with a star where calibration factors are in its answer."""
+    """A model's name, with a star if its result contains calibration factors."""
     answer = comparison.predictions.get(name)
     return f"{name}*" if answer is not None and answer.calibrated else name
 
@@ -179,7 +179,7 @@ def _conditions(comparison: ModelComparison) -> str:
         driven = f"tail at {rates[0]:.4g} Hz"
     else:
         driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
-    return f"{driven} · friction reading '{comparison.friction}' · computed, nothing is measured"
+    return f"{driven} · friction model '{comparison.friction}' · computed, no measured data"
 
 
 def _notes(comparison: ModelComparison) -> list[str]:
@@ -191,12 +191,12 @@ def _notes(comparison: ModelComparison) -> list[str]:
     silent = [name for name, error in errors.items() if error is None]
     if silent:
         found.append(
-            f"No bar: {', '.join(silent)}; {'their' if len(silent) > 1 else 'its'} error is known in words only."
+            f"No bar: {', '.join(silent)}; {'their' if len(silent) > 1 else 'its'} error is not a single number."
         )
     calibrated = [name for name, answer in comparison.predictions.items() if answer.calibrated]
     if calibrated:
-        found.append("*With calibration factors on the body's drag, which stand for the channel's walls.")
-    found += [f"No answer: {plain(why, 400)}" for why in comparison.refusals.values()]
+        found.append("*With calibration factors on the body's drag, which represent the channel's walls.")
+    found += [f"No result: {plain(why, 400)}" for why in comparison.refusals.values()]
     return found
 
 
@@ -245,7 +245,7 @@ _WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "styl
 
 
 def _finish(axes: Axes, values: np.ndarray) -> None:
-    """Horizontal axis from zero, with room for words; models on lines of their own."""
+    """Set the horizontal axis from zero, with room for labels; one line for each model."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     low, high = min(low, 0.0), max(high, 0.0)

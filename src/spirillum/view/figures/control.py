@@ -16,7 +16,7 @@ from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
 
 _MOST_SEEN = 1500
-"""Frames that are drawn at most."""
+"""Largest number of plotted frames."""
 
 
 def control_figure(control: Control) -> Figure:
@@ -55,7 +55,7 @@ def _subtitle(control: Control) -> str:
     return (
         f"model {control.model} · camera {show(control.lab.camera.latency, 's')} late · remote "
         f"{show(control.lab.remote.delay, 's')} late · friction times {control.drawn.friction:.3g} · {flow} · "
-        f"{'good' if control.score.good else 'not good'} enough · computed, nothing is measured"
+        f"{'good' if control.score.good else 'not good'} enough · computed, no measured data"
     )
 
 
@@ -73,12 +73,12 @@ def _legend(control: Control) -> list[Line2D]:
 
 
 def _has_interval(control: Control) -> bool:
-    """Whether the place that is estimated has a standard error, which is drawn."""
+    """Whether the estimated position has a standard error to be plotted."""
     return _path_of(control).estimated is not None and "estimated_position_error" in control.dataset
 
 
 class _Path(NamedTuple):
-    """What a task is about: the place along the tube, or the distance from its axis; m."""
+    """Controlled variable of a task: the position along the tube, or the distance from its axis; m."""
 
     true: Samples
     seen: Samples

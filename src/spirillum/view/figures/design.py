@@ -71,12 +71,12 @@ def _subtitle(design: Design) -> str:
     if len(design.profiles) > 1:
         words.append("along each field the others at their best values")
     if design.uncertainty is not None:
-        words.append(f"{design.searched.drawn.number} draws of what is not known")
-    return " · ".join([*words, "computed, nothing is measured"])
+        words.append(f"{design.searched.drawn.number} draws of the unknown parameters")
+    return " · ".join([*words, "computed, no measured data"])
 
 
 def _legend(design: Design) -> list[Line2D]:
-    """What is drawn, in its colours; nothing that is not."""
+    """Legend entries of the plotted elements."""
     found = [Line2D([], [], **_BEST, label="best")]
     if design.landscape is not None and _today(design) is not None:
         found.append(Line2D([], [], **_TODAY, label="today"))
@@ -135,7 +135,7 @@ def _profile(axes: Axes, design: Design, profile: ObjectiveProfile) -> None:
 
 
 def _today(design: Design) -> list[float] | None:
-    """Where in the landscape the robot lies as it was given; None where it lies beyond the ranges."""
+    """Position of the given robot in the landscape; None beyond the ranges."""
     found = []
     for profile in design.profiles:
         value = design.alternatives[0].values[profile.path]

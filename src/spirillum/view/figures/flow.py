@@ -71,7 +71,7 @@ class _View:
 
     @property
     def offset(self) -> float:
-        """Place of the plane on the axis across it, m."""
+        """Position of the plane on the axis across it, m."""
         return float(self.plane[self.across])
 
     def values(self, name: str) -> Values:
@@ -80,7 +80,7 @@ class _View:
         return found
 
     def continued(self, values: Values) -> Values:
-        """Values carried on into the solids, which are drawn above: no fringe of cells without colour around them."""
+        """Values extrapolated into the solids, which are plotted above: avoids a fringe of cells without colour."""
         from scipy.ndimage import distance_transform_edt
 
         if not self.solid.any() or self.solid.all():
@@ -145,7 +145,7 @@ def _sheet(flow: Flow, view: _View, *, strip: bool) -> Sheet:
 
 
 def _draw_solids(axes: Axes, flow: Flow, view: _View) -> None:
-    """Glass and robot; the panel has its final size, for the wire is drawn in true thickness."""
+    """Plot tube and robot; the panel has its final size, so that the wire has its true thickness."""
     unit, scale = view.lengths.factor, _inches(axes)[0] * 72.0 / float(np.ptp(view.x))
     if flow.seat is not None:
         draw_glass(axes, flow.seat, view.name, view.offset, unit)
@@ -259,7 +259,7 @@ def _draw_heading(axes: Axes, flow: Flow, view: _View) -> None:
 
 
 def _at_glass(view: _View) -> tuple[Values, Values]:
-    """Places along the tube, and pressures (Pa) at the plane's uppermost points of the fluid there."""
+    """Positions along the tube, and pressures (Pa) at the plane's uppermost points of the fluid there."""
     pressure = view.values("pressure")
     free = np.isfinite(pressure)
     there = np.flatnonzero(free.any(axis=0))
@@ -284,7 +284,7 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     motion, unit = flow.prediction, view.lengths
     frame = "lab frame" if flow.frame == "lab" else "frame of the swimming robot"
     plane = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
-    where = f"{plane}, origin at the body's middle"
+    where = f"{plane}, origin at the body's mid-length"
     yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
     speed = UnitPrefix.of(np.array([motion.forward_velocity]), "m/s")
     yield (
@@ -296,7 +296,7 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
 
 
 def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
-    """Where in its tube the robot lies, and what the fluid is made to do."""
+    """Pose of the robot in its tube, and the imposed flow."""
     placement, motion = flow.prediction.placement, flow.prediction
     film = placement["gap"]["value"]
     own = UnitPrefix.of(np.array([film - flow.lifted]), "m")
@@ -322,7 +322,7 @@ def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
 
 def _notes(flow: Flow, view: _View) -> Iterator[str]:
     oblique = flow.seat is not None and (view.name == "xy" or view.offset != 0)
-    lines = "velocity's part in the plane, ending at oblique glass" if oblique else _LINES
+    lines = "velocity component in the plane, ending at an oblique wall" if oblique else _LINES
     drawn = ["grey: robot where it is cut" if oblique else "grey: robot where the plane cuts it"]
     if view.first == "x":
         drawn.append("white band: tail")
@@ -334,4 +334,4 @@ def _notes(flow: Flow, view: _View) -> Iterator[str]:
         words = "Weight and contact push it sideways with" if flow.prediction.motion == "free" else _HELD
         held = f" {words} {flow.held_force / force.factor:.2g} {force.unit}."
     walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
-    yield f"{walls}{held} Computed, nothing is measured."
+    yield f"{walls}{held} Computed, no measured data."

@@ -31,7 +31,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         sheet = Sheet(
             f"{plain(dataset.attrs['robot'])} in a rotating field",
             f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
-            "computed, nothing is measured",
+            "computed, no measured data",
             width=PAGE,
             heights=[1.9, 1.9],
             columns=2,
@@ -70,7 +70,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
-    """Rates of the field and of the held robot, Hz, and its phase lag, rad: the closed form between the given rates."""
+    """Rates of the field and of the constrained robot, Hz, and its phase lag, rad, in closed form."""
     rates, step_out = dataset["field_rate"].values / Hz, float(dataset["step_out_rate"]) / Hz
     sense = float(np.sign(rates[0]))
     size = np.unique(np.append(np.linspace(0.0, np.abs(rates).max(), 801), min(step_out, np.abs(rates).max())))
@@ -85,6 +85,6 @@ def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
 
 
 def _step_out(panels: Samples, rate: float) -> None:
-    """A line where the held robot steps out."""
+    """Mark the step-out rate of the constrained robot."""
     for axes in panels:
         axes.axvline(rate, **_STEP_OUT)

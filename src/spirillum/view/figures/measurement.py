@@ -80,7 +80,7 @@ def trial_figure(trial: Trial) -> Figure:
 
 
 def _say_synthetic(figure: Figure, *, synthetic: bool) -> None:
-    """In the lower right corner, where a video says of itself that it is computed."""
+    """Mark the picture as synthetic in the lower right corner, as the video's metadata declares."""
     if synthetic:
         figure.supxlabel("synthetic", x=0.99, ha="right", size=8.0, color="#9c3d00")
 
@@ -121,7 +121,7 @@ def _left_out(values: Samples, rate: Rate) -> np.ndarray:
 
 
 def _why_left_out(left_out: Sequence[np.ndarray]) -> str:
-    """What the grey dots are: the first frames of a compressed film, which are left out together, and stray ones."""
+    """Explain the grey dots: omitted first frames of a compressed video, and outliers."""
     lead = any(out.size > LEADING and out[:LEADING].all() for out in left_out)
     stray = any(out[LEADING if lead else 0 :].any() for out in left_out)
     words = [*(["first"] if lead else []), *(["stray"] if stray else [])]

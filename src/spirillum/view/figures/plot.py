@@ -1,4 +1,4 @@
-"""`spirillum.plot`: the figure of any answer, by its kind.
+"""`spirillum.plot`: the figure of any result, by its kind.
 
 Answers are data and know no figures; this module knows both.
 """
@@ -67,7 +67,7 @@ class Plot:
 
 
 def plot(answer: Any) -> Plot:
-    """Draw an answer: the figure that its command draws, or the one that says most.
+    """Plot a result: the figure of its command, or the most informative one.
 
     Args:
         answer: a robot (`sp.load`), a prediction (its robot in its place, to scale), or what `compare_models`, `study`,
@@ -107,7 +107,7 @@ _FIGURES: dict[type, Callable[[Any], Figure]] = {
     Measurement: _of_measurement,
     Calibrated: lambda answer: next(iter(calibration_figures(answer).values())),
 }
-"""Figures by the kind of the answer; those of datasets follow from what is in them."""
+"""Figures by the kind of the result; those of datasets follow from their content."""
 _ALLOWED = (
     "a robot, or what predict, compare_models, study, simulate, magnetic_sweep, settle, design, flow, control, measure "
     "or calibrate returns"

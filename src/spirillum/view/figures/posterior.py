@@ -1,4 +1,4 @@
-"""Figures of what is known about fitted numbers: marginals and pairs of the posterior, profiles of the likelihood."""
+"""Figures of fitted parameters: marginals and pairs of the posterior, profiles of the likelihood."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BINS = 32
 
 
 def posterior_figure(found: Calibrated) -> Figure:
-    """Marginals on the diagonal, pairs below it; what is not drawn beyond the sixth number is said."""
+    """Marginals on the diagonal, pairs below it; a note lists parameters beyond the sixth."""
     posterior = found.posterior
     assert posterior is not None  # noqa: S101 - drawn for a posterior only
     every = {name: values.reshape(-1) for name, values in posterior.values().items()}
@@ -43,9 +43,9 @@ def posterior_figure(found: Calibrated) -> Figure:
     count = len(names)
     colour = look_of_model(found.problem.model.name).colour
     with styled():
-        synthetic = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
+        synthetic = "synthetic, no measured data" if found.experiment.synthetic else "observed"
         words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
-        words += "; contours hold 50 and 95 % of the draws" if count > 1 else ""
+        words += "; contours contain 50 and 95 % of the draws" if count > 1 else ""
         words += f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
         sheet = Sheet(
             "Posterior of the fitted numbers",
@@ -83,7 +83,7 @@ def _scales(found: Calibrated, values: Mapping[str, Samples]) -> dict[str, UnitP
 
 
 def _unit(scale: UnitPrefix, between: str) -> str:
-    """A unit in brackets behind a name; nothing for a plain number."""
+    """A unit in brackets after a name; empty for a plain number."""
     return f"{between}({scale.unit})" if scale.unit else ""
 
 
@@ -110,7 +110,7 @@ def _marginal(axes: Axes, values: Samples, colour: str) -> None:
 
 
 def _pair(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
-    """Regions that hold 95 and 50 % of the draws."""
+    """Regions that contain 95 and 50 % of the draws."""
     window = (_window(x), _window(y))
     counts, xs, ys = np.histogram2d(x, y, bins=_BINS, range=window)
     smooth = counts
@@ -149,7 +149,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     fit = found.least_squares
     held = " and ".join(
         f"{percent(share)} of the {name.replace('_', ' ')} "
-        f"({'middle of its prior' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
+        f"({'prior median' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
         for name, share in fit.discrepancy.items()
     )
     synthetic = " (synthetic)" if found.experiment.synthetic else ""

@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 
 
 _SHORT = 0.2
-"""Time constant over the length of the run above which the way does not reach the steady motion."""
+"""Time constant over the run's length above which the run does not reach the steady state."""
 _TILTS = {"pitch": "green", "yaw": "purple"}
 """Angles of the tilt, and their colours."""
 
 
 def settling_figure(settling: Settling) -> Figure:
-    """Three panels over time: gap, azimuth, pitch and yaw; dashed where the robot comes to lie."""
+    """Three panels over time: gap, azimuth, pitch and yaw; dashed at the resting pose."""
     with styled():
         motion = settling.prediction
         sheet = Sheet(
             f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
             f"roughness {1e6 * settling.roughness:.3g} µm · friction {settling.friction_coefficient:.3g} · "
-            "computed, nothing is measured",
+            "computed, no measured data",
             width=PAGE,
             heights=[1.9],
             columns=3,
@@ -54,7 +54,7 @@ def settling_figure(settling: Settling) -> Figure:
 
 
 def _notes(settling: Settling) -> list[str]:
-    """That the way ends before the steady motion, where it does."""
+    """Note on a run that ends before the steady state."""
     slow, end = settling.lying.approach_time, float(settling.way("time")[-1])
     if settling.lying.state != "steady" or not slow > _SHORT * end:
         return []
@@ -100,12 +100,12 @@ _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewi
 
 
 def _steady(axes: Axes, value: float) -> None:
-    """Where the robot comes to lie."""
+    """Plot the resting pose."""
     axes.axhline(value, **_STEADY)
 
 
 def _legend(settling: Settling) -> list[Line2D]:
-    """Of the panel with two lines, and of the place where the robot comes to lie, if there is one."""
+    """Legend of the panel with two lines, and of the resting pose, if there is one."""
     lines = [Line2D([], [], color=COLOURS[name], label=words) for words, name in _TILTS.items()]
     return [*lines, *([Line2D([], [], **_STEADY, label="steady")] if settling.lying.state == "steady" else [])]
 
@@ -116,13 +116,13 @@ _SHOWN = {
     "body_rotation_rate": "body rate",
     "effective_friction": "inferred $B_{eff}$",
 }
-_KINDS = (("on the film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
+_KINDS = (("on the lubrication film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
 _MOST = 4
 """Robots of the figure."""
 
 
 def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
-    """Every reading of every run over the median of its robot; None where no robot was laid down."""
+    """Every reading of every run over the median of its robot; None if no robot was released."""
     if "forward_velocity_at_run" not in dataset:
         return None
     there = _readings(dataset, "forward_velocity")
@@ -133,7 +133,7 @@ def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | N
     title = "What the conditions of a run change"
     caption = (
         "Size of each reading of runs that differ in gap, pitch, wait, roughness and dry friction, over the median of "
-        f"its robot; $B_{{eff}}$ as model {dataset['inferred_by'].values[0]} infers it. Computed: nothing is measured."
+        f"its robot; $B_{{eff}}$ as model {dataset['inferred_by'].values[0]} infers it. Computed, no measured data."
     )
     if len(robots) > len(shown):
         caption += f" Shown: the {len(shown)} fastest of {len(robots)} robots."

@@ -1,4 +1,4 @@
-"""A robot in its channel, drawn to scale from the side, with the dimensions of the paper's Fig. 1b."""
+"""Side view of a robot in its channel, to scale, with the dimensions of the paper's Fig. 1b."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _axial_dimensions(axes: Axes, s: DrawingLayout) -> None:
 
 
 def _tail_words(s: DrawingLayout) -> Iterator[str]:
-    """What has no room as a drawn dimension of the tail."""
+    """Dimensions of the tail that have no room in the drawing, as text."""
     if not s.shows_wavelength:
         yield s.words("\\lambda", s.robot.tail.wavelength)
     if not s.shows_wire:
@@ -133,7 +133,7 @@ _FLUID, _GLASS, _GLASS_EDGE = "#eef5f9", "#cfe0ea", "#54788e"
 
 
 def robot_words(robot: Robot) -> str:
-    """What the picture shows, for those who cannot see it."""
+    """Alternative text of the picture."""
     body, tail, channel = robot.body, robot.tail, robot.channel
     where = (
         f"on the floor of a channel of {length_words(channel.diameter)} diameter" if channel else "without a channel"
@@ -225,7 +225,7 @@ def _draw_robot(axes: Axes, s: DrawingLayout) -> None:
 
 
 def _turning(axes: Axes, s: DrawingLayout, x: float, reach: float, sense: float, text: str) -> None:
-    """An arrow around the motor axis on the side of the viewer; sense +1 goes down there, as a turn about +x does."""
+    """Arrow around the motor axis on the viewer's side; sense +1 points down there, as a turn about +x does."""
     start, end = (x, sense * reach), (x, -sense * reach)
     curve = f"arc3,rad={-0.45 * sense:.3f}"
     for colour, width, order in (("white", 3.6, 9.4), (COLOURS["vermillion"], 1.7, 9.5)):

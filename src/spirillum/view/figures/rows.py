@@ -1,4 +1,4 @@
-"""The rows of panels of a study's figures: what each draws, against amplitude, robot or assumed rate."""
+"""Rows of panels of a study's figures, against amplitude, robot or assumed rate."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ MOST_LARGE_MARKS = 60
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
 _OBSERVED = COLOURS["black"]
 HOLLOW: Any = {"linestyle": "none", "marker": "D", "markersize": 7.5, "markerfacecolor": "none"}
-"""Look of an observed mean through which a model's marker is seen."""
+"""Style of an observed mean, transparent for a model's marker behind it."""
 _SHADE = 0.25  # opacity of a band
 _OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
-"""Look of the rotor's own friction: no model is drawn so."""
+"""Style of the rotor's own friction, unlike any model's."""
 _SETTLED: Any = {
     "linestyle": "none",
     "marker": "*",
@@ -37,8 +37,8 @@ _SETTLED: Any = {
     "markerfacecolor": "white",
     "zorder": 6,
 }
-"""Look of robots that were let go: no model is drawn so."""
-_SETTLED_WORDS = "Stars: in steady motion, let go in the tube on asperities and with dry friction that are assumed."
+"""Style of released robots, unlike any model's."""
+_SETTLED_WORDS = "Stars: steady state after release in the tube, with assumed asperities and dry friction."
 Draw = Callable[[Axes, StudyView, Values], None]
 
 
@@ -47,15 +47,15 @@ class PanelRow:
     """A row of panels that share their vertical axis."""
 
     label: str
-    """What is drawn, with its unit."""
+    """Plotted quantity with its unit."""
     draw: Draw
-    """Draws one panel: axes, part of the study, horizontal positions (amplitudes or robots)."""
+    """Plot one panel: axes, part of the study, horizontal positions (amplitudes or robots)."""
     across: Literal["tails", "rates"] = "tails"
     """Horizontal axis: the tails (or robots), or the assumed motor rate."""
     logarithmic: bool = False
     """Whether the vertical axis is logarithmic."""
     tells: str = ""
-    """What a reader has to know, a sentence for the note below the figure."""
+    """Explanation for the note below the figure, a sentence."""
 
 
 def grid_rows(shown: StudyView) -> list[PanelRow]:
@@ -109,7 +109,7 @@ def _advance_row(shown: StudyView) -> PanelRow:
 
 
 def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
-    """What lies between least and largest value: a shade along a curve, a bar behind a mark that stands alone."""
+    """Plot the range from least to largest value: a shade along a curve, a bar behind a single mark."""
     known = np.isfinite(low) & np.isfinite(high)
     if not np.any(known):
         return
@@ -138,7 +138,7 @@ def _own_rate_row(shown: StudyView) -> PanelRow:
 
 
 def bound_row(shown: StudyView) -> PanelRow:
-    """Forward velocity with what friction is known to be there, held, and in steady motion where robots were let go."""
+    """Forward velocity bounded by friction, in axial motion, and in the steady state of released robots."""
     labels = {"friction": list(shown.own_drive_readings)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
 
@@ -155,7 +155,7 @@ def bound_row(shown: StudyView) -> PanelRow:
 
 
 def drawn_amplitudes(shown: StudyView) -> list[int]:
-    """Places of the amplitudes that have a curve of their own."""
+    """Indices of the amplitudes that have a curve of their own."""
     return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
 
 
@@ -202,7 +202,7 @@ def _assumed_friction_row(shown: StudyView) -> PanelRow:
 
 
 def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool = False) -> None:
-    """Observed means with their 95 % intervals; a mean without an interval stands alone."""
+    """Plot observed means with their 95 % intervals, or without one where none is given."""
     seen = np.isfinite(y)
     axes.errorbar(
         x[seen],
@@ -264,7 +264,7 @@ def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> PanelR
                 draw_curve(axes, x, y, look_of_model(model), ring=number > 0, joined=part.grid)
 
     words = ", rings: ".join(f"'{reading}'" for reading in inferring)
-    tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction reading of filled marks: {words}."
+    tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction model of filled marks: {words}."
     return PanelRow(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
 
 
@@ -283,8 +283,8 @@ def band_handles(shown: StudyView) -> list[Line2D]:
 
 
 def settled_handles(shown: StudyView) -> list[Line2D]:
-    """Legend entry of the robots that were let go; none without such."""
-    return [Line2D([], [], **_SETTLED, label="let go, in steady motion")] if shown.settled else []
+    """Legend entry of released robots; none without such."""
+    return [Line2D([], [], **_SETTLED, label="released, steady state")] if shown.settled else []
 
 
 def _model_entries(shown: StudyView) -> Iterator[Line2D]:

@@ -24,7 +24,7 @@ _MOST_EVENTS = 12
 _WIDE = (0.04, 0.08)
 """Width of a label with one number and with two, over that of the axis: events without room share one."""
 _LETTER = 0.07
-"""Share of a time axis above which the panel's letter stands."""
+"""Share of a time axis above which the panel's letter is placed."""
 
 
 def events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
@@ -72,7 +72,7 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
 
 
 def _left_end(places: list[float]) -> float:
-    """Where the label of events begins that lie at these shares of the axis: beside the panel's letter at the least."""
+    """Left end of the labels of events at these shares of the axis, right of the panel's letter."""
     return max(float(np.mean(places)) - 0.5 * _WIDE[len(places) > 1], _LETTER)
 
 

@@ -1,4 +1,4 @@
-"""Where everything stands in the side view of a robot, and the marks of a technical drawing."""
+"""Layout of the side view of a robot, and the marks of a technical drawing."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ PHASE = 0.35 * np.pi
 INK = "#1d2b33"
 FAINT = "#6b7d88"
 HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)
-"""A white rim that keeps text readable on any ground."""
+"""White rim that keeps text legible on any background."""
 
 
 @dataclass(frozen=True)
 class DrawingLayout:
-    """Places of everything, in the drawing's unit; the motor axis lies at z = 0."""
+    """Positions of all elements, in the drawing's unit; the motor axis is at z = 0."""
 
     robot: Robot
     scale: UnitPrefix
@@ -42,7 +42,7 @@ class DrawingLayout:
     ceiling: float | None
     """Height of the upper wall where the picture reaches it."""
     wall: float
-    """Thickness with which walls are drawn; the true one is unknown."""
+    """Displayed thickness of the walls; the true one is unknown."""
 
     @classmethod
     def of(cls, robot: Robot) -> DrawingLayout:
@@ -112,12 +112,12 @@ class DrawingLayout:
 
     @cached_property
     def crests(self) -> Values:
-        """Places of the wire's highest points, from root to tip."""
+        """Positions of the wire's highest points, from root to tip."""
         return crests(self.robot, PHASE, self.scale.factor)
 
     @property
     def shows_wavelength(self) -> bool:
-        """Whether two crests and room above them let the wavelength be drawn."""
+        """Whether there is room for the wavelength's dimension between two crests."""
         room = np.inf if self.ceiling is None else self.ceiling
         return self.crests.size >= 2 and self.tail_top + 0.08 * self.total < room
 
@@ -128,7 +128,7 @@ class DrawingLayout:
 
     @property
     def stubby(self) -> bool:
-        """Whether the body is too short for words on it."""
+        """Whether the body is too short for labels on it."""
         return 2.0 * self.nose < 0.26 * self.total
 
     @property

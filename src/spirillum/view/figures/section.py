@@ -1,4 +1,4 @@
-"""A robot cut by a plane: its solids filled where they are cut, outlined where they lie beyond.
+"""Section of a robot by a plane: cut solids filled, solids beyond the plane outlined.
 
 Panels have their limits before anything is drawn on them. Solids are added as artists and not as patches, for which
 matplotlib looks for the extent of every segment: half a second for a tube.
@@ -36,7 +36,7 @@ def draw_section(
     points: float,
     drop: float = 0.0,
 ) -> None:
-    """Draw the robot on a plane, on whose axes the panel stands.
+    """Plot the robot on the plane of the panel's axes.
 
     Args:
         axes: the panel, in `unit`.
@@ -68,7 +68,7 @@ def draw_section(
 
 
 def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
-    """Draw the glass of a tube, cut by a plane, over all that lies beyond its wall.
+    """Plot the section of a tube's wall above the elements beyond it.
 
     Args:
         axes: the panel, in `unit`, its limits set.

@@ -18,18 +18,18 @@ from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure, readabl
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that is drawn when it is asked for."""
+    """Deferred figure with its title and caption."""
 
     title: str
     caption: str
-    """What it shows and what it does not, sentences."""
+    """Content and limits of the figure, sentences."""
     alternative: str
-    """What it shows for those who cannot see it."""
+    """Alternative text."""
     draw: Callable[[], Figure] = field(repr=False)
 
     @classmethod
     def of(cls, title: str, caption: str, alternative: str, draw: Callable[[], Figure]) -> Picture:
-        """A picture whose words may hold formulas, which are spelled out."""
+        """Create a picture whose texts may contain formulas, which are spelled out."""
         return cls(readable(title), readable(caption), readable(alternative), draw)
 
     def figure(self) -> Figure:
@@ -118,7 +118,7 @@ class Sheet:
             axes.tick_params(grid_color="#dddddd", grid_linewidth=0.5)
 
     def finished(self, shape: float | None = None) -> Figure:
-        """The figure, as high as its panels need; nothing moves any more."""
+        """Fix the layout: as high as the panels need."""
         beside = self.panels[:, 1:].ravel()
         for axes in beside if shape is None else ():  # one column tells the height, in a fraction of the time
             axes.set_in_layout(False)

@@ -65,7 +65,7 @@ def wire_line(robot: Robot, phase: float, unit: float) -> Values:
 
 
 def crests(robot: Robot, phase: float, unit: float) -> Values:
-    """Places x of the wire's highest points, from the root to the tip, in `unit`; the rising root is left out."""
+    """Positions x of the wire's highest points, from the root to the tip, in `unit`; without the rising root."""
     tail, hand = robot.tail, robot.hand
     root = 0.5 * robot.body.length + robot.coupling.length
     most = np.ceil((root + tail.length) / tail.wavelength) + 1
@@ -78,7 +78,7 @@ def crests(robot: Robot, phase: float, unit: float) -> Values:
 
 
 def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: float, points: float) -> None:
-    """The tail's wire in true thickness, seen along +y: what lies behind is darker and hidden by what lies before.
+    """Plot the tail's wire in true thickness, seen along +y: hidden parts are darker.
 
     Args:
         axes: where to draw, in `unit`.

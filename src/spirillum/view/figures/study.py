@@ -73,7 +73,7 @@ def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] 
 
 
 def _pages(count: int, most: int) -> list[list[int]]:
-    """Places of the wavelengths on each figure, as even as can be."""
+    """Indices of the wavelengths on each figure, as evenly distributed as possible."""
     places = spread(count, most * MOST_COLUMNS)
     pages = -(-len(places) // MOST_COLUMNS)
     return [list(map(int, page)) for page in np.array_split(places, pages)]
@@ -104,7 +104,7 @@ def _channel_title(shown: StudyView, channel: int) -> str:
 
 
 def _left_out(shown: StudyView, wavelengths: int, channels: int) -> str:
-    """A sentence on what the figures leave out; empty if nothing."""
+    """Note on omitted robots; empty if there are none."""
     sizes = shown.whole.sizes
     parts = []
     if wavelengths < sizes["wavelength"]:
@@ -120,7 +120,7 @@ def _channel_picture(shown: StudyView, channel: int, wavelengths: list[int], pag
     name = str(shown.whole["channel"].values[channel])
     title = _channel_title(shown, channel)
     if name in shown.paper_figures:
-        title = f"{title} · laid out as {shown.paper_figures[name].label} of the paper"
+        title = f"{title} · layout of {shown.paper_figures[name].label} of the paper"
     title = f"{title}{page}"
     rows = grid_rows(shown)
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
@@ -216,7 +216,7 @@ def _bound_picture(shown: StudyView) -> Picture:
     if any(shown.paper_speed(channel) for channel in channels):
         notes.append(
             "Dashed black: the speed behind the paper's largest Reynolds number if its length is the body's diameter "
-            "(the paper does not say), $U\\,=\\,Re\\,\\mu/(\\rho\\,D_b)$."
+            "(the paper does not specify it), $U\\,=\\,Re\\,\\mu/(\\rho\\,D_b)$."
         )
     part = shown.part(channel=channels, wavelength=wavelengths)
     notes += [
@@ -238,10 +238,10 @@ def _bound_picture(shown: StudyView) -> Picture:
 
 
 def _frictions(shown: StudyView) -> list[str]:
-    """Against what a motor turns under the readings that are drawn, with their marks where there are several."""
+    """Friction models of the plotted motors, with marks if there are several."""
     words = {"none": "as fast as it can against the fluid alone", "rotor": "with the rotor's own friction"}
     readings = shown.own_drive_readings
-    found = [words.get(reading, f"with friction reading '{reading}'") for reading in readings]
+    found = [words.get(reading, f"with friction model '{reading}'") for reading in readings]
     marks = ("filled", "hollow")
     return found if len(found) == 1 else [f"{one} ({mark})" for one, mark in zip(found, marks, strict=False)]
 
@@ -311,7 +311,7 @@ def _robots_picture(shown: StudyView) -> Picture:
     notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
     notes.append(shown.unanswered())
     if len(places) < count:
-        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
+        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset contains all.")
     notes = [note for note in notes if note]
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
     alternative = f"{len(rows)} panels with a point for each of {len(places)} robots: {what}. {shown.source_line}"
@@ -351,6 +351,6 @@ def _draw_robots(
             axes.set_xticks(x, names if last else [""] * len(names), rotation=0 if upright else 90)
         axes.tick_params(labelbottom=last)
         if last and not named:
-            axes.set_xlabel("place of the robot in the list, from 0")
+            axes.set_xlabel("index of the robot in the list, from 0")
         _finish_row([axes], row)
     return sheet.finished()

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
+NOTHING_MEASURED = "Computed only: this figure contains no measured data."
 
 
 class PaperFigure(NamedTuple):
-    """A figure of a paper that a study's figure of one channel is laid out as."""
+    """Layout of a study's figure of one channel after a figure of a paper."""
 
     file: str
     """Name of the study's figure."""
@@ -38,7 +38,7 @@ class PaperFigure(NamedTuple):
 
 
 def spread(count: int, most: int) -> list[int]:
-    """At most `most` places out of `count`, evenly spread, first and last among them."""
+    """At most `most` indices out of `count`, evenly spread, including the first and the last."""
     if count <= most:
         return list(range(count))
     return sorted({int(place) for place in np.linspace(0, count - 1, most).round()})
@@ -60,7 +60,7 @@ class StudyView:
         return cls(dataset, dataset, paper_figures or {})
 
     def part(self, **places: int | Sequence[int]) -> StudyView:
-        """A part of the study, by places along dimensions."""
+        """Select a part of the study by indices along dimensions."""
         return replace(self, dataset=self.dataset.isel(dict(places.items())))
 
     @cached_property
@@ -92,7 +92,7 @@ class StudyView:
 
     @property
     def source_line(self) -> str:
-        """The line of every figure that says what is measured in it."""
+        """Line on the measured content of a figure."""
         if not self.observed:
             return NOTHING_MEASURED
         name = plain(str(self.whole.attrs.get("observations", "an observations file")), 40)
@@ -116,13 +116,13 @@ class StudyView:
 
     @property
     def bound_words(self) -> str:
-        """What a value under the robots' own drive is, for a label."""
+        """Label of the value under the robots' own drive."""
         if not self.upper_bound:
             return "own drive"
         return "no contact friction" if self.shaded else "upper bound"
 
     def bound_sentence(self, what: str) -> str:
-        """What values under the robots' own drive bound, for a note; empty where they bound nothing."""
+        """Note on the bound from the robots' own drive; empty without one."""
         if not self.upper_bound:
             return ""
         if not self.shaded:
@@ -131,7 +131,7 @@ class StudyView:
 
     @property
     def settled(self) -> bool:
-        """Whether robots that were let go came to a steady motion."""
+        """Whether released robots reached a steady state."""
         return "forward_velocity_settled" in self.whole and bool(
             np.isfinite(self.whole["forward_velocity_settled"]).any()
         )
@@ -147,14 +147,14 @@ class StudyView:
         return tuple(name for name in ("none", "rotor") if name in self.readings) or self.readings[:1]
 
     def reading_label(self, reading: str) -> str:
-        """Words for a reading of the friction in a legend."""
+        """Legend label of a friction model."""
         if reading == "none":
             return (
                 f"no contact friction{'' if self.shaded else ' (upper bound)'}" if self.motor_driven else "no friction"
             )
         if reading == "rotor" and self.upper_bound:
             return f"rotor friction $B_m$ only{'' if self.shaded else ' (upper bound)'}"
-        return f"friction reading '{reading}'"
+        return f"friction model '{reading}'"
 
     @property
     def at_rate_reading(self) -> str:
@@ -191,7 +191,7 @@ class StudyView:
 
     @cached_property
     def banded(self) -> tuple[str, ...]:
-        """Names of the models that have a band over the places that the placement leaves open."""
+        """Names of the models that have a band over unspecified poses."""
         if "forward_velocity_low" not in self.whole:
             return ()
         known = self.whole["forward_velocity_low"]
@@ -206,7 +206,7 @@ class StudyView:
         return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
 
     def band(self, name: str, model: str) -> tuple[Values, Values]:
-        """Limits of a quantity of free swimming, of a posterior or over the open places, SI; NaN without them."""
+        """Limits of a quantity of free swimming, of a posterior or over unspecified poses, SI; NaN without them."""
         reading = self.own_drive_readings[0]
         if model in self.with_intervals:
             named = {"model": model, "friction": self.own_drive_readings[-1]}
@@ -219,7 +219,7 @@ class StudyView:
 
     @property
     def place_words(self) -> str:
-        """Where robots lie for models that compute the walls, and what is shaded; empty without either."""
+        """Poses of the models that compute the walls, and the meaning of shades; empty without either."""
         computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
         if not computed:
             return self._interval_words()
@@ -230,12 +230,12 @@ class StudyView:
         if not self.with_intervals:
             return ""
         names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
-        return f"Shades: 95 % intervals of the posterior ({names}, friction reading '{reading}'), discrepancy included."
+        return f"Shades: 95 % intervals of the posterior ({names}, friction model '{reading}'), discrepancy included."
 
     @property
     def _words_of_first_reading(self) -> str:
         reading = self.own_drive_readings[0]
-        return "without friction" if reading == "none" else f"friction reading '{reading}'"
+        return "without friction" if reading == "none" else f"friction model '{reading}'"
 
     def _band_words(self) -> str:
         if not self.banded:
@@ -260,7 +260,7 @@ class StudyView:
         return np.where(seen, rate, tail - body), np.where(seen, half, halves)
 
     def unanswered(self) -> str:
-        """A sentence on robots of this part without an answer; empty if there are none."""
+        """Note on robots of this part without a result; empty if there are none."""
         outside = self.dataset["outside"].sel(friction=list(self.own_drive_readings))
         codes = np.asarray(outside.max("friction").values).ravel()
         missing = Counter(int(code) for code in codes if code)
@@ -271,7 +271,7 @@ class StudyView:
             names[code].replace("-", " ") if code < len(names) else "other" for code, _ in missing.most_common(3)
         ]
         return (
-            f"Gaps: {missing.total()} of {codes.size} results (a robot with a model) have no answer "
+            f"Gaps: {missing.total()} of {codes.size} results (a robot with a model) have no result "
             f"({', '.join(reasons)}{', …' if len(missing) > 3 else ''})."
         )
 
@@ -286,7 +286,7 @@ class StudyView:
 
 
 def head_column(axes: Axes, shown: StudyView, wavelength: int) -> None:
-    """Head a column of panels with its wavelength, by its place in the study."""
+    """Title a column of panels with its wavelength, by its index in the study."""
     values = np.asarray(shown.whole["wavelength"].values, dtype=float)
     scale = UnitPrefix.of(values, "m")
     axes.set_title(f"$\\lambda$ = {values[wavelength] / scale.factor:.4g} {scale.unit}", loc="center", pad=3)

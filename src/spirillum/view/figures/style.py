@@ -1,4 +1,4 @@
-"""One look for all figures: colours, fonts, units, and files that come out the same every time."""
+"""Common style of all figures: colours, fonts, units, reproducible files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLOURS = {
     "vermillion": "#D55E00",
     "purple": "#CC79A7",
 }
-"""Palette of Okabe and Ito, which colour-blind readers can tell apart (without its yellow, too pale for lines)."""
+"""Palette of Okabe and Ito, distinguishable for colour-blind readers (without its yellow, too pale for lines)."""
 
 _STYLE: Any = {  # Any: the type of the keys differs between versions of matplotlib
     "font.family": "sans-serif",
@@ -63,9 +63,9 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
 COLUMN, PAGE = 3.35, 6.69
 """Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider."""
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
-"""Settings that say where a session shows its own figures, not how ours look."""
+"""Settings on the display of a session's own figures, which do not change ours."""
 PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}
-"""A line that stands for an area in a legend."""
+"""Line that represents an area in a legend."""
 DPI = 200
 """Of PNG files."""
 _NO_DATE: dict[str, dict[str, Any]] = {
@@ -91,7 +91,7 @@ _PREFIXES = (
 
 @dataclass(frozen=True)
 class Look:
-    """Colour, line and marker by which a model is known in every figure."""
+    """Colour, line and marker that identify a model in every figure."""
 
     colour: str
     line: Any
@@ -109,12 +109,12 @@ _OTHER = Look(COLOURS["orange"], (0, (5, 1, 1, 1, 1, 1)), "v")
 
 
 def look_of_model(name: str) -> Look:
-    """The look of a model by its name."""
+    """The style of a model by its name."""
     return _LOOKS.get(name, _OTHER)
 
 
 def label_of_model(name: str) -> str:
-    """A model's name as it stands in text: abbreviations in capitals."""
+    """A model's name in text: abbreviations in capitals."""
     return name.upper() if len(name) <= 3 else name
 
 
@@ -159,7 +159,7 @@ def _settings() -> dict[Any, Any]:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw and save in the look of all figures, whatever the user's settings are, which stay untouched.
+    """Plot and save in the style of all figures, without changing the user's settings.
 
     All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it.
     Names may hold characters that the font lacks; they become boxes, not warnings.
@@ -177,14 +177,14 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def lay_out(figure: Figure) -> None:
-    """Place panels and words of a figure with a layout engine, without drawing them."""
+    """Lay out panels and text of a figure with a layout engine, without rendering."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
 
 
 def plain(text: str, longest: int = 60) -> str:
-    """A user's text as one short line in which nothing is read as a formula."""
+    """A user's text as one short line without formulas."""
     kept = "".join(letter if unicodedata.category(letter)[0] != "C" else " " for letter in text)
     line = " ".join(kept.split())
     line = line if len(line) <= longest else f"{line[: longest - 1]}…"
@@ -192,7 +192,7 @@ def plain(text: str, longest: int = 60) -> str:
 
 
 def told_apart(names: Sequence[str], longest: int) -> list[str]:
-    """Names as lines of at most ``longest`` letters; if two names would then look alike, of at most 80."""
+    """Shorten names to lines of at most ``longest`` letters, or of at most 80 where they would be equal."""
     short = [plain(name, longest) for name in names]
     return short if len(set(short)) == len(set(names)) else [plain(name, 80) for name in names]
 

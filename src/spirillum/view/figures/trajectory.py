@@ -31,9 +31,9 @@ COLUMNS = {"single": COLUMN, "double": PAGE}
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
 _LETTERS_BESIDE = 40
-"""Letters of a legend, with seven for each line's sample, above which its entries stand in two columns."""
+"""Letters of a legend, with seven for each line's sample, above which it has two columns."""
 _MANY_TURNS = 30.0
-"""Turns of the tail above which their oscillations fill a panel, and means over a turn are drawn too."""
+"""Turns of the tail above which oscillations fill a panel, and means over a turn are plotted too."""
 _DECADES = 5
 """Range of a logarithmic axis."""
 _DECADES_BARE = 30.0
@@ -41,9 +41,9 @@ _DECADES_BARE = 30.0
 _SPREAD = 30.0
 """Ratio of the largest values of two lines above which their axis is logarithmic."""
 _STILL = 0.5
-"""Change of azimuth below which a robot is said to stay where it was laid down, degrees."""
+"""Change of azimuth below which a robot counts as stationary, degrees."""
 _ONE_WAY = 0.75
-"""Net change of azimuth over all of it above which a robot is said to go around the tube one way."""
+"""Net change of azimuth above which a robot circulates in the tube in one direction."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class _Panel:
 
     label: str
     lines: tuple[tuple[str, str], ...]
-    """Variable, and its words in the legend."""
+    """Variable and its legend label."""
     logarithmic: bool = False
     """Whether a logarithmic axis may be used."""
     film: bool = False
@@ -60,7 +60,7 @@ class _Panel:
     changing: bool = False
     """Whether a panel whose lines are constant is left out."""
     mean: bool = False
-    """Whether the mean over a turn of the tail is drawn for the first line of a long run."""
+    """Whether the mean over a turn of the tail is plotted for the first line of a long run."""
 
 
 _PANELS = (
@@ -149,7 +149,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
         rows = [*first, *[panel_height] * (-(-drawn // beside) - len(first))]
         sheet = Sheet(
             _headline(dataset, path, in_tube=tube is not None),
-            " · ".join([*_facts(dataset, in_tube=tube is not None), "computed, nothing is measured"]),
+            " · ".join([*_facts(dataset, in_tube=tube is not None), "computed, no measured data"]),
             width=COLUMNS[column],
             heights=rows,
             columns=beside,
@@ -194,7 +194,7 @@ def _tube_robot(dataset: xr.Dataset, path: Samples | None) -> Robot | None:
 
 
 def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> str:
-    """What the run shows, in one line."""
+    """Summary of the run in one line."""
     name = plain(str(dataset.attrs.get("robot", "a robot")), 50)
     if not in_tube or path is None:
         return f"{name}: a run in time"
@@ -215,7 +215,7 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
-    """What the run was told."""
+    """Settings of the run."""
     attrs = dataset.attrs
     found = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
     if in_tube:
@@ -227,7 +227,7 @@ def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
         found += [f"roughness {1e6 * float(attrs['roughness']):.3g} µm"] if "roughness" in attrs else []
         found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
     if "draws" in attrs:
-        found.append(f"the middle of {attrs['draws']} draws")
+        found.append(f"the median of {attrs['draws']} draws")
     return found
 
 
@@ -254,7 +254,7 @@ def _turn_of(dataset: xr.Dataset, time: Samples) -> int:
 
 
 def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
-    """(n, 3) places of the body's mid-length, m; None where the run has a distance only."""
+    """(n, 3) positions of the body's mid-length, m; None for a run with a distance only."""
     if "position" not in dataset or dataset["position"].ndim != 2:
         return None
     values = np.asarray(dataset["position"].transpose("time", ...).values, dtype=float)
@@ -262,7 +262,7 @@ def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
 
 
 def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> list[tuple[str, Samples]]:
-    """Words and SI values of the lines of a panel that the run has; one that is always 0 only where all are."""
+    """Labels and SI values of the lines of a panel that the run has, without lines that are always 0."""
     found = []
     for name, words in panel.lines:
         if name in dataset and dataset[name].dims == ("time",):
@@ -286,7 +286,7 @@ def _draw_path(axes: Axes, path: Samples, across: int, name: str) -> None:
 
 
 def _widen(axes: Axes, x: Samples, y: Samples) -> None:
-    """Keep rounding from filling an axis across which nothing moves."""
+    """Widen a nearly constant axis, on which rounding would dominate."""
     reach = float(np.nanmax(x) - np.nanmin(x))
     low, high = float(np.nanmin(y)), float(np.nanmax(y))
     if high - low < 1e-6 * max(reach, abs(low)) or high == low:

@@ -1,1 +1,1 @@
-"""Pictures and films of a robot in three dimensions; needs the extra `3d`."""
+"""Pictures and videos of a robot in three dimensions; needs the extra `3d`."""

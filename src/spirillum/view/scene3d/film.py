@@ -1,4 +1,4 @@
-"""A film of a run in three dimensions, by a camera that stands still or follows the robot."""
+"""Video of a run in three dimensions, by a fixed camera or one that follows the robot."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
 _SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
 """Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
 _FINE = 3
-"""Pixels that are drawn for one that is shown, along each side."""
+"""Rendered pixels per displayed pixel, along each side (supersampling)."""
 _RIM, _ROOM = 0.93, 0.90
-"""Radius of the glass, drawn and within, over half of the square."""
+"""Radius of the tube, outside and inside, over half of the square."""
 _GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
 _MOST = 600
-"""Points of the path that are drawn."""
+"""Number of plotted points of the path."""
 
 
 class CrossSection:
-    """The inset of all frames of one film: seen from the front, y to the right and z up."""
+    """Inset with the cross-section, in all frames of a video: seen from the front, y to the right and z up."""
 
     def __init__(self, size: tuple[int, int], robot: Robot, poses: Poses) -> None:
         """Prepare the inset."""
@@ -102,7 +102,7 @@ _LARGEST_TURN = 0.25
 
 @dataclass(frozen=True, repr=False)
 class Film(DisplayMixin):
-    """A film that was written."""
+    """Video file and its facts."""
 
     path: Path
     robot: Robot
@@ -111,7 +111,7 @@ class Film(DisplayMixin):
     size: tuple[int, int]
     fps: int
     speed: float
-    """Time of the run over time of the film."""
+    """Time of the run over time of the video."""
     follows: bool
     """Whether the camera follows the robot."""
     turn_per_frame: float
@@ -120,11 +120,11 @@ class Film(DisplayMixin):
 
     @property
     def duration(self) -> float:
-        """Length of the film, s."""
+        """Length of the video, s."""
         return self.frames / self.fps
 
     def to_dict(self) -> dict[str, Any]:
-        """The film's facts, as ``film --json`` prints them."""
+        """Content of ``film --json``."""
         content = {
             "robot": self.robot.name,
             "model": self.model,
@@ -152,7 +152,7 @@ def film(
     camera: str = "auto",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Film:
-    """Film a run; one in a tube with the cross-section in a corner.
+    """Render a video of a run; in a tube with the cross-section in a corner.
 
     Args:
         dataset: what `spirillum.simulate` returns, or the file with it.
@@ -204,7 +204,7 @@ def film(
 
 
 class _Shots:
-    """The frames of a film: what is seen, from where."""
+    """Frames of a video: scene and view."""
 
     def __init__(
         self,
@@ -227,7 +227,7 @@ class _Shots:
         self._camera, self._rows = self._framed()
 
     def _framed(self) -> tuple[SceneCamera, int | None]:
-        """The camera of the first frame, and the rows about the middle in which all frames have all that is drawn."""
+        """Camera of the first frame, and the rows about the middle that contain the content of all frames."""
         several = [self._poses.at(float(time)) for time in np.linspace(self._poses.time[0], self._poses.time[-1], 60)]
         glass = self._glass
         if self._follows:
@@ -277,7 +277,7 @@ class _Shots:
 
 
 def _channel_middle(dataset: xr.Dataset) -> float | None:
-    """Where the run says that the channel's middle is, m."""
+    """Position of the channel's middle in the run, m."""
     try:
         middle = float(dataset.attrs.get("channel_middle", np.nan))
     except (TypeError, ValueError):
@@ -287,7 +287,7 @@ def _channel_middle(dataset: xr.Dataset) -> float | None:
 
 def _even(size: tuple[int, int]) -> tuple[int, int]:
     if size[0] % 2 or size[1] % 2:
-        raise InputError(f"size = {size[0]}x{size[1]}; allowed: even numbers, as films want them")
+        raise InputError(f"size = {size[0]}x{size[1]}; allowed: even numbers, which the video encoder requires")
     return size
 
 
@@ -296,7 +296,9 @@ def _check_pace(fps: int, speed: float, suffix: str) -> None:
     if isinstance(fps, bool) or int(fps) != fps or not 1 <= fps <= most:
         raise InputError(f"fps = {fps}; allowed: a whole number of frames a second from 1 to {most} for {suffix}")
     if not _SLOWEST <= speed <= _FASTEST:
-        raise InputError(f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run a second of film")
+        raise InputError(
+            f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run per second of video"
+        )
 
 
 def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:

@@ -1,4 +1,4 @@
-"""Words on a picture: title, axes, a bar of known length."""
+"""Text on a picture: title, axes, scale bar."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from spirillum.view.scene3d.scenery import SceneCamera, ruler_steps
 
 _DPI = 200
 _REFERENCE = 900.0
-"""Height of a picture in pixels at which words have their nominal size."""
+"""Height of a picture in pixels at which text has its nominal size."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A bar of known length in the scene, as it is seen."""
+    """Scale bar in the scene, projected."""
 
     length: float
     """Length, m."""
@@ -35,7 +35,7 @@ class Bar:
 
 
 def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Bar:
-    """The bar at the lower right: in the upright plane along the robot's axis, or across it where one looks along.
+    """Scale bar at the lower right: in the upright plane along the robot's axis, or across it in a view along the axis.
 
     Args:
         camera: the camera.
@@ -57,7 +57,7 @@ def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Ba
 
 
 def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, lines: Sequence[str]) -> np.ndarray:
-    """(height, width, 4) the words alone, straight alpha."""
+    """(height, width, 4) the text alone, straight alpha."""
     with styled():
         figure, axes, unit = _canvas(size)
         left, top = 0.022 * size[0], 0.035 * size[1]
@@ -71,7 +71,7 @@ def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, l
 
 
 def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Words over pictures of one size; only the rows and columns that have words are touched.
+    """Text blended into pictures of one size; only the rows and columns with text change.
 
     Returns:
         A function that writes the words into a picture and gives it back.
@@ -99,7 +99,7 @@ def _runs(truth: Any) -> list[slice]:
 
 
 class Stamp:
-    """The time in the upper right corner of a film's frames, and how its speed differs from the run's."""
+    """Time stamp in the upper right corner of a video's frames, and the ratio of its speed to the run's."""
 
     def __init__(self, size: tuple[int, int], times: Samples, speed: float) -> None:
         """Prepare the digits.
@@ -124,7 +124,7 @@ class Stamp:
         self._right, self._top, self._height = int(0.978 * size[0]), int(0.035 * size[1]), int(1.5 * height)
 
     def text(self, time: float) -> str:
-        """The words at a time of the run, s."""
+        """The label at a time of the run, s."""
         return f"t = {time / self._scale.factor:{self._width}.{self._digits}f} {self._scale.unit}{self._speed}"
 
     def write(self, image: np.ndarray, time: float) -> None:
@@ -140,7 +140,7 @@ class Stamp:
 
 
 def _canvas(size: tuple[int, int]) -> tuple[Figure, Axes, float]:
-    """An empty figure, axes in its pixels, and the size of words."""
+    """An empty figure, axes in its pixels, and the size of text."""
     figure = Figure(figsize=(size[0] / _DPI, size[1] / _DPI), dpi=_DPI, facecolor="none")
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), facecolor="none")

@@ -72,7 +72,7 @@ def _has_display() -> bool:
 
 @contextmanager
 def _quiet_context(*, live: bool) -> Iterator[None]:
-    """Off-screen drawing asks for no display, so that nothing complains about one; the environment is put back."""
+    """Disable the display during off-screen rendering to avoid warnings; restores the environment."""
     if live or not sys.platform.startswith("linux"):
         yield
         return
@@ -103,13 +103,13 @@ def _can_draw(window: Any) -> bool:
 
 
 FILMS = {".mp4": "a film", ".gif": "a film"}
-"""Endings of the films that can be written, for `output_target`."""
+"""Endings of the supported video files, for `output_target`."""
 _PALETTE_FRAMES = 9
 _QUALITY = {"crf": "18", "preset": "veryfast"}
 
 
 class Writer(Protocol):
-    """Takes the frames of a film, one after the other."""
+    """Sequential writer of a video's frames."""
 
     def add(self, image: np.ndarray) -> None:
         """Append a frame, (height, width, 3) sRGB bytes."""
@@ -129,7 +129,7 @@ class _Gif:
         self._shape: tuple[int, ...] = ()
 
     def add(self, image: np.ndarray) -> None:
-        """Keep a frame, compressed: the colours of the film are chosen when all of it is known."""
+        """Store a frame, compressed: the video's colours are chosen after the last one."""
         self._shape = image.shape
         self._frames.append(zlib.compress(np.ascontiguousarray(image).tobytes(), 1))
 
@@ -137,7 +137,7 @@ class _Gif:
         return np.frombuffer(zlib.decompress(self._frames[number]), dtype=np.uint8).reshape(self._shape)
 
     def pictures(self) -> Iterator[Any]:
-        """The frames in at most 256 colours, those of frames from all over the film."""
+        """The frames in at most 256 colours, chosen from frames of the whole video."""
         from PIL import Image
 
         chosen = np.unique(np.linspace(0, len(self._frames) - 1, _PALETTE_FRAMES).astype(int))
@@ -152,7 +152,7 @@ class _Gif:
             yield frame.quantize(palette=palette, dither=Image.Dither.NONE)
 
     def durations(self) -> list[int]:
-        """Time of each frame, ms: whole hundredths of a second, as the format wants, that add up to the film's."""
+        """Time of each frame, ms: whole hundredths of a second, as the format requires, that add up to the video's."""
         ends = np.round(100.0 * np.arange(len(self._frames) + 1) / self._fps).astype(int)
         return [int(10 * step) for step in np.diff(ends)]
 

@@ -1,4 +1,4 @@
-"""A robot in its place as a scene of VTK: solids that move rigidly, the glass around them, light, a camera.
+"""VTK scene of a robot in its pose: rigid solids, the tube around them, light, a camera.
 
 VTK clips scenes of micrometres, so that everything is drawn in units of the robot's length.
 """
@@ -26,7 +26,7 @@ _REACH = 0.30
 
 
 def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
-    """Darkness, 0 to 1, of places on the inner side of a tube under a level robot.
+    """Darkness, 0 to 1, of points on the inner side of a tube under a level robot.
 
     Args:
         robot: the robot.
@@ -190,10 +190,10 @@ _MATERIALS: dict[str, _Material] = {
     "arm": _COPPER,
 }
 _QUICK: _Material = {"ambient": 0.46, "diffuse": 0.58, "specular": 0.30, "specular_power": 40.0}
-"""Shading of a film's solids: reflected surroundings would double the time of a frame."""
+"""Shading of a video's solids: reflected surroundings would double the time of a frame."""
 _QUICK_METAL: _Material = {"ambient": 0.34, "diffuse": 0.62, "specular": 0.75, "specular_power": 16.0}
 _SHARP = 35.0
-"""Angle between faces above which an edge is drawn sharp, deg."""
+"""Angle between faces above which an edge is sharp, deg."""
 
 
 @dataclass(frozen=True)
@@ -245,13 +245,13 @@ def level_height(solids: DrawnRobot) -> float:
 
 
 def resting(solids: DrawnRobot, phase: float = 0.0) -> RobotPose:
-    """The pose of a robot that lies level on its channel's floor, its tail at a phase."""
+    """Pose of a robot that is level on its channel's floor, its tail at a phase."""
     height = level_height(solids)
     return RobotPose(np.array([0.0, 0.0, height]), np.array([1.0, 0.0, 0.0, 0.0]), phase)
 
 
 class Scene:
-    """What is drawn. Lengths in m, the lab's axes: those of the channel, its axis at y = z = 0."""
+    """Scene for rendering. Lengths in m, the lab's axes: those of the channel, its axis at y = z = 0."""
 
     def __init__(
         self,
@@ -314,7 +314,7 @@ class Scene:
         return actor
 
     def add_grid(self, view: View, low: Samples, high: Samples) -> None:
-        """Add a faint grid behind or below what lies between two corners, m."""
+        """Add a faint grid behind or below the space between two corners, m."""
         step = ruler_steps(0.3 * self.solids.length)
         add_grid(self.plotter, self._pyvista, view, low / self.unit, high / self.unit, step / self.unit)
 

@@ -144,11 +144,11 @@ def _framed(
 
 
 WALL = 0.035
-"""Thickness with which the glass is drawn, in radii: the true one is unknown."""
+"""Displayed thickness of the glass, in radii: the true one is unknown."""
 _SIDES = 144
 _MOST_MARKS = 300
 _CLEAR = 0.004
-"""Alpha below which a side of a tube is not drawn."""
+"""Alpha below which a side of a tube is not rendered."""
 _AROUND = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
 _CEILING, _FLOOR, _BAND, _NEAR = "#cdd6dc", "#e3eef4", "#eaf1f5", "#f4fafd"
 _RIM, _EDGE, _TICK = "#9dbfd1", "#5f8ba3", "#54788e"
@@ -175,7 +175,7 @@ def _tube(pyvista: Any, radius: float, start: float, end: float, colours: Sample
 
 
 def _inner_colours() -> Samples:
-    """Colours of the inner side: light from above falls on the floor, a soft streak lies along each side.
+    """Colours of the inner side: light from above on the floor, a soft streak along each side.
 
     They are fixed, and not worked out from lamps: the tube fills the picture, and lamps would double a frame's time.
     """

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 64, 4096
 """Allowed widths and heights of a picture, pixels."""
 _FINER = 2
-"""Pixels drawn for each pixel of a picture, along width and height."""
+"""Rendered pixels per pixel of a picture, along width and height (supersampling)."""
 _MOST_FINER = 5_000_000
-"""Pixels of a picture above which no finer ones are drawn: they would take gigabytes."""
+"""Pixels of a picture above which supersampling is off: it would take gigabytes."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -43,9 +43,9 @@ class Picture3D(DisplayMixin):
     pixels: np.ndarray
     """(height, width, 3) the picture, sRGB bytes."""
     camera: SceneCamera
-    """Where it is seen from: `camera.pixels(points, size)` says where points of the lab are in the picture."""
+    """View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab."""
     pose: RobotPose
-    """Where the robot lies: its body's mid-length, attitude, and the angle of its tail."""
+    """Pose of the robot: its body's mid-length, attitude, and the angle of its tail."""
     path: Path | None
     """The file that was written."""
 
@@ -191,7 +191,7 @@ def _lines(robot: Robot, camera: SceneCamera, glass: tuple[float, float] | None)
 
 
 def _words(robot: Robot, view: View) -> str:
-    """What the picture shows, for those who cannot see it."""
+    """Alternative text of the picture."""
     from spirillum.view.figures.scene import length_words
 
     body, tail = robot.body, robot.tail

@@ -1,0 +1,42 @@
+"""The package's names are unique, and the map in CONTRIBUTING.md leads to files that exist."""
+
+import ast
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src" / "spirillum"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+MAP = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split("## Map of the house")[1].split("## Habits")[0]
+
+
+def _definitions(path: Path) -> list[str]:
+    body = ast.parse(path.read_text("utf-8")).body
+    return [node.name for node in body if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.decorator_list]
+
+
+def test_public_class_names_are_unique() -> None:
+    trees = [ast.parse(path.read_text("utf-8")) for path in MODULES]
+    names = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+    assert [name for name, count in names.items() if count > 1 and not name.startswith("_")] == []
+
+
+def test_no_module_defines_a_name_twice() -> None:
+    assert [path.name for path in MODULES if max(Counter(_definitions(path)).values(), default=1) > 1] == []
+
+
+@pytest.mark.parametrize("name", ["answer", "options", "warnings", "loading"])
+def test_general_module_names_occur_once_at_most(name: str) -> None:
+    assert len(list(PACKAGE.rglob(f"{name}.py"))) <= 1
+
+
+def test_every_path_of_the_map_exists() -> None:
+    paths = set(re.findall(r"`([\w/-]+(?:\.py|\.md|/))`", MAP))
+    roots = (ROOT, ROOT / "src", PACKAGE, PACKAGE / "fluid", PACKAGE / "view", PACKAGE / "vision")
+    rooms = [path for path in PACKAGE.iterdir() if path.is_dir()]
+    new = {"src/spirillum/fluid/closed/mymodel.py"}
+    assert [path for path in sorted(paths - new) if not any((root / path).exists() for root in (*roots, *rooms))] == []
+    assert len(paths) > 80
