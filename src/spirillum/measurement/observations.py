@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.files.numbers import number_in
+from spirillum.files.reading import number_in
 from spirillum.formats.tables import Table, TableRow, check_known, check_present, read_table
 from spirillum.measurement.rate_checks import RateTriples, check_motor_rates, first_of, rows_in_words, wrong_signs
 from spirillum.measurement.statistics import NORMAL, Mean, mean_with_interval
