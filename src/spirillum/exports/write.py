@@ -21,7 +21,7 @@ from spirillum.exports.polydata import vtp_bytes
 from spirillum.exports.sidecar import sidecar_of
 from spirillum.exports.solid import UnitedBody, is_watertight, is_watertight_file, stl_bytes, united
 from spirillum.exports.urdf import urdf_text
-from spirillum.files import MARK, output_folder, output_target, protected, whole_files
+from spirillum.files import MARK, atomic_write_all, guard_inputs, output_folder, output_target
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
@@ -302,7 +302,7 @@ def export(
             lacks, a robot outside the model's domain, or an `.fmu` without a C compiler.
     """
     inputs = [robot] if isinstance(robot, (str, Path)) else []
-    with protected(*inputs, calibration):
+    with guard_inputs(*inputs, calibration):
         target = output_target(path, KINDS_OF_FILES, "robot.stl")
     angle, of_held = parse_option("phase", phase, KINDS["angle"]), (friction, calibration, placement)
     if target.suffix == ".fmu":
@@ -392,7 +392,7 @@ def _commit(target: Path, contents: Mapping[str, bytes]) -> None:
     try:
         for folder in made:
             output_folder(folder, target.parent)
-        with whole_files(list(reversed(final))) as parts:
+        with atomic_write_all(list(reversed(final))) as parts:
             for path, data in final.items():
                 parts[path].write_bytes(data)
     finally:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spirillum.errors import InputError
-from spirillum.files import MARK, output_target, protected, whole_file
+from spirillum.files import MARK, atomic_write, guard_inputs, output_target
 from spirillum.measurement.observations import COLUMNS, observation_table, read_observations
 
 _TABLES = {".csv": "an observations file"}
@@ -23,7 +23,7 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     paths = [Path(file) for file in files]
     if len(paths) < 2:
         raise InputError(f"{len(paths)} file of observations; allowed: two or more to join")
-    with protected(*paths):
+    with guard_inputs(*paths):
         target = output_target(output, _TABLES, "observations.csv")
     rows: list[dict[str, str]] = []
     comments: list[str] = []
@@ -38,7 +38,7 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    with protected(*paths), whole_file(target) as temporary:
+    with guard_inputs(*paths), atomic_write(target) as temporary:
         own = [] if any(MARK in line for line in comments) else [f"# joined, {MARK}"]
         temporary.write_text("".join(f"{line}\n" for line in (*comments, *own)) + text.getvalue(), encoding="utf-8")
         try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from spirillum.files import opened, whole_file
+from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
@@ -73,7 +73,7 @@ def _as_kept(item: zipfile.ZipInfo) -> bool:
 def keep(task: StudyTask, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
-        with whole_file(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
+        with atomic_write(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
             np.savez(stream, **cast("dict[str, Any]", part))
 
 

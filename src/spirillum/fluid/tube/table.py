@@ -24,7 +24,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import read_bytes, whole_file
+from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.places import CHECKED_FROM
 from spirillum.fluid.tube.responses import RESPONSES
@@ -226,7 +226,7 @@ class TubeTable:
             "seconds": self.seconds,
             "wire": self.wire,
         }
-        with whole_file(path, replace="any") as temporary:
+        with atomic_write(path, replace="any") as temporary:
             temporary.write_bytes(to_bytes(json.dumps(head).encode(), self.packed))
 
     @classmethod
