@@ -12,7 +12,7 @@ from path_traced.geometry import robot_of
 from path_traced.job import axis_height, papers
 from path_traced.scenes import Scene
 
-from spirillum.files import whole_file
+from spirillum.files import atomic_write
 from spirillum.formats.h264 import h264_writer
 
 __all__ = ["develop", "setup_text", "truth_of"]
@@ -45,7 +45,7 @@ def develop(scene: Scene, folder: Path, target: Path, windows: list[list[Window]
     else:
         quality |= {"b": f"{scene.bit_rate}k", "maxrate": f"{scene.bit_rate}k", "bufsize": f"{2 * scene.bit_rate}k"}
     with (
-        whole_file(target) as temporary,
+        atomic_write(target) as temporary,
         h264_writer(
             temporary,
             scene.size,

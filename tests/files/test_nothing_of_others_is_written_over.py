@@ -11,15 +11,15 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
+    atomic_folder,
+    atomic_write,
     file_name,
-    is_own,
+    guard_inputs,
     output_folder,
-    protected,
     results_folder,
     text_cell,
-    whole_file,
-    whole_folder,
     write_text,
+    written_by_us,
 )
 from spirillum.files.locks import LEFTOVER, private_folder, sweep
 
@@ -112,7 +112,7 @@ def test_pictures_say_who_drew_them(tmp_path: Path, name: str) -> None:
     from spirillum.view.figures.style import new_figure, save_as
 
     save_as(new_figure(1.0, 1.0), tmp_path / name)
-    assert is_own(tmp_path / name)
+    assert written_by_us(tmp_path / name)
     save_as(new_figure(1.0, 1.0), tmp_path / name)
 
 
@@ -120,11 +120,11 @@ def test_an_input_is_not_written_over(tmp_path: Path) -> None:
     path = tmp_path / "a.html"
     write_text(path, "ours")
     (tmp_path / "link").symlink_to(path)
-    with protected(tmp_path / "link"), pytest.raises(InputError, match="read by this command"):
+    with guard_inputs(tmp_path / "link"), pytest.raises(InputError, match="read by this command"):
         write_text(path, "new")
     (tmp_path / "images").mkdir()
     (tmp_path / "images" / "a.html").touch()
-    with protected(tmp_path / "images"), pytest.raises(InputError, match="read by this command"):
+    with guard_inputs(tmp_path / "images"), pytest.raises(InputError, match="read by this command"):
         write_text(tmp_path / "images" / "a.html", "new")
     write_text(path, "new")
 
@@ -147,7 +147,7 @@ def test_measuring_does_not_replace_films_or_files_of_others(tmp_path: Path, ref
 
 def test_a_planted_link_at_a_temporary_name_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "target").write_text("precious")
-    with whole_file(tmp_path / "a.txt") as temporary:
+    with atomic_write(tmp_path / "a.txt") as temporary:
         assert temporary.parent.stat().st_mode & 0o077 == 0  # nobody else can plant one
         temporary.write_text("text")
     assert (tmp_path / "target").read_text() == "precious"
@@ -182,14 +182,14 @@ def test_leftovers_of_dead_runs_go_and_those_of_living_ones_stay(tmp_path: Path)
         assert not dead.exists()
     (tmp_path / ".r.part").mkdir()
     (tmp_path / ".r.part" / "mine").touch()
-    with whole_folder(tmp_path / "r") as part:
+    with atomic_folder(tmp_path / "r") as part:
         (part / "1.png").touch()
     assert {path.name for path in tmp_path.iterdir()} == {"r", ".r.part"}
     assert (tmp_path / ".r.part" / "mine").exists()
 
 
 def test_a_folder_that_has_come_meanwhile_is_not_replaced(tmp_path: Path) -> None:
-    writing = whole_folder(tmp_path / "r")
+    writing = atomic_folder(tmp_path / "r")
     (writing.__enter__() / "1.png").touch()
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / "other").touch()

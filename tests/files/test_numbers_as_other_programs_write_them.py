@@ -9,7 +9,7 @@ from spirillum.calibration.experiment import read_experiment
 from spirillum.dynamics.timing import read_duty
 from spirillum.dynamics.tube_options import read_flow
 from spirillum.files import csv_rows
-from spirillum.files.numbers import number_in
+from spirillum.files.reading import number_in
 from spirillum.measurement.observations import join_observations, observations_answer, read_observations
 from spirillum.robot.load import load
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from spirillum.files import is_own
+from spirillum.files import written_by_us
 from spirillum.robot.load import is_preset, load, preset_names
 from spirillum.robot.toml_writer import robot_text
 
@@ -23,7 +23,7 @@ def test_a_robot_file_holds_every_field(name: str, changes: dict[str, Any], tmp_
     path = tmp_path / "robot.toml"
     path.write_text(robot_text(robot, "A robot.\nOf two lines."), encoding="utf-8")
     assert load(path) == robot
-    assert is_own(path)
+    assert written_by_us(path)
     assert is_preset(robot) == (not changes)
 
 

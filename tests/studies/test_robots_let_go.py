@@ -8,7 +8,7 @@ from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
 from spirillum.studies.ranking import LET_GO, StudyRanking, best_in_words, ranking_of
-from spirillum.studies.settled import STATES, SettledTask, not_settled
+from spirillum.studies.released_robots import STATES, SettledTask, not_settled
 from spirillum.studies.spec import Contact
 from spirillum.view.figures.comparison import ranking_picture
 
@@ -89,8 +89,8 @@ def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> No
 
 def test_what_cannot_be_followed_is_no_number() -> None:
     robot = sp.load("biorob2012-wide")
-    task = SettledTask(0, 0, robot, Placement.of({"gap": "30 mm"}), Contact())
-    part = task.answer()
+    task = SettledTask(0, np.array([0]), robot, Placement.of({"gap": "30 mm"}), Contact())
+    part = task.answer(None, None)
     assert set(part) == task.needed
     assert np.isnan(part["forward_velocity"]).all()
     (said,) = not_settled([(task, part)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.studies import jobs
+from spirillum.studies.work import ModelTask
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +22,7 @@ def test_interrupted_study_resumes_where_it_stopped(
 ) -> None:
     whole = sp.study(small)
     done: list[int] = []
-    original = jobs.answer
+    original = ModelTask.answer
     most = 3
 
     def counted(task, loaded, observed):
@@ -31,7 +31,7 @@ def test_interrupted_study_resumes_where_it_stopped(
         done.append(task.number)
         return original(task, loaded, observed)
 
-    monkeypatch.setattr(jobs, "answer", counted)
+    monkeypatch.setattr(ModelTask, "answer", counted)
     with pytest.raises(KeyboardInterrupt):
         sp.study(small, output=tmp_path / "out")
     assert not (tmp_path / "out" / "dataset.nc").exists()

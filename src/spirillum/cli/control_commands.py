@@ -169,7 +169,7 @@ def control(
     """
     from spirillum.cli import renderer
     from spirillum.controllers.control import control as answer
-    from spirillum.files import PICTURES, netcdf_target, output_target, protected, write_dataset
+    from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
 
     target = None if output is None else netcdf_target(output)
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
@@ -177,7 +177,7 @@ def control(
         check_movie(movie)
     fields = {"at": at, "tolerance": tolerance, "speed": speed, "law": law, "rate": rate, "duration": duration}
     place = placement_from(gap, eccentricity, pitch, None, ends, None)
-    with protected(lab), renderer.progress_bar(quiet=json) as progress:
+    with guard_inputs(lab), renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded_robot(robot, settings),
             {"kind": task, **{name: value for name, value in fields.items() if value is not None}},

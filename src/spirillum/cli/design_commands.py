@@ -86,10 +86,10 @@ def design(
     """
     from spirillum.cli import renderer
     from spirillum.designs.design import design as answer
-    from spirillum.files import PICTURES, output_target, protected, whole_files
+    from spirillum.files import PICTURES, atomic_write_all, guard_inputs, output_target
     from spirillum.robot.toml_writer import robot_text
 
-    with protected(robot, posterior):
+    with guard_inputs(robot, posterior):
         target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
         picture = None if plot is None else output_target(plot, PICTURES, "design.png")
         printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
@@ -116,7 +116,7 @@ def design(
             tail_rate=tail_rate,
             progress=progress,
         )
-    with whole_files([path for path in (picture, printed, target) if path is not None]) as parts:
+    with atomic_write_all([path for path in (picture, printed, target) if path is not None]) as parts:
         if picture is not None:
             from spirillum.view.figures.design import design_figure
             from spirillum.view.figures.style import save_as

@@ -118,11 +118,11 @@ def flow(
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
     from spirillum.fields.flow_summary import flow_answer
-    from spirillum.files import protected
+    from spirillum.files import guard_inputs
     from spirillum.fluid.tube.domain import seat_of
     from spirillum.results.flow import check_targets, write_flow
 
-    with protected(run):
+    with guard_inputs(run):
         check_targets(output, volume)
     _check_options(context, output, volume, run, time, model)
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow, yaw)
@@ -157,7 +157,7 @@ def flow(
     plane_around(loaded, plane, offset, extent, resolution, seat)
     if volume is not None:
         box_around(loaded, extent, volume_resolution, seat)
-    with renderer.progress_bar(quiet=json) as progress, protected(run):
+    with renderer.progress_bar(quiet=json) as progress, guard_inputs(run):
         if run is None:
             progress("flow: forces on the robot", 0, 1)
         found = around()

@@ -201,10 +201,10 @@ def simulate(
     from spirillum.dynamics.run_summary import run_answer
     from spirillum.dynamics.simulation import simulate as answer
     from spirillum.errors import InputError
-    from spirillum.files import PICTURES, netcdf_target, output_target, protected, write_dataset
+    from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
 
     over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
-    with protected(continued, posterior, calibration, duty, flow if over_time else None):
+    with guard_inputs(continued, posterior, calibration, duty, flow if over_time else None):
         target = netcdf_target(output)
         picture = None if plot is None else output_target(plot, PICTURES, "run.png")
     width = column or "double"

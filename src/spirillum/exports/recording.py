@@ -20,7 +20,7 @@ from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports import foxglove
-from spirillum.files import MARK, output_target, protected, whole_file
+from spirillum.files import MARK, atomic_write, guard_inputs, output_target
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
@@ -90,14 +90,14 @@ def export_run(
     if not _SLOWEST <= as_number(speed) <= _FASTEST:
         raise InputError(f"speed = {str(speed)[:40]}; allowed: {_SLOWEST:g} to {_FASTEST:g}")
     inputs = [run] if isinstance(run, (str, Path)) else []
-    with protected(*inputs, film):
+    with guard_inputs(*inputs, film):
         target = output_target(path, RECORDINGS, "run.mcap")
     import_optional("mcap", "a recording in the format MCAP", "control")
     dataset = open_run(run) if isinstance(run, (str, Path)) else run
     robot = robot_of(dataset)
     poses = poses_of(dataset)
     counts: dict[str, int] = {}
-    with whole_file(target) as temporary, temporary.open("wb") as stream:
+    with atomic_write(target) as temporary, temporary.open("wb") as stream:
         writer = _Writer(stream, dataset)
         for message in _messages(dataset, robot, poses, film, speed):
             writer.add(message)

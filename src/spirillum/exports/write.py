@@ -25,7 +25,7 @@ from spirillum.exports.meshes import (
     united,
     vtp_bytes,
 )
-from spirillum.files import MARK, output_folder, output_target, protected, whole_files
+from spirillum.files import MARK, atomic_write_all, guard_inputs, output_folder, output_target
 from spirillum.notes import Note, notes_in_answer
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
@@ -306,7 +306,7 @@ def export(
             lacks, a robot outside the model's domain, or an `.fmu` without a C compiler.
     """
     inputs = [robot] if isinstance(robot, (str, Path)) else []
-    with protected(*inputs, calibration):
+    with guard_inputs(*inputs, calibration):
         target = output_target(path, KINDS_OF_FILES, "robot.stl")
     angle, of_held = parse_option("phase", phase, KINDS["angle"]), (friction, calibration, placement)
     if target.suffix == ".fmu":
@@ -396,7 +396,7 @@ def _commit(target: Path, contents: Mapping[str, bytes]) -> None:
     try:
         for folder in made:
             output_folder(folder, target.parent)
-        with whole_files(list(reversed(final))) as parts:
+        with atomic_write_all(list(reversed(final))) as parts:
             for path, data in final.items():
                 parts[path].write_bytes(data)
     finally:

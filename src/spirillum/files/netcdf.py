@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_NETCDF, MOST_VARIABLES
 from spirillum.files.reading import opened
-from spirillum.files.writing import Replace, whole_file
+from spirillum.files.writing import Replace, atomic_write
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -62,14 +62,14 @@ def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.Fi
 
     Args:
         path: the file.
-        replace: what it may replace, see `whole_file`.
+        replace: what it may replace, see `atomic_write`.
     """
     import h5netcdf
 
     content = BytesIO()
     with _hdf5()(content, "w", track_order=True) as stored, h5netcdf.File(stored, "w") as file:
         yield file
-    with whole_file(path, replace=replace) as temporary:
+    with atomic_write(path, replace=replace) as temporary:
         temporary.write_bytes(content.getbuffer())
 
 
@@ -79,7 +79,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") 
     Args:
         dataset: what is written.
         path: the file.
-        replace: what it may replace, see `whole_file`.
+        replace: what it may replace, see `atomic_write`.
     """
     from xarray.backends import H5NetCDFStore
 

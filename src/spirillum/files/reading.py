@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import math
 import os
 import re
 import stat
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -17,7 +18,7 @@ from typing import Any, BinaryIO
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS
 from spirillum.files.names import checked_path
-from spirillum.files.numbers import separator_of, with_plain_numbers
+from spirillum.scalars import plain_minus
 
 _LINE = re.compile(r"at line (\d+)")
 _STRING = re.compile(r'"((?:[^"\\\n]|\\.)*)("|$)')
@@ -297,3 +298,53 @@ def _check_extent(text: str, path: Path, what: str) -> None:
             f"{path} has {rows} lines and {cells} commas; allowed: {what} of at most {MOST_ROWS} rows and "
             f"{MOST_CELLS} cells"
         )
+
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
+_WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d{1,3})?", re.ASCII)
+_WITH_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d{1,3})?", re.ASCII)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+_SEPARATORS = ",;\t"
+_QUOTED_CELL = re.compile(r'"[^"]*"')
+
+
+def number_in(text: str) -> float:
+    """A cell's text as a decimal number; NaN for all else, such as `inf`, `1_000` or digits of other scripts."""
+    plain = plain_minus(text)
+    return float(plain) if _NUMBER.fullmatch(plain) else math.nan
+
+
+def separator_of(lines: Sequence[str]) -> str:
+    """The character between columns, by the first line that holds one: comma, semicolon or tab."""
+    for line in lines:
+        counts = [_QUOTED_CELL.sub("", line).count(mark) for mark in _SEPARATORS]
+        if any(counts):
+            return _SEPARATORS[counts.index(max(counts))]
+    return ","
+
+
+def with_plain_numbers(rows: Sequence[Sequence[str]], separator: str) -> list[list[str]]:
+    """Cells in which numbers have a decimal point and an ASCII minus sign; other texts stay as they are.
+
+    Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabs
+    separate, or some comma that cannot mark thousands. No number may have a point then. Else they stay.
+    """
+    found = [[cell if cell.isascii() else _with_plain_minus(cell) for cell in cells] for cells in rows]
+    with_comma = [cell for cells in found for cell in cells if "," in cell and _WITH_COMMA.fullmatch(cell)]
+    if not with_comma or (separator == "," and all(map(_THOUSANDS.fullmatch, with_comma))):
+        return found
+    if any(_WITH_POINT.fullmatch(cell) for cells in found for cell in cells if "." in cell):
+        return found
+    return [[cell.replace(",", ".") if _WITH_COMMA.fullmatch(cell) else cell for cell in cells] for cells in found]
+
+
+def number_hint(text: str) -> str:
+    """What to change in a text that looks like a number, for the end of a sentence; empty where it does not."""
+    if re.fullmatch(r"[+-]?[\d.,' ]+(?:[eE][+-]?\d+)?", text, re.ASCII) and "," in text:
+        return ", with a decimal point and without other marks"
+    return ""
+
+
+def _with_plain_minus(cell: str) -> str:
+    plain = plain_minus(cell)
+    return plain if _NUMBER.fullmatch(plain) or _WITH_COMMA.fullmatch(plain) else cell

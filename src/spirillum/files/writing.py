@@ -2,7 +2,7 @@
 
 A file is made in a hidden folder beside its place that only this user can enter (`locks.private_folder`), written to
 the disk, and renamed: a kill or a full disk leaves the old file or the new one, whole. What the program writes says so
-(`is_own`); any other file that is there is refused, and so are inputs of the running command (`protected`).
+(`written_by_us`); any other file that is there is refused, and so are inputs of the running command (`guard_inputs`).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 
-def is_own(path: Path, begins: bytes = b"") -> bool:
+def written_by_us(path: Path, begins: bytes = b"") -> bool:
     """Whether a file is one of this program's, or empty.
 
     Args:
@@ -57,7 +57,7 @@ def is_own(path: Path, begins: bytes = b"") -> bool:
 
 
 @contextmanager
-def protected(*inputs: str | Path | None) -> Iterator[None]:
+def guard_inputs(*inputs: str | Path | None) -> Iterator[None]:
     """While the block runs, these files and folders are not written over.
 
     Args:
@@ -80,7 +80,7 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
     Args:
         path: where a file is to be written.
         replace: what it may replace.
-        begins: what a file of this kind begins with, see `is_own`.
+        begins: what a file of this kind begins with, see `written_by_us`.
 
     Raises:
         InputError: if something is there that is no regular file, is an input, or may not be replaced.
@@ -100,7 +100,7 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
     if any(_same(real, source) for source in _inputs.get()):
         raise InputError(f"{path} is read by this command and would be written over; allowed: another name or folder")
     try:
-        if replace == "own" and not is_own(real, begins):
+        if replace == "own" and not written_by_us(real, begins):
             raise InputError(
                 f"{path} is there and of unknown origin, not written by spirillum; allowed: another name or folder, "
                 "or to move it away"
@@ -120,25 +120,25 @@ def _same(path: Path, source: Path) -> bool:
 
 
 @contextmanager
-def whole_file(path: Path, *, replace: Replace = "own", begins: bytes = b"", sync: bool = True) -> Iterator[Path]:
+def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", sync: bool = True) -> Iterator[Path]:
     """Give a temporary path; when the block ends well, what was written there takes the place of `path`.
 
     Args:
         path: the file; its folder has to be there.
         replace: what it may replace.
-        begins: what a file of this kind begins with, see `is_own`.
+        begins: what a file of this kind begins with, see `written_by_us`.
         sync: wait until the disk has it; not needed for what is computed again where it is damaged.
 
     Raises:
         InputError: if the folder cannot be written to, or something is there that may not be replaced.
         OSError: if there is no space.
     """
-    with whole_files({path: begins}, replace=replace, sync=sync) as temporary:
+    with atomic_write_all({path: begins}, replace=replace, sync=sync) as temporary:
         yield temporary[path]
 
 
 @contextmanager
-def whole_files(
+def atomic_write_all(
     paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
 ) -> Iterator[dict[Path, Path]]:
     """Give temporary paths of files that belong together; all are made before the first takes its place.
@@ -201,13 +201,13 @@ def _named(temporary: Mapping[Path, Path]) -> Iterator[None]:
 def holds_own_only(folder: Path) -> bool:
     """Whether all that a folder holds are files of this program, or nothing."""
     return all(
-        path.is_file() and not path.is_symlink() and path.stat().st_size > 0 and is_own(path)
+        path.is_file() and not path.is_symlink() and path.stat().st_size > 0 and written_by_us(path)
         for path in folder.iterdir()
     )
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
+def atomic_folder(path: Path) -> Iterator[Path]:
     """Give a temporary folder; when the block ends well it takes the place of `path`, with all that is in it.
 
     Args:
@@ -315,9 +315,9 @@ def write_text(path: Path, text: str, *, replace: Replace = "own", begins: str =
         path: the file.
         text: what it holds.
         replace: what it may replace.
-        begins: what a file of this kind begins with, see `is_own`.
+        begins: what a file of this kind begins with, see `written_by_us`.
     """
-    with whole_file(path, replace=replace, begins=begins.encode()) as temporary:
+    with atomic_write(path, replace=replace, begins=begins.encode()) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import checked_path, csv_rows, opened, read_text
 from spirillum.files.limits import LARGEST_TABLE, LONGEST_CELL, MOST_CELLS, MOST_COLUMNS, MOST_ROWS
-from spirillum.files.numbers import number_hint, number_in
+from spirillum.files.reading import number_hint, number_in
 from spirillum.optional_dependencies import installation_of
 
 _BATCH = 4096

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spirillum.files import whole_file
+from spirillum.files import atomic_write
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ def write_vti(dataset: xr.Dataset, path: Path) -> None:
 
     ordered = dataset.transpose(*_AXES)
     axes = [np.asarray(ordered[axis].values, dtype=float) for axis in _AXES]
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         imageToVTK(
             str(temporary.with_suffix("")),  # the library adds the suffix
             # Plain floats: the library writes their repr, which numpy's own floats spell with their type.

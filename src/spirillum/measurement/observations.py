@@ -14,8 +14,8 @@ import numpy as np
 
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.files import MARK, new_file, output_target, protected, whole_file
-from spirillum.files.numbers import number_in
+from spirillum.files import MARK, atomic_write, guard_inputs, new_file, output_target
+from spirillum.files.reading import number_in
 from spirillum.formats.tables import Table, TableRow, check_known, check_present, read_table
 from spirillum.measurement.rate_checks import (
     RateTriples,
@@ -280,7 +280,7 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     paths = [Path(file) for file in files]
     if len(paths) < 2:
         raise InputError(f"{len(paths)} file of observations; allowed: two or more to join")
-    with protected(*paths):
+    with guard_inputs(*paths):
         target = output_target(output, _TABLES, "observations.csv")
     rows: list[dict[str, str]] = []
     comments: list[str] = []
@@ -295,7 +295,7 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    with protected(*paths), whole_file(target) as temporary:
+    with guard_inputs(*paths), atomic_write(target) as temporary:
         own = [] if any(MARK in line for line in comments) else [f"# joined, {MARK}"]
         temporary.write_text("".join(f"{line}\n" for line in (*comments, *own)) + text.getvalue(), encoding="utf-8")
         try:

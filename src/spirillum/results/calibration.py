@@ -18,7 +18,7 @@ from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
-from spirillum.files import MARK, check_replaceable, output_folder, protected, results_folder, whole_files
+from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inputs, output_folder, results_folder
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.notes import Note
 from spirillum.robot.placement import gap_on_asperities
@@ -271,7 +271,7 @@ def calibrate(
         folder = None
         if output is not None:
             folder = stack.enter_context(results_folder(output))
-            stack.enter_context(protected(*inputs))
+            stack.enter_context(guard_inputs(*inputs))
             check_folder(folder)
         found = fit_model(
             observations,
@@ -304,7 +304,7 @@ def write_calibration(
     earlier = earlier_results(folder)
     names = _RESULTS if found.posterior is not None else _RESULTS[:2]
     written = [folder / name for name in names]
-    with whole_files({path: _begins(path) for path in written}) as parts:
+    with atomic_write_all({path: _begins(path) for path in written}) as parts:
         parts[written[0]].write_text(calibration_text(found), encoding="utf-8")
         parts[written[1]].write_text(predictions_text(found), encoding="utf-8")
         if found.posterior is not None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.display import percent
 from spirillum.errors import InputError
-from spirillum.files import check_replaceable, protected, results_folder, whole_file, write_text
+from spirillum.files import atomic_write, check_replaceable, guard_inputs, results_folder, write_text
 from spirillum.measurement.flags import BY_HAND, says_synthetic
 from spirillum.measurement.measure import (
     TABLE,
@@ -187,7 +187,7 @@ def measure(
     if output is None:
         return _measured(asked, None, tell)
     inputs = (*asked.videos, setup, marks, track, asked.folder / asked.setup.robot.file)
-    with results_folder(output) as path, protected(*inputs):
+    with results_folder(output) as path, guard_inputs(*inputs):
         folder = _Folder(path, annotated=annotated, figures=figures)
         folder.check(asked)
         return _measured(asked, folder, tell)
@@ -278,7 +278,7 @@ def _annotated_trial(
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
     period = pattern_period(stripes_of(asked.setup, asked.robot))
     film = partial(annotated_film, robot=asked.robot, words=words, period=period, waiting=video.waiting)
-    with whole_file(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
+    with atomic_write(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
         trial = measured_trial(asked, number, video, progress=tell, on_frame=on_frame)
     if (flag := _flag_with_frame(trial)) is not None and flag.frame is not None:
         folder.thumbnails[name] = frame_of_film(target, flag.frame) or folder.thumbnails.get(name, b"")

@@ -15,7 +15,7 @@ import numpy as np
 
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.files import output_folder, protected, results_folder, write_dataset, write_text
+from spirillum.files import guard_inputs, output_folder, results_folder, write_dataset, write_text
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
@@ -206,13 +206,13 @@ def study(  # noqa: PLR0913 - the options of the command
     tell = progress or (lambda _what, _done, _total: None)
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
-        with protected(*inputs):
+        with guard_inputs(*inputs):
             return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, tell))
     if output is None:
         return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, tell, crew))
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
-    with protected(*inputs), results_folder(output, claim=claim) as folder:
+    with guard_inputs(*inputs), results_folder(output, claim=claim) as folder:
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)

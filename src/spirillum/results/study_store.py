@@ -30,9 +30,8 @@ from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
 from spirillum.studies.estimate import CostEstimate, Pace, estimate_of, is_large
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import RobotBlock, layout_of
+from spirillum.studies.regions import Plan, RobotBlock, encoded_region, layout_of, plan_of, region_jobs
 from spirillum.studies.run import warnings_of, warnings_of_calibrations
-from spirillum.studies.stored import Plan, encoded_region, plan_of, region_jobs
 from spirillum.studies.study_loader import LoadedStudy
 from spirillum.worker_pool import WorkerPool, map_tasks
 

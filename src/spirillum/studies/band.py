@@ -19,8 +19,9 @@ from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.tube_pose import GAP_SHARE
+from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.study_loader import LoadedStudy
-from spirillum.studies.work import Indices, Part, groups
+from spirillum.studies.work import Part, StudyTask, groups
 from spirillum.swimming.band import at_place, band_places, joined
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
@@ -39,31 +40,23 @@ AT_PLACES = (
 
 
 @dataclass(frozen=True)
-class BandTask:
+class BandTask(StudyTask):
     """One model for the robots of one channel that share a place of their bands."""
 
-    number: int
     model: str
-    indices: Indices
-    """Indices of the robots in the flat order of the study."""
     place: int
     """Number of the place in the band of each robot."""
     robots: tuple[RobotBatch, ...]
     """The robots at that place, one by one."""
 
     @property
-    def size(self) -> int:
-        """Number of robots."""
-        return len(self.robots)
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
-        return f"part-{self.number:05d}.npz"
+    def models(self) -> tuple[str, ...]:
+        """Models whose linear algebra is limited to one thread."""
+        return (self.model,)
 
     @property
     def words(self) -> str:
-        """What is computed, in a few words."""
+        """Progress message."""
         return f"{self.model}, band: {self.where}, {self.size} robots"
 
     @property
@@ -77,16 +70,15 @@ class BandTask:
         """Names of the arrays of its answer."""
         return set(AT_PLACES)
 
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-        return self.needed
+    def leading(self, readings: int) -> tuple[int, ...]:
+        """Return the sizes of the first axes of all arrays: robots, friction readings."""
+        return self.size, readings
 
-    def answer(self, readings: Iterable[str]) -> Part:
-        """Steady swimming at this place, (robots, friction readings); NaN where there is none."""
+    def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Compute steady swimming at this place, (robots, friction readings); NaN where there is none."""
         model = find_swimmer_model(self.model)
         there = [_quickly(robot, model) for robot in self.robots]
-        found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in readings]
+        found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
         return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
 
 
@@ -101,7 +93,7 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
             model = find_swimmer_model(name)
             for place, sharing in _shared_places(robots, model):
                 there = tuple(sharing.values())
-                yield BandTask(number, name, indices[list(sharing)], place, there)
+                yield BandTask(number, indices[list(sharing)], name, place, there)
                 number += 1
 
 

@@ -27,10 +27,11 @@ from spirillum.studies.released_robots import (
     READ,
     WINDOWS,
     LaidDownTask,
+    SettledTask,
     levels,
     levels_of_readings,
+    settled_variables,
 )
-from spirillum.studies.settled import SettledTask, settled_variables
 from spirillum.studies.spec import LaidDown
 from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import REASONS, ModelTask, Part, gathered

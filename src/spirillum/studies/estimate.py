@@ -11,8 +11,7 @@ from typing import NamedTuple
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.processes import AHEAD, memory_in_use
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import Layout, RobotBlock, cut, layout_of
-from spirillum.studies.stored import Plan, RegionJob, encoded_region, plan_of
+from spirillum.studies.regions import Layout, Plan, RegionJob, RobotBlock, cut, encoded_region, layout_of, plan_of
 from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import groups
 from spirillum.worker_pool import ESTIMATE, WorkerPool

@@ -1,21 +1,29 @@
-"""A large study cut into regions: blocks of robots that are computed, written and found again each by itself.
+"""Regions of a large study: blocks of robots that are computed, written and found again.
 
-A region is one chunk of every variable of the dataset, so that no two of them ever write into one chunk.
+A region is one chunk of every variable, so that no two regions share a chunk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, prod
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from spirillum.envelope import as_json
+from spirillum.files import Stored, chunk_key, region_files
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.studies.cautions import cautions
+from spirillum.studies.dataset import coordinates_of, laid_out
 from spirillum.studies.observed import ObservedArrays, observed_at
 from spirillum.studies.study_loader import LoadedStudy
-from spirillum.studies.work import BLOCK, Indices
+from spirillum.studies.work import AT_RATES, BLOCK, WITH_INTERVALS, Indices, Part, one_thread_each, tasks
+from spirillum.swimming.steady_quantities import STEADY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SOLVED_BLOCK, _PLACED_BLOCK = 128, 64
 """Robots of a region for a model that solves for the flow: some ten seconds of work; and for one that solves for body
@@ -108,3 +116,124 @@ def cut(
         cautions=(),
     )
     return own, None if observed is None else observed_at(observed, layout.indices(region))
+
+
+_LAST = "outside"
+"""The variable whose chunk takes its place last: where it is, the region is."""
+
+
+class Plan(NamedTuple):
+    """What a store of a study holds."""
+
+    layout: Layout
+    variables: Mapping[str, Stored]
+    coordinates: Mapping[str, np.ndarray[Any, Any]]
+    """Values that stand in it whole."""
+    others: tuple[str, ...]
+    """Coordinates that are no dimension."""
+
+    @property
+    def regional(self) -> tuple[str, ...]:
+        """Variables that are written by regions, the last one last."""
+        return (*(name for name in self.variables if name not in (*self.coordinates, _LAST)), _LAST)
+
+    @property
+    def bytes_of_results(self) -> int:
+        """Size of all variables before compression."""
+        items = [item for item in self.variables.values() if item.dtype != "str"]
+        return int(sum(np.prod(item.shape, dtype=float) * np.dtype(item.dtype).itemsize for item in items))
+
+    def place(self, name: str, region: RobotBlock) -> list[tuple[int, int]]:
+        """Where a region of a variable lies: among the robots where it is, and whole along what comes behind them."""
+        own = list(zip(region.start, region.stop, strict=True))
+        return own + [(0, size) for size in self.variables[name].shape[len(own) :]]
+
+    def note(self, region: RobotBlock) -> str:
+        """Path within the store of what a region has to say, while the study runs."""
+        return f"notes/{region.number:07d}.json"
+
+    def pieces(self, region: RobotBlock) -> list[str]:
+        """Paths within the store of all files of a region, in the order in which they take their places."""
+        keys = [chunk_key(name, self.variables[name], self.place(name, region)) for name in self.regional]
+        return [*keys[:-1], self.note(region), keys[-1]]
+
+
+class RegionJob(NamedTuple):
+    """A region with all that it is computed from."""
+
+    region: RobotBlock
+    loaded: LoadedStudy
+    """The study of its robots."""
+    observed: ObservedArrays | None
+    plan: Plan
+    """Without values."""
+
+
+def plan_of(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout) -> Plan:
+    """What a store of a study holds: known before anything is computed."""
+    import xarray as xr
+
+    own, seen = cut(loaded, observed, layout, next(layout.regions()).of_one)
+    empty = _empty(loaded, observed)
+    template = laid_out(own, [(task, empty) for task in tasks(own)], observed=seen)
+    whole = xr.Dataset(coords=coordinates_of(loaded))
+    robots = len(layout.dimensions)
+    variables = {}
+    for name, array in whole.coords.items():
+        variables[str(name)] = Stored(tuple(map(str, array.dims)), array.shape, array.shape, _kind(array), array.attrs)
+    for name, array in template.data_vars.items():
+        shape = (*layout.shape, *array.shape[robots:])
+        chunk = (*layout.chunk, *array.shape[robots:])
+        variables[str(name)] = Stored(tuple(map(str, array.dims)), shape, chunk, _kind(array), array.attrs)
+    coordinates = {str(name): array.values for name, array in whole.coords.items()}
+    return Plan(layout, variables, coordinates, tuple(str(name) for name in whole.coords if name not in whole.dims))
+
+
+def _kind(array: xr.DataArray) -> str:
+    return "str" if array.dtype.kind in "OUS" else str(array.dtype)
+
+
+def _empty(loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
+    """An answer without values, with all the arrays that any robot of the study may have."""
+    models, rates = loaded.study.models, loaded.study.assumed_motor_rates
+    empty = np.full((1, len(loaded.study.friction)), np.nan)
+    part: Part = {item.name: empty for item in STEADY}
+    if any(not find_swimmer_model(name).closed_form for name in models):
+        part["error_estimate"] = empty
+    part["outside"] = np.zeros_like(empty)
+    if loaded.posterior is not None and loaded.posterior.model in models:
+        part |= {f"{name}_interval_{end}": empty for name in WITH_INTERVALS for end in ("low", "high")}
+    if observed is not None:
+        part |= {f"{name}_at_observed_rate": empty for name in AT_RATES}
+    if rates and any(robot.motor and robot.battery for robot in loaded.robots):
+        part |= {f"{name}_at_assumed_rate": np.repeat(empty[..., None], len(rates), axis=-1) for name in AT_RATES}
+    return part
+
+
+def region_jobs(
+    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, regions: Sequence[RobotBlock]
+) -> Iterator[RegionJob]:
+    """Regions with what they are computed from, made as they are taken."""
+    light = plan._replace(coordinates=dict.fromkeys(plan.coordinates, np.zeros(0)))
+    for region in regions:
+        yield RegionJob(region, *cut(loaded, observed, plan.layout, region), light)
+
+
+def encoded_region(job: RegionJob) -> dict[str, bytes]:
+    """Compute a region: its files by their paths within the store, in the order in which they take their places."""
+    region, loaded, observed, plan = job
+    with one_thread_each(*loaded.study.models):
+        answers = [(task, task.answer(loaded, observed)) for task in tasks(loaded)]
+    dataset = laid_out(loaded, answers, observed=observed)
+    places = {name: plan.place(name, region) for name in plan.regional}
+    values = {}
+    for name in plan.regional:
+        shape = tuple(stop - start for start, stop in places[name])
+        values[name] = np.broadcast_to(dataset[name].values, shape) if name in dataset else np.full(shape, np.nan)
+    files = region_files(plan.variables, values, places)
+    note = {
+        "cautions": [list(caution) for pair in answers for caution in cautions(*pair)],
+        "unanswered": int(np.count_nonzero(values[_LAST])),
+    }
+    files[plan.note(region)] = as_json(note).encode()
+    return {key: files[key] for key in plan.pieces(region)}

@@ -1,34 +1,43 @@
-"""Robots of a study laid down in their tubes and let go: what an experiment would see, with nothing fitted.
+"""Robots of a study released in their tubes: the runs of an experiment with nothing fitted, and steady states.
 
-Nobody reports how a robot was laid down. So each robot makes the runs of a design of experiments over what decides:
-gap and pitch at which it is laid down, time until its motor is switched on, height of the asperities, and coefficient
-of dry friction. Every run is one of `spirillum.simulate` with the model `tube`, read as a camera above the channel
-reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag by (15).
+Publications do not report the initial placement. For the experiment, each robot makes the runs of a design of
+experiments over what decides: gap and pitch at which it is laid down, time until its motor is switched on, height of
+the asperities, and coefficient of dry friction. Every run is one of `spirillum.simulate` with the model `tube`, read as
+a camera above the channel reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag
+by (15).
+
+For the steady state, each robot is released where the study's placement says, with its drive on, and followed as
+`spirillum.settle` does.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples, Values
+from spirillum.dynamics.free_motion import free_motion
 from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.simulation import simulate
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.factorial import Levels, half_fraction
-from spirillum.studies.spec import LaidDown
+from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.spec import Contact, LaidDown
 from spirillum.studies.study_loader import LoadedStudy
-from spirillum.studies.work import OneRobot, Part
+from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.steady import swim
+from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,7 +105,7 @@ class LaidDownTask(OneRobot):
 
     @property
     def words(self) -> str:
-        """What is computed, in a few words."""
+        """Progress message."""
         return f"laid down: {self.robot.with_tail}"
 
     @property
@@ -104,7 +113,7 @@ class LaidDownTask(OneRobot):
         """Names of the arrays of its answer."""
         return {*AT_RUNS, *INFERRED, "laid_pitch"}
 
-    def answer(self) -> Part:
+    def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
 
         NaN for a run that its robot cannot make, and over a window that it does not reach.
@@ -200,7 +209,7 @@ def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int
     """One task for each robot, numbered from `first`; none where none is asked for."""
     if loaded.study.predicted:
         for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield LaidDownTask(number, index, robot, loaded.study.laid_down)
+            yield LaidDownTask(number, np.array([index]), robot, loaded.study.laid_down)
 
 
 def without_answer(parts: Iterable[Part]) -> list[Note]:
@@ -215,3 +224,141 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
         "other ranges in [laid_down]"
     )
     return [Note("without-answer", words, ("laid_down",))]
+
+
+SETTLED = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "motor_current",
+    "shaft_power",
+    "hydrodynamic_efficiency",
+)
+"""Quantities of a steady motion."""
+PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
+"""Where a robot lies in it, and how fast it comes there."""
+STATES = ("not followed", "steady", "orbits", "goes around", "changing")
+"""What became of a robot; the index in this list is the value in the dataset."""
+
+
+@dataclass(frozen=True)
+class SettledTask(OneRobot):
+    """One robot that is let go."""
+
+    placement: Placement
+    """Where it is laid down."""
+    contact: Contact
+    """What it rests on."""
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
+        return f"let go: {self.robot.with_tail}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return {*SETTLED, *PLACE, "error_estimate", "near", "state"}
+
+    def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
+        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate", "near")}
+        try:
+            motion = free_motion(
+                self.robot,
+                placement=self.placement,
+                roughness=self.contact.roughness,
+                in_tube={"friction_coefficient": self.contact.friction_coefficient},
+            )
+        except InputError:
+            return {**nothing, "state": np.zeros(1)}
+        found = motion.prediction
+        lying = found.lying
+        assert lying is not None  # noqa: S101 - a free motion has one
+        state = np.array([float(STATES.index(lying.state))])
+        if lying.state == "changing":  # its means depend on when they are taken
+            return {**nothing, "state": state}
+        values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
+        values |= {name: float(getattr(lying, name)) for name in PLACE}
+        values |= {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
+        return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
+
+
+def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[SettledTask]:
+    """One task for each robot, numbered from `first`; none where none is asked for."""
+    if loaded.study.settled:
+        tails = loaded.count // len(loaded.robots)
+        for number, (index, robot) in enumerate(robots.items(), start=first):
+            yield SettledTask(
+                number, np.array([index]), robot, loaded.placement_of(index // tails), loaded.study.contact
+            )
+
+
+def settled_basis(contact: Contact) -> Note:
+    """What settled speeds are, and rest on."""
+    height = "1e-4 of its radius" if contact.roughness is None else show(contact.roughness, "um")
+    words = (
+        f"settled speeds assume asperities of {height} and a friction coefficient of {contact.friction_coefficient:g}; "
+        "a trial of some turns does not reach them"
+    )
+    return Note("settled-basis", words, ("contact",))
+
+
+def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
+    """Notes on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
+    lost = [task for task, part in answers if not np.isfinite(part["forward_velocity"][0])]
+    far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
+    near = [task for task, part in answers if part["near"][0] == 1.0 and task not in far]
+    found = []
+    if far:
+        words = (
+            f"{len(far)} of {len(answers)} robots yaw further than their tables were checked for: settled speeds "
+            "have no "
+            f"error estimate; the first: {far[0].robot.with_tail}"
+        )
+        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
+    if near:
+        words = (
+            f"{len(near)} of {len(answers)} robots come nearer to the wall than their tables were checked for: error "
+            f"estimates are of wider gaps; the first: {near[0].robot.with_tail}"
+        )
+        found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
+    if lost:
+        words = (
+            f"{len(lost)} of {len(answers)} robots have no steady motion that could be found, the first: "
+            f"{lost[0].robot.with_tail}; `spirillum settle` says why"
+        )
+        found.append(Note("without-answer", words, ("settled_forward_velocity",)))
+    return found
+
+
+def settled_variables(
+    answers: Sequence[tuple[SettledTask, Part]], robots: Sequence[str], shape: Sequence[int]
+) -> dict[str, Any]:
+    """The steady motions as variables of a dataset.
+
+    Returns:
+        `<quantity>_settled` over the robots, NaN for those without a steady motion, and `settled`, what became of them.
+    """
+    found: dict[str, Any] = {}
+    for name in (*SETTLED, *PLACE):
+        about = attributes(
+            name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
+        )
+        found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
+    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(STATES) - 1).astype("int8")
+    about = {
+        "units": "1",
+        "long_name": "what became of a robot that was let go",
+        "source": "free motion in the tube",
+        "flag_values": np.arange(len(STATES), dtype="int8"),
+        "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
+    }
+    about_error = attributes(
+        "error_estimate",
+        meaning="relative error of the speed in steady motion; NaN beyond the yaws that the table was checked for",
+        source="table of the tube",
+    )
+    error = (tuple(robots), gathered(answers, "error_estimate", shape), about_error)
+    return {**found, "error_estimate_settled": error, "settled": (tuple(robots), state, about)}

@@ -7,11 +7,11 @@ import json
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from spirillum.files import opened, whole_file
+from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
@@ -23,12 +23,10 @@ from spirillum.robot.robot import Robot
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.cautions import cautions, summed
 from spirillum.studies.dataset import assembled
-from spirillum.studies.jobs import AnyTask, answered, job_of
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.released_robots import laid_down_tasks, without_answer
-from spirillum.studies.settled import not_settled, settled_basis, settled_tasks
+from spirillum.studies.released_robots import laid_down_tasks, not_settled, settled_basis, settled_tasks, without_answer
 from spirillum.studies.study_loader import LoadedStudy
-from spirillum.studies.work import ModelTask, OneRobot, Part, tasks
+from spirillum.studies.work import ModelTask, Part, StudyTask, run_job, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
@@ -42,27 +40,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class Keepable(Protocol):
-    """A task as far as keeping its answer goes."""
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
-
-    @property
-    def size(self) -> int:
-        """Number of robots."""
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays that every answer has."""
-
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-
-
-def kept(task: Keepable, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
+def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
     """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task.
 
     Args:
@@ -93,10 +71,10 @@ def _as_kept(item: zipfile.ZipInfo) -> bool:
     return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
 
 
-def keep(task: Keepable, part: Part, folder: Path | None) -> None:
+def keep(task: StudyTask, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
-        with whole_file(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
+        with atomic_write(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
             np.savez(stream, **cast("dict[str, Any]", part))
 
 
@@ -134,19 +112,20 @@ def computed_study(
     with_table = _with_table(loaded) if followed else {}
     runs = list(laid_down_tasks(loaded, with_table, len(todo)))
     let_go = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
-    asked: list[AnyTask] = [*todo, *runs, *let_go]
-    found = {task.number: kept(task, parts, _leading(task, loaded)) for task in asked}
+    asked: list[StudyTask] = [*todo, *runs, *let_go]
+    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in asked}
     missing = [task for task in asked if found[task.number] is None]
     done = len(asked) - len(missing)
     if missing:
         tell(missing[0].words, done, len(asked))
-    jobs = (job_of(task, loaded, observed) for task in missing)
+    jobs = (task.job(loaded, observed) for task in missing)
     at_work = _worth(missing, crew or WorkerPool())
-    for (number, _), part in map_tasks(answered, jobs, at_work, besides=_KEPT if parts else ""):
-        found[number] = part
-        keep(asked[number], part, parts)
+    for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
+        task = asked[job.task.number]
+        found[task.number] = part
+        keep(task, part, parts)
         done += 1
-        tell(asked[number].words, done, len(asked))
+        tell(task.words, done, len(asked))
     tell("dataset", len(asked), len(asked))
     parts_of = {number: part for number, part in found.items() if part is not None}
     answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
@@ -170,12 +149,7 @@ _SHORT = 600_000
 """Robots in closed form below which other processes would start longer than they work."""
 
 
-def _leading(task: AnyTask, loaded: LoadedStudy) -> tuple[int, ...]:
-    """Sizes of the first axes of a task's arrays."""
-    return (1,) if isinstance(task, OneRobot) else (task.size, len(loaded.study.friction))
-
-
-def _worth(missing: Sequence[AnyTask], crew: WorkerPool) -> WorkerPool:
+def _worth(missing: Sequence[StudyTask], crew: WorkerPool) -> WorkerPool:
     """Who computes: this process where the others would start longer than they work."""
     quick = all(isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form for task in missing)
     short = quick and sum(task.size for task in missing) < _SHORT

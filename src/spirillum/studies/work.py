@@ -1,10 +1,12 @@
-"""The work of a study: blocks of robots, one model at a time."""
+"""The tasks of a study: blocks of robots, each answered by itself, in this process or another one."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +15,11 @@ from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
+from spirillum.kernels.compiled import rows_in_one_thread
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.observed import ObservedArrays, observed_at
 from spirillum.studies.study_loader import LoadedStudy
 from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
@@ -87,28 +90,100 @@ Part = dict[str, Values]
 
 
 @dataclass(frozen=True)
-class ModelTask:
-    """One model for one block of robots of the same kind."""
+class StudyTask(ABC):
+    """A block of robots of a study and how it is answered, as a value that other processes can take."""
 
     number: int
-    model: str
     indices: Indices
     """Indices of the robots in the flat order of the study."""
-    batch: RobotBatch
 
     @property
     def size(self) -> int:
         """Number of robots."""
-        return self.batch.size
+        return int(self.indices.size)
 
     @property
     def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
+        """Name of the file that holds its finished answer."""
         return f"part-{self.number:05d}.npz"
 
     @property
+    def models(self) -> tuple[str, ...]:
+        """Models whose linear algebra is limited to one thread."""
+        return ()
+
+    @property
+    @abstractmethod
     def words(self) -> str:
-        """What is computed, in a few words."""
+        """Progress message."""
+
+    @property
+    @abstractmethod
+    def needed(self) -> set[str]:
+        """Names of the arrays that every answer has."""
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+        return self.needed
+
+    def leading(self, _readings: int) -> tuple[int, ...]:
+        """Return the sizes of the first axes of all arrays, for a number of friction readings."""
+        return (self.size,)
+
+    def job(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> StudyJob:
+        """Return the task with the inputs that its answer needs, and no more."""
+        study = loaded.study.model_copy(update={"grid": None, "robots": None})
+        small = replace(loaded, study=study, robots=(), placements=(), question={}, cautions=())
+        return StudyJob(self, small, None)
+
+    @abstractmethod
+    def answer(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> Part:
+        """Compute the arrays of the answer, the robots along their first axis."""
+
+
+class StudyJob(NamedTuple):
+    """A task with its inputs, as it is sent to other processes; its robots are numbered from 0."""
+
+    task: StudyTask
+    loaded: LoadedStudy
+    """The study without robots, or with those of the task where their posterior draws are requested."""
+    observed: ObservedArrays | None
+
+
+def run_job(job: StudyJob) -> Part:
+    """Return the answer of a job, computed in one thread."""
+    with one_thread_each(*job.task.models):
+        return job.task.answer(job.loaded, job.observed)
+
+
+@contextmanager
+def one_thread_each(*models: str) -> Iterator[None]:
+    """Limit this process to one thread while the block runs: the other processes use the other cores."""
+    if all(find_swimmer_model(name).closed_form for name in models):
+        yield
+        return
+    from spirillum.fluid.wire.interaction import one_thread
+
+    with rows_in_one_thread(), one_thread():
+        yield
+
+
+@dataclass(frozen=True)
+class ModelTask(StudyTask):
+    """One model for one block of robots of the same kind."""
+
+    model: str
+    batch: RobotBatch
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Models whose linear algebra is limited to one thread."""
+        return (self.model,)
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
         return f"{self.model}, {self.size} robots"
 
     @property
@@ -122,49 +197,53 @@ class ModelTask:
         endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
         return {"outside", "error_estimate", *(item.name + at for item in STEADY for at in endings)}
 
+    def leading(self, readings: int) -> tuple[int, ...]:
+        """Return the sizes of the first axes of all arrays: robots, friction readings."""
+        return self.size, readings
+
+    def job(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> StudyJob:
+        """Return the task with its observations, and its robots where their posterior draws are requested."""
+        small = super().job(loaded, observed).loaded
+        if loaded.posterior is not None:
+            small = replace(small, robots=tuple(loaded.robot_at(index) for index in self.indices.tolist()))
+        seen = None if observed is None else observed_at(observed, self.indices)
+        return StudyJob(replace(self, indices=np.arange(self.size, dtype=np.intp)), small, seen)
+
+    def answer(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> Part:
+        """Compute steady swimming, (robots, friction readings), and the flag `outside` of robots without an answer."""
+        study = loaded.study
+        readings = study.friction
+        quick = quick_parts(self.batch, self.model)
+        free = [_swum(quick, reading) for reading in readings]
+        part: Part = {item.name: _stacked(free, item.name) for item in STEADY}
+        errors = [_speed_errors(quick, reading, found) for reading, found in zip(readings, free, strict=True)]
+        if not np.isnan(errors).all():
+            part["error_estimate"] = np.stack(errors, axis=-1)
+        valid = np.stack([result.valid for result in free], axis=-1)
+        reason = _reasons(self.batch, self.model)[:, None]
+        reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
+        part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
+        if loaded.posterior is not None and self.model == loaded.posterior.model:
+            part |= _intervals(self, loaded, loaded.posterior)
+        if observed is not None:
+            tail, motor = observed.tail_rate[self.indices], observed.motor_rate[self.indices]
+            found = [_swum(quick, r, tail, motor) for r in readings]
+            part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
+        if study.assumed_motor_rates and self.batch.electrics is not None:
+            part |= _at_assumed_rates(self, quick, study.assumed_motor_rates, readings)
+        return part
+
 
 @dataclass(frozen=True)
-class OneRobot(ABC):
+class OneRobot(StudyTask):
     """One robot that is followed in its tube, as a task of its own."""
 
-    number: int
-    index: int
-    """Of the robot in the flat order of the study."""
     robot: Robot
 
     @property
-    def size(self) -> int:
-        """Number of robots."""
-        return 1
-
-    @property
-    def indices(self) -> Indices:
+    def index(self) -> int:
         """Index of the robot in the flat order of the study."""
-        return np.array([self.index], dtype=np.intp)
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
-        return f"part-{self.number:05d}.npz"
-
-    @property
-    @abstractmethod
-    def words(self) -> str:
-        """What is computed, in a few words."""
-
-    @property
-    @abstractmethod
-    def needed(self) -> set[str]:
-        """Names of the arrays of its answer."""
-
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-        return self.needed
-
-    @abstractmethod
-    def answer(self) -> Part:
-        """Its answer, with one robot along the first axis of every array."""
+        return int(self.indices[0])
 
 
 def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
@@ -182,7 +261,7 @@ def tasks(loaded: LoadedStudy) -> Iterator[ModelTask]:
     for indices, batch in groups(loaded):
         for model in loaded.study.models:
             for cut, block in batch.blocks(_block_size(find_swimmer_model(model))):
-                yield ModelTask(number, model, indices[cut], block)
+                yield ModelTask(number, indices[cut], model, block)
                 number += 1
 
 
@@ -220,31 +299,6 @@ def _friction_at(loaded: LoadedStudy, index: int) -> float:
     robot = loaded.robot_at(index)
     own = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction)).friction.effective
     return float("nan") if own is None else own
-
-
-def answer(task: ModelTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
-    """Compute one task."""
-    study = loaded.study
-    readings = study.friction
-    quick = quick_parts(task.batch, task.model)
-    free = [_swum(quick, reading) for reading in readings]
-    part: Part = {item.name: _stacked(free, item.name) for item in STEADY}
-    errors = [_speed_errors(quick, reading, found) for reading, found in zip(readings, free, strict=True)]
-    if not np.isnan(errors).all():
-        part["error_estimate"] = np.stack(errors, axis=-1)
-    valid = np.stack([result.valid for result in free], axis=-1)
-    reason = _reasons(task.batch, task.model)[:, None]
-    reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
-    part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
-    if loaded.posterior is not None and task.model == loaded.posterior.model:
-        part |= _intervals(task, loaded, loaded.posterior)
-    if observed is not None:
-        tail, motor = observed.tail_rate[task.indices], observed.motor_rate[task.indices]
-        found = [_swum(quick, r, tail, motor) for r in readings]
-        part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
-    if study.assumed_motor_rates and task.batch.electrics is not None:
-        part |= _at_assumed_rates(task, quick, study.assumed_motor_rates, readings)
-    return part
 
 
 def quick_parts(batch: RobotBatch, name: str) -> QuickParts:

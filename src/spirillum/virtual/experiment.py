@@ -21,14 +21,14 @@ from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
     file_name,
-    is_own,
+    guard_inputs,
     opened,
     output_folder,
-    protected,
     read_json,
     results_folder,
     text_cell,
     write_text,
+    written_by_us,
 )
 from spirillum.notes import Note
 from spirillum.robot.arguments import in_range, whole
@@ -194,7 +194,7 @@ def virtual_experiment(
     ]
     claim = {"mark": _MARK, "content": mark, "what": "virtual experiment"}
     inputs = study if isinstance(study, (str, Path)) else None
-    with protected(inputs), results_folder(output, claim=claim) as folder:
+    with guard_inputs(inputs), results_folder(output, claim=claim) as folder:
         missing = [item for item in planned if not _finished(folder, item)]
         for name in robots:
             output_folder(folder / name, folder)
@@ -349,7 +349,7 @@ def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> 
                 raise _Stopped
 
         for damaged in _files_of(folder, planned):
-            if damaged.is_file() and not is_own(damaged):  # the folder is claimed: it was ours
+            if damaged.is_file() and not written_by_us(damaged):  # the folder is claimed: it was ours
                 damaged.unlink()
         render(
             planned.robot,

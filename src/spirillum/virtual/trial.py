@@ -18,13 +18,13 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import (
     MARK,
+    atomic_folder,
+    atomic_write,
+    atomic_write_all,
     check_replaceable,
+    guard_inputs,
     holds_own_only,
     output_target,
-    protected,
-    whole_file,
-    whole_files,
-    whole_folder,
     write_dataset,
 )
 from spirillum.formats.h264 import h264_writer
@@ -91,7 +91,7 @@ def video_writer(
             yield pngs
         return
     with (
-        whole_file(target) as temporary,
+        atomic_write(target) as temporary,
         h264_writer(
             temporary,
             size,
@@ -126,7 +126,7 @@ class _Pngs:
 
 @contextmanager
 def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
-    with whole_folder(folder) as part:
+    with atomic_folder(folder) as part:
         yield _Pngs(part, tags)
 
 
@@ -234,7 +234,7 @@ def render(
         InputError: for wrong input, or a target that cannot be written.
     """
     inputs = [item for item in (robot, run) if isinstance(item, (str, Path))]
-    with protected(*inputs):
+    with guard_inputs(*inputs):
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
@@ -297,8 +297,8 @@ def render(
     tell = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
-        protected(*inputs),
-        whole_files([*beside, names["nc"]]) as parts,  # all of them appear together, or none
+        guard_inputs(*inputs),
+        atomic_write_all([*beside, names["nc"]]) as parts,  # all of them appear together, or none
         video_writer(target, camera.size, camera.fps, degradation.crf, tags) as writer,
     ):
         for place, text in beside.items():

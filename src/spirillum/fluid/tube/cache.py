@@ -22,7 +22,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, clipped
-from spirillum.files import read_bytes, whole_file
+from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.solids import MOTIONS
 
 _PACKAGE = Path(__file__).parents[2]
@@ -76,7 +76,7 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         found = compute(question)
         content = np.ascontiguousarray(found, dtype="<f8").tobytes()
         try:
-            with whole_file(path, replace="any", sync=False) as temporary:
+            with atomic_write(path, replace="any", sync=False) as temporary:
                 temporary.write_bytes(sealed(content))
         except (InputError, OSError):  # a full or read-only disk costs time only
             pass

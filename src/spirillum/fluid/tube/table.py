@@ -24,7 +24,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import read_bytes, whole_file
+from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.nodes import CHECKED_FROM
 from spirillum.fluid.tube.stages import STAGES, StageName
@@ -229,7 +229,7 @@ class TubeTable:
             "wire": self.wire,
             "stage": self.stage,
         }
-        with whole_file(path, replace="any") as temporary:
+        with atomic_write(path, replace="any") as temporary:
             temporary.write_bytes(to_bytes(json.dumps(head).encode(), self.packed))
 
     @classmethod

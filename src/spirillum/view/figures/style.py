@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
 from spirillum.arrays import Values
-from spirillum.files import MARK, whole_file
+from spirillum.files import MARK, atomic_write
 from spirillum.units import for_people, shown_in
 
 COLOURS = {
@@ -230,5 +230,5 @@ def save_as(figure: Figure, path: Path) -> None:
     kind = path.suffix.removeprefix(".")
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
         figure.set_layout_engine(None)  # else everything is laid out once more before it is drawn
-    with styled(), whole_file(path) as temporary:
+    with styled(), atomic_write(path) as temporary:
         figure.savefig(temporary, format=kind, dpi=DPI, metadata=_NO_DATE[kind])

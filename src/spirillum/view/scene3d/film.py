@@ -16,7 +16,7 @@ from spirillum.dynamics.poses import Poses, RobotPose, poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.files import MARK, output_target, whole_file
+from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.run_panels import silhouette
@@ -194,7 +194,7 @@ def film(
         inset = CrossSection(pixels, robot, poses)
     shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset), inset=inset)
     tell = progress or (lambda _what, _done, _total: None)
-    with whole_file(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
+    with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
             for number, image in enumerate(images):
                 tell("film", number, times.size)

@@ -15,7 +15,7 @@ from spirillum.display import DisplayMixin
 from spirillum.dynamics.poses import RobotPose
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
-from spirillum.files import MARK, output_target, whole_file
+from spirillum.files import MARK, atomic_write, output_target
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
@@ -210,5 +210,5 @@ def _write_png(image: np.ndarray, path: Path, robot: Robot, view: View) -> None:
     facts.add_itxt("Title", robot.name)
     facts.add_text("Software", MARK)
     facts.add_itxt("Description", _words(robot, view))
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         Image.fromarray(image).save(temporary, format="png", optimize=True, pnginfo=facts)
