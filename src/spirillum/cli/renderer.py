@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -55,6 +56,30 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     """An answer with the files that a command has written for it; its warnings stay last."""
     content = {name: item for name, item in answer.items() if name != "warnings"}
     return {**content, **files, "warnings": answer["warnings"]}
+
+
+def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str | None]:
+    """A function that draws an answer into a file, which is checked now; it returns the file's name, or None.
+
+    Args:
+        path: of the picture; None without one.
+        example: of a file's name, for the sentence of an error.
+        figure: function that makes the figure of an answer, `module:name`.
+    """
+    from spirillum.files import PICTURES, output_target
+
+    target = None if path is None else output_target(path, PICTURES, example)
+
+    def draw(answer: Any) -> str | None:
+        if target is None:
+            return None
+        from spirillum.view.figures.style import save_as
+
+        module, _, name = figure.partition(":")
+        save_as(getattr(import_module(module), name)(answer), target)
+        return str(path)
+
+    return draw
 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:
