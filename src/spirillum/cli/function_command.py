@@ -260,10 +260,16 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
         about["help"] = f"{str(about['help']).rstrip('.')}; repeatable."
     if default is None:
         kind |= None
+    elif isinstance(default, tuple):
+        default = _shown(default)
     if "." in item.path and metavar is None and item.default not in (None, ()):
-        shown = item.default
-        about["show_default"] = "x".join(map(str, shown)) if isinstance(shown, tuple) else str(shown)
+        about["show_default"] = _shown(item.default)
     return Annotated[kind, typer.Option(option, metavar=METAVARS.get(item.path, metavar), **about)], default
+
+
+def _shown(value: Any) -> str:
+    """A default as it is typed."""
+    return "x".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _switch(item: Declaration, option: str, about: dict[str, Any]) -> tuple[Any, Any]:

@@ -135,6 +135,7 @@ PANELS = {
 """Panels of the help by argument, or by table (with a point)."""
 METAVARS = {
     "camera.size": "WIDTHxHEIGHT",
+    "size": "WIDTHxHEIGHT",
     "judged.statistic": "mean|quantile",
     "maximise": "QUANTITY",
     "minimise": "QUANTITY",
@@ -164,23 +165,6 @@ def optional_robot(text: str) -> Any:
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
-Model = Annotated[
-    str,
-    typer.Option(
-        autocompletion=complete_auto_models,
-        help="Hydrodynamic model: sbt, rft, slender, tube; or auto: that of the posterior or calibration, else tube in "
-        "a channel and slender without.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
-Friction = Annotated[
-    str | None,
-    typer.Option(
-        autocompletion=_complete_friction,
-        help=_FRICTION,
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
 Calibration = Annotated[
     Path | None,
     typer.Option(
@@ -207,10 +191,6 @@ Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Fi
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
 ]
-TailRate = Annotated[
-    str | None,
-    typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
-]
 Gap = Annotated[
     str | None,
     typer.Option(
@@ -234,43 +214,11 @@ Pitch = Annotated[
         rich_help_panel=PLACE_PANEL,
     ),
 ]
-Yaw = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ANGLE",
-        help="Model tube: angle by which the nose is turned to +y, such as 2deg.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-TailDrop = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help="Model tube: distance by which the tail's axis is lowered (a surrogate).",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
 Ends = Annotated[
     str | None,
     typer.Option(
         autocompletion=_complete_ends,
         help="Model tube: open or closed ends of the channel; else open if it has a length.",
         rich_help_panel=PLACE_PANEL,
-    ),
-]
-ImposedFlow = Annotated[
-    str | None,
-    typer.Option(
-        "--flow",
-        metavar="VELOCITY",
-        help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-Tolerance = Annotated[
-    float | None,
-    typer.Option(
-        help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's.",
-        rich_help_panel=MODEL_PANEL,
     ),
 ]
