@@ -177,7 +177,7 @@ class FunctionCommand(TyperCommand):
         return typer.main.get_command(maker)
 
     @property
-    def callback(self) -> Any:  # type: ignore[override]
+    def callback(self) -> Any:
         """What the command does."""
         return self._made.callback
 
@@ -186,7 +186,7 @@ class FunctionCommand(TyperCommand):
         self._stub = stub
 
     @property
-    def params(self) -> Any:  # type: ignore[override]
+    def params(self) -> Any:
         """Arguments and options."""
         return self._made.params
 
@@ -244,7 +244,7 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
     metavar = next((_BY_FIELD_TYPE[word] for word in words if word in _BY_FIELD_TYPE), None)
     if metavar is None and {"str", "float"} <= words and unit is not None:
         metavar = _BY_UNIT[unit[1]]
-    about = {"help": _help(item, metavar), "rich_help_panel": PANELS.get(item.table or item.path)}
+    about: dict[str, Any] = {"help": _help(item, metavar), "rich_help_panel": PANELS.get(item.table or item.path)}
     about |= {"autocompletion": completions.get(last)}
     if "bool" in words:
         return _switch(item, option, about)
