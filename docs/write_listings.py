@@ -303,7 +303,8 @@ def _parameter(parameter: Any) -> tuple[str, str, str] | None:
     names = ", ".join(f"`{name}`" for name in parameter.opts) if option else f"`{parameter.name.upper()}`"
     if option and not parameter.is_flag and parameter.metavar:
         names += f" `{parameter.metavar}`"
-    value = parameter.default
+    stated = getattr(parameter, "show_default", None)  # of options whose default stands in a table
+    value = stated if isinstance(stated, str) else parameter.default
     shown = "required" if parameter.required else "–" if value in (None, False) else f"`{value}`"
     return names, shown, parameter.help or ""
 

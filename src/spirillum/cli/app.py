@@ -15,7 +15,8 @@ from spirillum.cli.control_commands import control
 from spirillum.cli.design_commands import design
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
-from spirillum.cli.inputs import angle, given_options, loaded_robot, overrides_from, placement_from
+from spirillum.cli.function_command import FunctionCommand, Request, from_function
+from spirillum.cli.inputs import check_request, overrides_from
 from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
@@ -26,33 +27,16 @@ from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
 from spirillum.cli.setup_commands import setup_app
 from spirillum.cli.shared_options import (
-    Accuracy,
+    NO_FORM,
+    NO_START,
     All,
     Calibration,
-    Eccentricity,
-    Ends,
-    Friction,
-    Gap,
-    ImposedFlow,
     Json,
-    Model,
-    Motion,
-    NoCalibration,
-    Phases,
     Picture,
-    Pitch,
     Posterior,
-    PosteriorFor,
-    RobotArgument,
     Settings,
-    TailDrop,
-    TailRate,
-    Tolerance,
-    Yaw,
     add_notes_option,
     complete_auto_models,
-    complete_models,
-    complete_parts,
     complete_resistance_models,
     complete_schemas,
 )
@@ -105,105 +89,29 @@ def _root(
     """
 
 
-def predict(
-    robot: RobotArgument,
-    model: Model = "auto",
-    tail_rate: TailRate = None,
-    friction: Friction = None,
-    no_calibration: NoCalibration = False,
-    calibration: Calibration = None,
-    posterior: Posterior = None,
-    posterior_for: PosteriorFor = "new",
-    accuracy: Accuracy = None,
-    gap: Gap = None,
-    eccentricity: Eccentricity = None,
-    pitch: Pitch = None,
-    yaw: Yaw = None,
-    tail_drop: TailDrop = None,
-    ends: Ends = None,
-    flow: ImposedFlow = None,
-    tolerance: Tolerance = None,
-    phases: Phases = None,
-    band: Annotated[
-        bool | None,
-        typer.Option(
-            "--band/--no-band",
-            help="Model tube: the band over gap and pitch where they are not given, or the reference place alone; else "
-            "with it where the robot has a table (see `prepare`), without which it takes minutes.",
-            show_default=False,
-        ),
-    ] = None,
-    motion: Motion = "held",
-    roughness: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Model tube, free: height of the asperities, else 1e-4 of the body's radius."
-        ),
-    ] = None,
-    friction_coefficient: Annotated[
-        float | None,
-        typer.Option(help="Model tube, free: coefficient of dry friction where asperities touch; else 0.1."),
-    ] = None,
-    beyond_stokes: Annotated[
-        bool,
-        typer.Option("--beyond-stokes", help="Answer at Reynolds numbers above 10 too, where these models are wrong."),
-    ] = False,
-    all_of_it: All = False,
-    settings: Settings = None,
-    json: Json = False,
-) -> None:
+@from_function(
+    "spirillum.dynamics.prediction:predict",
+    without={**NO_FORM, **NO_START, "in_tube.azimuth": "of the start of a run: settle and simulate"},
+)
+def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> None:
     """Predict the steady swimming of one robot.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
     from spirillum.cli import renderer
-    from spirillum.dynamics.prediction import predict as answer
 
     with renderer.progress_bar(quiet=json) as progress:
-        result = answer(
-            loaded_robot(robot, settings, calibration, posterior),
-            model=model,
-            tail_rate=tail_rate,
-            friction=friction,
-            calibrated=not no_calibration,
-            calibration=calibration,
-            posterior=posterior,
-            posterior_for=posterior_for,
-            resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
-            band=band,
-            motion=motion,
-            roughness=roughness,
-            in_tube={"friction_coefficient": friction_coefficient},
-            beyond_stokes=beyond_stokes,
-            progress=progress,
-        )
+        result = request(progress=progress)
     renderer.show(result.to_dict(), json=json, all_of_it=all_of_it)
 
 
+@from_function("spirillum.swimming.comparison:compare_models", without=NO_FORM)
 def compare_models(
-    robot: RobotArgument,
+    request: Request,
+    *,
     output: Picture = None,
-    model: Annotated[
-        list[str] | None,
-        typer.Option(autocompletion=complete_models, help="A model to compare; repeatable. Without it, all of them."),
-    ] = None,
-    tail_rate: TailRate = None,
-    friction: Friction = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
-    calibration: Calibration = None,
-    accuracy: Accuracy = None,
-    gap: Gap = None,
-    eccentricity: Eccentricity = None,
-    pitch: Pitch = None,
-    yaw: Yaw = None,
-    tail_drop: TailDrop = None,
-    ends: Ends = None,
-    flow: ImposedFlow = None,
-    tolerance: Tolerance = None,
-    phases: Phases = None,
     all_of_it: All = False,
-    settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Predict one robot's swimming with every model, side by side.
@@ -211,78 +119,28 @@ def compare_models(
     Example: `spirillum compare-models biorob2012-wide --tail-rate 1.2Hz`
     """
     from spirillum.cli import renderer
-    from spirillum.files import PICTURES, output_target
-    from spirillum.swimming.comparison import compare_models as answer
 
-    target = None if output is None else output_target(output, PICTURES, "models.png")
-    loaded = loaded_robot(robot, settings, calibration)
+    draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
     with renderer.progress_bar(quiet=json) as progress:
-        result = answer(
-            loaded,
-            models=model,
-            tail_rate=tail_rate,
-            friction=friction,
-            calibrated=calibrated or None,
-            calibration=calibration,
-            resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
-            progress=progress,
-        )
-    if target is not None:
-        from spirillum.view.figures.comparison import comparison_figure
-        from spirillum.view.figures.style import save_as
-
-        save_as(comparison_figure(result), target)
-    file = None if output is None else str(output)
-    renderer.show(renderer.with_files(result.to_dict(), file=file), json=json, all_of_it=all_of_it)
+        result = request(calibrated=calibrated or None, progress=progress)
+    renderer.show(renderer.with_files(result.to_dict(), file=draw(result)), json=json, all_of_it=all_of_it)
 
 
-def resistance(
-    robot: RobotArgument,
-    part: Annotated[
-        str | None,
-        typer.Option(
-            autocompletion=complete_parts,
-            help="body, coupling, tail, rotor or robot (joint locked): 6x6; both (body and rotor): 12x12.",
-        ),
-    ] = None,
-    model: Annotated[
-        str,
-        typer.Option(
-            autocompletion=complete_resistance_models, help="perrin (body only), rft, slender, tube or sbt (axial)."
-        ),
-    ] = "rft",
-    about: Annotated[str, typer.Option(help="Reference point: body (its mid-length) or tail-root.")] = "body",
-    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
-    accuracy: Accuracy = None,
-    gap: Gap = None,
-    eccentricity: Eccentricity = None,
-    pitch: Pitch = None,
-    yaw: Yaw = None,
-    tail_drop: TailDrop = None,
-    ends: Ends = None,
-    flow: ImposedFlow = None,
-    tolerance: Tolerance = None,
-    settings: Settings = None,
-    json: Json = False,
-) -> None:
+@from_function(
+    "spirillum.fluid.resistance:resistance",
+    without={**NO_FORM, "resolution.phases": "the matrix is that of one phase"},
+    complete={"model": complete_resistance_models},
+)
+def resistance(request: Request, *, json: Json = False) -> None:
     """Give the resistance matrix of a robot, of one of its parts or of its two links, never calibrated.
 
     Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
     """
     from spirillum.cli import renderer
-    from spirillum.fluid.resistance import resistance as answer
 
-    with renderer.patience(model, quiet=json, tilted=yaw is not None):
-        result = answer(
-            loaded_robot(robot, settings),
-            part=part,
-            model=model,
-            about=about,
-            phase=angle(phase),
-            resolution={"accuracy": accuracy, "tolerance": tolerance},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
-        )
+    tilted = "placement.yaw" in request.typed
+    with renderer.patience(request.typed.get("model", "rft"), quiet=json, tilted=tilted):
+        result = request()
     renderer.show(result.to_dict(), json=json)
 
 
@@ -345,10 +203,9 @@ def study(
     Example: `spirillum study -o my-study`
     """
     from spirillum.cli import renderer
-    from spirillum.errors import InputError
 
-    if store is not None and given_options(context, "rows"):
-        raise InputError(f"--rows {rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)")
+    if store is not None:
+        check_request(context, "store", rows=rows)
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer
         from spirillum.results.study import study_answer
@@ -418,7 +275,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
 
 for _task, _commands in _TASKS.items():
     for _command in _commands:
-        app.command(rich_help_panel=_task)(_command)
+        app.command(cls=FunctionCommand if hasattr(_command, "source") else None, rich_help_panel=_task)(_command)
 app.add_typer(robot_app, name="robot", rich_help_panel="Files")
 app.add_typer(setup_app, name="setup", rich_help_panel="Files")
 app.add_typer(observations_app, name="observations", rich_help_panel="Files")

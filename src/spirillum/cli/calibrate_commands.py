@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from spirillum.calibration.methods import METHODS
-from spirillum.cli.inputs import given_options, loaded_robot, overrides_from
+from spirillum.cli.inputs import check_request, loaded_robot, overrides_from
 from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
@@ -102,11 +102,8 @@ def calibrate(
 
     robots = [loaded_robot(name, settings) for name in robot]
     check_not_set(set_fields(overrides_from(settings)), free, model)
-    sampler = given_options(context, "seed", "doublings")
-    if method in METHODS and method != "posterior" and sampler:
-        raise InputError(
-            f"{sampler[0]} with method '{method}', which samples no posterior; allowed: with method posterior"
-        )
+    if method in METHODS and method != "posterior":
+        check_request(context, "no posterior", method=method)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,

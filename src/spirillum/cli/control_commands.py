@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.motion_commands import check_movie
 from spirillum.cli.shared_options import Eccentricity, Ends, Gap, Json, Pitch, RobotArgument, Settings, starting
 
@@ -176,7 +176,8 @@ def control(
     if movie is not None:
         check_movie(movie)
     fields = {"at": at, "tolerance": tolerance, "speed": speed, "law": law, "rate": rate, "duration": duration}
-    place = placement_from(gap, eccentricity, pitch, None, ends, None)
+    asked = {"gap": gap, "eccentricity": eccentricity, "pitch": pitch, "ends": ends}
+    place = {name: value for name, value in asked.items() if value is not None}
     with guard_inputs(lab), renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded_robot(robot, settings),

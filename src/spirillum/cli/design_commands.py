@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, pairs_of
-from spirillum.cli.shared_options import Json, Posterior, RobotArgument, Settings, TailRate
+from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.inputs import pairs_of
+from spirillum.cli.shared_options import Json
 
 _Pairs = Annotated[
     list[str],
@@ -19,8 +20,10 @@ _Pairs = Annotated[
 ]
 
 
+@from_function("spirillum.designs.design:design")
 def design(
-    robot: RobotArgument,
+    request: Request,
+    *,
     vary: _Pairs,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Robot file of the best design (.toml).")
@@ -32,23 +35,10 @@ def design(
         Path | None,
         typer.Option(metavar="FILE", help="The best design as one closed body for a printer (.stl, in mm)."),
     ] = None,
-    maximise: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="QUANTITY",
-            help="Quantity to make large, such as forward_velocity, or a condition to make likely; two: a front.",
-        ),
-    ] = None,
-    minimise: Annotated[list[str] | None, typer.Option(metavar="QUANTITY", help="Quantity to make small.")] = None,
-    subject_to: Annotated[
-        list[str] | None,
-        typer.Option(metavar="CONDITION", help="Condition, such as 'motor_current <= 0.4 A'; repeatable."),
-    ] = None,
     unknown: Annotated[
         list[str] | None,
         typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
     ] = None,
-    posterior: Posterior = None,
     model: Annotated[
         str,
         typer.Option(
@@ -56,28 +46,6 @@ def design(
             "one, learned from some fifteen tails in about a minute of one core; sbt where they cannot be learned."
         ),
     ] = "auto",
-    tail_rate: TailRate = None,
-    statistic: Annotated[
-        str | None,
-        typer.Option(metavar="mean|quantile", help="Of the objective over what is not known; else its mean."),
-    ] = None,
-    level: Annotated[
-        float | None, typer.Option(help="Of the quantile: share of the draws that are worse; else 0.1.")
-    ] = None,
-    confidence: Annotated[
-        float | None, typer.Option(help="Share of the draws in which a condition has to hold; else 0.95.")
-    ] = None,
-    draws: Annotated[
-        int | None, typer.Option(help="Draws of what is not known under which designs are compared; else 256.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of draws and search.")] = 1,
-    mandrel: Annotated[
-        float, typer.Option(help="Least diameter around which the wire is bent, in wire diameters.")
-    ] = 1.0,
-    clearance: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Least distance of tail and glass; else a wire diameter.")
-    ] = None,
-    settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Find the tail to build: the best values of some fields, under conditions and what is not known.
@@ -85,36 +53,16 @@ def design(
     Example: `spirillum design biorob2012-wide --vary tail.wavelength=5mm:40mm --maximise forward_velocity`
     """
     from spirillum.cli import renderer
-    from spirillum.designs.design import design as answer
     from spirillum.files import PICTURES, atomic_write_all, guard_inputs, output_target
     from spirillum.robot.toml_writer import robot_text
 
-    with guard_inputs(robot, posterior):
+    with guard_inputs(request.named_robot, request.typed.get("posterior")):
         target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
         picture = None if plot is None else output_target(plot, PICTURES, "design.png")
         printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
-    loaded = loaded_robot(robot, settings, posterior=posterior)
-    judged = {
-        "statistic": statistic,
-        "level": level,
-        "confidence": confidence,
-        "draws": draws,
-        "seed": seed,
-    }
     with renderer.progress_bar(quiet=json) as progress:
-        found = answer(
-            loaded,
-            pairs_of(vary, "--vary"),
-            maximise=maximise or (),
-            minimise=minimise or (),
-            subject_to=subject_to or (),
-            unknown=pairs_of(unknown or [], "--unknown"),
-            posterior=posterior,
-            judged=judged,
-            bench={"mandrel": mandrel, "clearance": clearance},
-            model=model,
-            tail_rate=tail_rate,
-            progress=progress,
+        found = request(
+            pairs_of(vary, "--vary"), unknown=pairs_of(unknown or [], "--unknown"), model=model, progress=progress
         )
     with atomic_write_all([path for path in (picture, printed, target) if path is not None]) as parts:
         if picture is not None:
@@ -127,7 +75,7 @@ def design(
 
             export(found.robot, parts[printed])
         if target is not None:
-            words = f"Best design of {loaded.name}: {found.objectives[0].words}, model {found.model}."
+            words = f"Best design of {request.robot.name}: {found.objectives[0].words}, model {found.model}."
             parts[target].write_text(robot_text(found.robot, words), encoding="utf-8")
     files = {"file": None if output is None else str(output), "picture": None if plot is None else str(plot)}
     files |= {"stl": None if stl is None else str(stl)}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from spirillum.argument_rules import check_rules
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
@@ -35,6 +37,17 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
         and (source := context.get_parameter_source(parameter.name)) is not None
         and source.name != "DEFAULT"
     ]
+
+
+def check_request(context: typer.Context, *states: str, **words: object) -> None:
+    """Refuse typed options that conflict with the request, by the rules of the command.
+
+    Args:
+        context: of the command.
+        states: that hold for the request.
+        words: of the request, for the sentence.
+    """
+    check_rules(str(context.info_name), states, partial(given_options, context), **words)
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
@@ -76,28 +89,6 @@ def loaded_robot(
     return found
 
 
-def placement_from(
-    gap: str | None,
-    eccentricity: float | None,
-    pitch: str | None,
-    tail_drop: str | None,
-    ends: str | None,
-    flow: str | None,
-    yaw: str | None = None,
-) -> dict[str, str | float]:
-    """Those fields of the placement that were given."""
-    fields = {
-        "gap": gap,
-        "eccentricity": eccentricity,
-        "pitch": pitch,
-        "yaw": yaw,
-        "tail_drop": tail_drop,
-        "ends": ends,
-        "flow": flow,
-    }
-    return {name: value for name, value in fields.items() if value is not None}
-
-
 def pairs_of(items: list[str], option: str) -> dict[str, str]:
     """FIELD=VALUE texts by field."""
 
@@ -108,11 +99,6 @@ def pairs_of(items: list[str], option: str) -> dict[str, str]:
         return name, value
 
     return _each_once(map(pair, items), option)
-
-
-def angle(text: str) -> float:
-    """An angle with its unit, rad."""
-    return parse_option("phase", text, KINDS["angle"])
 
 
 def time_window(text: str) -> tuple[float, float]:

@@ -8,19 +8,12 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import given_options, overrides_from
+from spirillum.cli.inputs import check_request, overrides_from
 from spirillum.cli.shared_options import Json, Settings
 
 _FEASIBILITY = "Before an experiment"
 _BY_HAND = "Instead of the tracker"
 _Rate = typer.Option(metavar="RATE", help="Expected rate, such as 1.2Hz; else predicted.", rich_help_panel=_FEASIBILITY)
-
-
-_APART = {
-    False: ("output", "marks", "no_tracking", "track", "no_annotated", "no_figures", "start", "end"),
-    True: ("expect_tail_rate", "expect_body_rate", "expect_speed", "duration", "fps", "view_width", "width"),
-}
-"""Options of one way alone: of measuring, and of `--feasibility`."""
 
 
 def measure(
@@ -100,7 +93,7 @@ def measure(
     if setup is None:
         raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
     overrides = overrides_from(settings)
-    _check_apart(context, feasibility=feasibility)
+    check_request(context, "feasibility" if feasibility else "no feasibility")
     if feasibility:
         from spirillum.measurement.feasibility import feasibility as verdict
 
@@ -150,17 +143,6 @@ def measure(
     if values and not any(math.isfinite(value) for value in values):
         trial = result.trials[0]
         raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
-
-
-def _check_apart(context: typer.Context, *, feasibility: bool) -> None:
-    """Refuse options of the other way."""
-    from spirillum.errors import InputError
-
-    given = given_options(context, *_APART[not feasibility])
-    if given and feasibility:
-        raise InputError(f"{', '.join(given)} with --feasibility, which measures nothing; allowed: without it")
-    if given:
-        raise InputError(f"{', '.join(given)} without --feasibility; allowed: with it")
 
 
 def _time(name: str, value: str | None) -> float | None:

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, placement_from, time_window
+from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import (
-    Accuracy,
-    Calibration,
-    Friction,
+    NO_FORM,
+    START_PANEL,
+    TIMING_PANEL,
     Json,
-    NoCalibration,
     Output,
-    Posterior,
-    RobotArgument,
-    Settings,
     complete_auto_models,
     complete_models,
 )
@@ -28,8 +25,6 @@ from spirillum.notes import note_attributes, notes_in
 if TYPE_CHECKING:
     import xarray as xr
 
-_START = "Start of a free run, and its tube"
-_TIMING = "Timing and remote"
 _PICTURES = "Pictures"
 
 _FullModel = Annotated[
@@ -40,130 +35,41 @@ _FullModel = Annotated[
         "else tube in a channel (free: where the robot has a table, see `prepare`) and slender without.",
     ),
 ]
-_RunMotion = Annotated[
-    str | None,
-    typer.Option(
-        help="free (lateral motion and tilt released) or held; else free, but held with a calibration of sbt, or of a "
-        "place in the tube without dry friction."
-    ),
-]
 
 
+@from_function(
+    "spirillum.dynamics.simulation:simulate",
+    without={
+        **NO_FORM,
+        "resolution.tolerance": "an option of the robot, model.tube.tolerance",
+        "resolution.phases": "an option of the robot, model.tube.phases",
+        "placement.tail_drop": "no rigid tail moves with it",
+        "in_tube.flow": "--flow takes a velocity or a file",
+        "field.rotation_rate": "an option of the robot, drive.rate",
+        "field.strength": "an option of the robot, drive.field",
+    },
+)
 def simulate(
-    robot: RobotArgument,
+    request: Request,
+    *,
     output: Output,
     model: _FullModel = "auto",
-    motion: _RunMotion = None,
-    friction: Friction = None,
-    turns: Annotated[
-        float | None,
-        typer.Option(help="Length of the run in turns of the tail (of the field); else 3.", rich_help_panel=_TIMING),
-    ] = None,
-    duration: Annotated[
-        str | None,
-        typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.", rich_help_panel=_TIMING),
-    ] = None,
     on: Annotated[
         list[str] | None,
         typer.Option(
             metavar="FROM:TO",
             help="When the remote switches the drive on, such as 0s:2s; repeatable.",
-            rich_help_panel=_TIMING,
+            rich_help_panel=TIMING_PANEL,
         ),
-    ] = None,
-    duty: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Duty over time instead: CSV with the columns time_s, duty.", rich_help_panel=_TIMING
-        ),
-    ] = None,
-    gap: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Smallest distance of body and wall, free at the start, or where tube holds it; else 1/18 of its "
-            "radius.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    eccentricity: Annotated[
-        float | None,
-        typer.Option(help="Instead of --gap: the body's offset towards the floor over R - a.", rich_help_panel=_START),
-    ] = None,
-    pitch: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ANGLE",
-            help="Angle by which the nose is raised, free at the start, or where tube holds it.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    no_weight: Annotated[
-        bool, typer.Option("--no-weight", help="Free: leave weight and buoyancy out.", rich_help_panel=_START)
-    ] = False,
-    roughness: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Free: roughness under the robot, else 1e-4 of its radius.", rich_help_panel=_START
-        ),
-    ] = None,
-    yaw: Annotated[
-        str | None,
-        typer.Option(metavar="ANGLE", help="Free, tube: angle of the nose to +y at the start.", rich_help_panel=_START),
-    ] = None,
-    azimuth: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ANGLE",
-            help="Free, tube: azimuth of the body's centre about +x from the lowest place.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    ends: Annotated[
-        str | None, typer.Option(help="Free, tube: ends of the channel, open or closed.", rich_help_panel=_START)
     ] = None,
     flow: Annotated[
         str | None,
         typer.Option(
             metavar="VELOCITY|FILE",
             help="Free, tube: imposed mean flow, such as 1mm/s, or over time: CSV with the columns time_s, flow_mm_s.",
-            rich_help_panel=_START,
+            rich_help_panel=START_PANEL,
         ),
     ] = None,
-    friction_coefficient: Annotated[
-        float | None,
-        typer.Option(
-            help="Free, tube: coefficient of dry friction where asperities touch; else 0.1.", rich_help_panel=_START
-        ),
-    ] = None,
-    wait: Annotated[
-        str | None,
-        typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.", rich_help_panel=_START),
-    ] = None,
-    continued: Annotated[
-        Path | None,
-        typer.Option(
-            "--continue",
-            metavar="FILE",
-            help="Free, tube: a run that ended early or was interrupted; what comes behind it is written.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    field_yaw: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ANGLE",
-            help="Free, magnetic: angle to +y of the axis about which the field turns, up to 45deg; else along +x.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    field_pitch: Annotated[
-        str | None,
-        typer.Option(metavar="ANGLE", help="Free, magnetic: angle of that axis upwards.", rich_help_panel=_START),
-    ] = None,
-    samples_per_turn: Annotated[
-        int, typer.Option(help="Samples of the output per steady turn of the tail.", rich_help_panel=_TIMING)
-    ] = 100,
     plot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
@@ -181,30 +87,23 @@ def simulate(
             metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
         ),
     ] = None,
-    no_calibration: NoCalibration = False,
-    calibration: Calibration = None,
-    posterior: Posterior = None,
-    draws: Annotated[
-        int | None,
-        typer.Option(help="With --posterior: draws that are run for the intervals of the means, 20 to 1000; else 100."),
-    ] = None,
-    accuracy: Accuracy = None,
-    settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Simulate swimming from rest: six degrees of freedom, weight, floor, motor and remote; or two (`--motion held`).
+
+    A free robot starts where --gap, --pitch and --yaw place it; without --gap at 1/18 of its radius from the wall.
 
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
     from spirillum.cli import renderer
     from spirillum.dynamics.integration import INTERRUPTED
     from spirillum.dynamics.run_summary import run_answer
-    from spirillum.dynamics.simulation import simulate as answer
     from spirillum.errors import InputError
     from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
 
     over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
-    with guard_inputs(continued, posterior, calibration, duty, flow if over_time else None):
+    files_read = (request.typed.get(name) for name in ("in_tube.continued", "posterior", "calibration", "timing.duty"))
+    with guard_inputs(*files_read, flow if over_time else None):
         target = netcdf_target(output)
         picture = None if plot is None else output_target(plot, PICTURES, "run.png")
     width = column or "double"
@@ -216,38 +115,12 @@ def simulate(
         raise InputError(f"column = {column[:40]!r} without a plot, whose width it is; allowed: with --plot")
     if movie is not None:
         check_movie(movie)
-    loaded = loaded_robot(robot, settings, calibration, posterior)
+    if on:
+        request.typed["timing.on"] = [time_window(window) for window in on]
+    if flow is not None:
+        request.typed["in_tube.flow" if over_time else "placement.flow"] = flow
     with renderer.progress_bar(quiet=json) as progress:
-        dataset = answer(
-            loaded,
-            model=model,
-            motion=motion,
-            friction=friction,
-            timing={
-                "turns": turns,
-                "duration": duration,
-                "samples_per_turn": samples_per_turn,
-                "on": [time_window(window) for window in on] if on else None,
-                "duty": duty,
-            },
-            calibrated=not no_calibration,
-            calibration=calibration,
-            posterior=posterior,
-            draws=draws,
-            resolution={"accuracy": accuracy},
-            placement=placement_from(gap, eccentricity, pitch, None, ends, None if over_time else flow, yaw),
-            weight=not no_weight,
-            roughness=roughness,
-            in_tube={
-                "azimuth": azimuth,
-                "wait": wait,
-                "friction_coefficient": friction_coefficient,
-                "flow": flow if over_time else None,
-                "continued": continued,
-            },
-            field={"yaw": field_yaw, "pitch": field_pitch},
-            progress=progress,
-        )
+        dataset = request(model=model, progress=progress)
         write_dataset(dataset, target)
         files, warnings = _drawn(dataset, picture, width, movie, progress)
     found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
@@ -300,23 +173,16 @@ def _after_the_run(what: str) -> Iterator[None]:
         raise InputError(f"the run is written, the {what} is not: {error}") from error
 
 
+@from_function(
+    "spirillum.dynamics.magnetic_sweep:magnetic_sweep",
+    without={**NO_FORM, **dict.fromkeys(("resolution.tolerance", "resolution.phases"), "of the model tube")},
+    complete={"model": complete_models},
+)
 def magnetic_sweep(
-    robot: RobotArgument,
+    request: Request,
+    *,
     output: Output,
-    rate: Annotated[
-        list[str] | None,
-        typer.Option(metavar="RATE", help="Rate of the field, such as 2Hz; repeatable, increasing; else 40 of them."),
-    ] = None,
-    model: Annotated[
-        str,
-        typer.Option(autocompletion=complete_models, help="Hydrodynamic model: slender, as `predict` takes, or rft."),
-    ] = "slender",
-    turns: Annotated[
-        float, typer.Option(help="Turns of the field in a stretch; the last of at most 25 is averaged.")
-    ] = 30.0,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it too: .png, .pdf or .svg.")] = None,
-    accuracy: Accuracy = None,
-    settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.
@@ -324,20 +190,13 @@ def magnetic_sweep(
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
     """
     from spirillum.cli import renderer
-    from spirillum.dynamics.magnetic_sweep import magnetic_sweep as answer
     from spirillum.dynamics.run_summary import sweep_answer
-    from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
+    from spirillum.files import netcdf_target, write_dataset
 
     target = netcdf_target(output)
-    picture = None if plot is None else output_target(plot, PICTURES, "sweep.png")
-    loaded = loaded_robot(robot, settings)
+    draw = renderer.picture(plot, "sweep.png", "spirillum.view.figures.magnetic:magnetic_figure")
     with renderer.progress_bar(quiet=json) as progress:
-        dataset = answer(loaded, rate, model=model, turns=turns, resolution={"accuracy": accuracy}, progress=progress)
+        dataset = request(progress=progress)
     write_dataset(dataset, target)
-    if picture is not None:
-        from spirillum.view.figures.magnetic import magnetic_figure
-        from spirillum.view.figures.style import save_as
-
-        save_as(magnetic_figure(dataset), picture)
-    files = {} if plot is None else {"plot": str(plot)}
+    files = {} if plot is None else {"plot": draw(dataset)}
     renderer.show(renderer.with_files(sweep_answer(dataset), file=str(output), **files), json=json)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -95,6 +97,30 @@ def _print_note(console: Console, note: Note, code: str = "") -> None:
 def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     """An answer with the files that a command has written for it; its notes stay last."""
     return with_notes_last(answer, **files)
+
+
+def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str | None]:
+    """A function that draws an answer into a file, which is checked now; it returns the file's name, or None.
+
+    Args:
+        path: of the picture; None without one.
+        example: of a file's name, for the sentence of an error.
+        figure: function that makes the figure of an answer, `module:name`.
+    """
+    from spirillum.files import PICTURES, output_target
+
+    target = None if path is None else output_target(path, PICTURES, example)
+
+    def draw(answer: Any) -> str | None:
+        if target is None:
+            return None
+        from spirillum.view.figures.style import save_as
+
+        module, _, name = figure.partition(":")
+        save_as(getattr(import_module(module), name)(answer), target)
+        return str(path)
+
+    return draw
 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:

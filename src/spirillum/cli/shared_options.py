@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from copy import copy
 from pathlib import Path
@@ -14,6 +14,9 @@ MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
 PLACE_PANEL = "Place in the channel (model tube)"
 """Panel of the help: where in its channel the robot lies."""
+START_PANEL = "Start of a free run, and its tube"
+TIMING_PANEL = "Timing and remote"
+DISTURBANCES_PANEL = "Disturbances"
 
 
 def starting(words: Iterable[str], incomplete: str) -> list[str]:
@@ -85,46 +88,85 @@ def _complete_motions(incomplete: str) -> list[str]:
     return starting(("free", "held"), incomplete)
 
 
+def _complete_views(incomplete: str) -> list[str]:
+    return starting(("side", "top"), incomplete)
+
+
+def _complete_directions(incomplete: str) -> list[str]:
+    return starting(("left", "right"), incomplete)
+
+
 def _complete_friction(incomplete: str) -> list[str]:
     return starting(("body", "none", "paper", "rotor"), incomplete)
 
 
+COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
+    "accuracy": _complete_accuracies,
+    "ends": _complete_ends,
+    "friction": _complete_friction,
+    "model": complete_auto_models,
+    "models": complete_models,
+    "motion": _complete_motions,
+    "part": complete_parts,
+    "view": _complete_views,
+    "direction": _complete_directions,
+}
+"""What the shell completes, by argument or field of a table."""
+NAMES = {
+    "calibrated": "--no-calibration",
+    "degradation.glare_moves": "--glare-fixed",
+    "field.pitch": "--field-pitch",
+    "field.yaw": "--field-yaw",
+    "in_tube.continued": "--continue",
+    "models": "--model",
+    "posterior_for": "--for",
+    "rates": "--rate",
+}
+"""Options that are not named after the argument or field."""
+PANELS = {
+    **dict.fromkeys(("model", "friction", "calibrated", "calibration", "posterior", "posterior_for"), MODEL_PANEL),
+    "resolution.": MODEL_PANEL,
+    "placement.": PLACE_PANEL,
+    **dict.fromkeys(("weight", "roughness", "in_tube.", "field."), START_PANEL),
+    "timing.": TIMING_PANEL,
+    "camera.": "Camera",
+    "degradation.": DISTURBANCES_PANEL,
+    **dict.fromkeys(("motion.", "trial."), "Motion"),
+    "setup_errors.": "Errors of the setup file",
+}
+"""Panels of the help by argument, or by table (with a point)."""
+METAVARS = {
+    "camera.size": "WIDTHxHEIGHT",
+    "size": "WIDTHxHEIGHT",
+    "judged.statistic": "mean|quantile",
+    "maximise": "QUANTITY",
+    "minimise": "QUANTITY",
+    "posterior_for": "new|measured",
+    "subject_to": "CONDITION",
+}
+"""What stands for a value in the help, where its kind does not tell."""
+_FRICTION = (
+    "Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall brakes "
+    "the body; paper: as eq. (19) is printed, on the tail from outside."
+)
+TEXTS = {
+    "friction": _FRICTION,
+    "motion.friction": _FRICTION,
+    "degradation.glare_moves": "The glare stands still instead of moving with the body.",
+    "seed": "Seed of all random numbers.",
+}
+"""Helps of arguments that docstrings explain elsewhere."""
+NO_FORM = {"resolution.form": "an option of the robot, model.tube.form"}
+"""Fields of tables that are no options of commands, with the reason; so below."""
+NO_START = dict.fromkeys(("in_tube.wait", "in_tube.flow", "in_tube.continued"), "of a run over time: simulate")
+
+
+def optional_robot(text: str) -> Any:
+    """Annotation of the argument that names a robot, where there may be none."""
+    return Annotated[str | None, typer.Argument(autocompletion=complete_robots, help=text)]
+
+
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
-Model = Annotated[
-    str,
-    typer.Option(
-        autocompletion=complete_auto_models,
-        help="Hydrodynamic model: sbt, rft, slender, tube; or auto: that of the posterior or calibration, else tube in "
-        "a channel and slender without.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
-Accuracy = Annotated[
-    str | None,
-    typer.Option(
-        autocompletion=_complete_accuracies,
-        help="Of the models slender and tube: standard or high; else the robot's.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
-Friction = Annotated[
-    str | None,
-    typer.Option(
-        autocompletion=_complete_friction,
-        help="Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall "
-        "brakes the body; paper: as eq. (19) is printed, on the tail from outside.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
-Motion = Annotated[
-    str,
-    typer.Option(
-        autocompletion=_complete_motions, help="Lateral motion and tilt held, as the channel's floor does, or free."
-    ),
-]
-NoCalibration = Annotated[
-    bool, typer.Option("--no-calibration", help="Leave the calibration factors out.", rich_help_panel=MODEL_PANEL)
-]
 Calibration = Annotated[
     Path | None,
     typer.Option(
@@ -139,15 +181,6 @@ Posterior = Annotated[
         rich_help_panel=MODEL_PANEL,
     ),
 ]
-PosteriorFor = Annotated[
-    str,
-    typer.Option(
-        "--for",
-        metavar="new|measured",
-        help="With --posterior: intervals of a new tail like those fitted, or of this one, which was measured.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -159,10 +192,6 @@ Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
-]
-TailRate = Annotated[
-    str | None,
-    typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
 ]
 Gap = Annotated[
     str | None,
@@ -187,51 +216,12 @@ Pitch = Annotated[
         rich_help_panel=PLACE_PANEL,
     ),
 ]
-Yaw = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ANGLE",
-        help="Model tube: angle by which the nose is turned to +y, such as 2deg.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-TailDrop = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help="Model tube: distance by which the tail's axis is lowered (a surrogate).",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
 Ends = Annotated[
     str | None,
     typer.Option(
         autocompletion=_complete_ends,
         help="Model tube: open or closed ends of the channel; else open if it has a length.",
         rich_help_panel=PLACE_PANEL,
-    ),
-]
-ImposedFlow = Annotated[
-    str | None,
-    typer.Option(
-        "--flow",
-        metavar="VELOCITY",
-        help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-Tolerance = Annotated[
-    float | None,
-    typer.Option(
-        help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
-Phases = Annotated[
-    int | None,
-    typer.Option(
-        help="Model tube: number of phases of the tail to average over, 1 to 64; else the robot's.",
-        rich_help_panel=MODEL_PANEL,
     ),
 ]
 

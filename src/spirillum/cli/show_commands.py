@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import angle, loaded_robot
-from spirillum.cli.shared_options import Json, RobotArgument, Settings, starting
+from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.shared_options import Json, starting
 
 _VIEWS = ("front", "perspective", "rear", "side", "top")
 
@@ -26,19 +26,16 @@ _View = Annotated[
 ]
 
 
+@from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _complete_views})
 def show(
-    robot: RobotArgument,
+    request: Request,
+    *,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
     ] = None,
-    view: _View = "perspective",
-    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the picture.")] = "1600x900",
-    no_channel: Annotated[bool, typer.Option("--no-channel", help="Leave the channel out.")] = False,
     window: Annotated[
         bool, typer.Option("--window", help="A window to turn the robot in, instead of a file unless -o names one.")
     ] = False,
-    settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
@@ -46,19 +43,10 @@ def show(
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
     from spirillum.cli import renderer
-    from spirillum.view.scene3d.show import show as answer
 
     target = output if output is not None or window else Path("robot.png")
     with renderer.at_work("drawing the robot", quiet=json):
-        found = answer(
-            loaded_robot(robot, settings),
-            target,
-            view=view,
-            phase=angle(phase),
-            size=size,
-            channel=not no_channel,
-            window=window,
-        )
+        found = request(target, window=window)
     renderer.show(found.to_dict(), json=json)
 
 

@@ -24,7 +24,7 @@ class Judged(Options):
     draws: Annotated[int, Field(strict=True, ge=8, le=16384)] = 256
     """Draws under which the search swims every design; what is stated rests on four times as many, drawn anew."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
-    """Of draws and search."""
+    """Seed of draws and search."""
 
     def check_read(self, *, known: bool, conditions: bool) -> None:
         """Refuse what was given and nothing reads; a seed serves the search in any case.

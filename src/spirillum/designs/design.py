@@ -93,7 +93,8 @@ def design(
             three fields of the tail, or fields of the body, are varied and nothing is unknown. `auto` is that of the
             posterior, else `tube` for a robot in a channel and `slender` without one, and `sbt` where the flow cannot
             be learned.
-        tail_rate: lab rotation rate of the tail; None: the robot's own drive.
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the
+            robot's own drive.
         progress: told what is being done, how much of it, and of how much.
 
     Raises:

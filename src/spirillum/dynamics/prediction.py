@@ -49,7 +49,8 @@ def predict(  # noqa: PLR0913 - the options of the command
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `sbt`, `rft`, `slender`, `tube`, or `auto`.
+        model: hydrodynamic model, `sbt`, `rft`, `slender`, `tube`; or `auto`: that of the posterior or calibration,
+            else `tube` in a channel and `slender` without.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the robot's
             drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
@@ -57,10 +58,12 @@ def predict(  # noqa: PLR0913 - the options of the command
         calibration: calibration file whose values replace the robot's.
         posterior: file of a calibration's posterior, for intervals; in free motion in the tube 40 of its draws are
             followed to their steady motions, in some second each.
-        posterior_for: whose intervals: `new` or `measured`.
+        posterior_for: with a posterior, intervals of a `new` tail like those fitted, or of this one, which was
+            `measured`.
         resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
         placement: where in the channel the robot lies, or is laid down.
-        band: with or without the band over what the placement leaves open; not of free motion in the tube.
+        band: of `tube`, with the band over what the placement leaves open, or the reference place alone; None: with it
+            where the robot has a table, without which it takes minutes; not of free motion in the tube.
         motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`.
         roughness: of free motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4 of
             the body's radius.

@@ -86,7 +86,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         calibration: calibration file whose factors replace the robot's.
         posterior: file of a calibration's posterior: its middle replaces the robot's values, and mean speed and rates
             have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
-        draws: how many draws of the posterior are run for these, 20 to 1000; None: 100.
+        draws: how many draws of the posterior are run for the intervals, 20 to 1000; None: 100.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.

@@ -197,9 +197,9 @@ class Timing(Options):
     argument: ClassVar[str] = "timing"
 
     turns: Annotated[float, BeforeValidator(_number_of_turns)] = 3.0
-    """Length of the run in turns (the paper's three periods)."""
+    """Length of the run in turns of the tail, or of the field (the paper's three periods)."""
     duration: Annotated[str | float | None, BeforeValidator(_length)] = None
-    """Length of the run instead, with its unit (``"2 s"``) or a float in s."""
+    """Length of the run in time instead, with its unit (``"2 s"``) or a float in s."""
     samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100
     """Samples of the output per turn."""
     on: Annotated[Sequence[Window] | None, BeforeValidator(windows_of)] = None

@@ -26,9 +26,9 @@ class Field(Options):
     rotation_rate: Rate | None = None
     """Rotation rate of the field about its axis."""
     yaw: Yaw | None = None
-    """Of the axis about which it turns, to the side, from the lab's +x."""
+    """Angle to +y, up to 45 degrees, of the axis about which the field turns; along the lab's +x without it."""
     pitch: Pitch | None = None
-    """Of that axis, up, from the horizontal."""
+    """Angle of that axis upwards, from the horizontal."""
     strength: MagneticField | None = None
     """Flux density, at right angles to the axis."""
 

@@ -296,7 +296,7 @@ def export(
         fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
         unit: of an STL file, `mm`, `um` or `m`; None: mm, or um where the file would not be watertight in mm.
         sidecar: whether to write the resistance beside the file; None: with `.urdf` and `.mjcf` only.
-        model: whose resistance, `slender` (as None) or `rft`; of an `.fmu` any model, or `auto` (as None).
+        model: whose resistance, `slender` or `rft`; of an `.fmu` any model; None: `slender`, of an `.fmu` `auto`.
         friction: of an `.fmu`, reading of the friction; None: the robot's own.
         calibration: of an `.fmu`, calibration file whose factors replace the robot's.
         placement: of an `.fmu` with `tube`, where the robot is held; with a `flow`, also 0, the flow is an input.

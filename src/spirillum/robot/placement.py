@@ -55,7 +55,7 @@ class Placement(Options):
     tail_drop: LengthOrZero = 0.0
     """Distance by which the tail's axis is lowered: a surrogate, for no rigid tail on a revolute joint does it."""
     ends: Ends | None = None
-    """`open` or `closed`; unset: `open` where the robot has a `channel.length`, else `closed`."""
+    """Ends of the channel, `open` or `closed`; unset: `open` where the robot has a `channel.length`, else `closed`."""
     flow: Velocity | None = None
     """Imposed mean velocity of the fluid far from the robot, signed about +x; instead of `ends`."""
 

@@ -44,11 +44,11 @@ class Degradation(Options):
     glare: Annotated[float, BeforeValidator(in_range(0.0, 1.0))] = 0.0
     """Share of the body's picture under a spot of glare."""
     glare_moves: Annotated[bool, Field(strict=True)] = True
-    """Whether the glare moves with the body, or stands still in the lab."""
+    """The glare moves with the body, instead of standing still in the lab."""
     bubbles: Annotated[int, BeforeValidator(whole(0, 200))] = 0
     """Number of bubbles that drift under the top of the tube."""
     hand: Annotated[bool, Field(strict=True)] = False
-    """Whether the shadow of a hand passes over the picture."""
+    """The shadow of a hand passes over the picture."""
 
     @classmethod
     def of(cls, value: str | Self | Mapping[str, Any] | None) -> Self:

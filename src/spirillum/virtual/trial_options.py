@@ -62,7 +62,7 @@ class MotionOptions(Options):
     tail_rate: Rate | None = None
     """Lab rotation rate of the tail; None: the robot's drive."""
     forward_velocity: Velocity | None = None
-    """Instead of the model's."""
+    """Forward velocity instead of the model's."""
     body_rate: Rate | None = None
     """Lab rotation rate of the body instead of the model's."""
 
@@ -97,15 +97,15 @@ class CameraOptions(Options):
     argument: ClassVar[str] = "camera"
 
     view: Annotated[Literal["top", "side"], BeforeValidator(one_of("top", "side"))] = "top"
-    """From above, or level from beside the tank."""
+    """From the `top`, or level from the `side` of the tank."""
     direction: Annotated[Literal["right", "left"], BeforeValidator(one_of("right", "left"))] = "right"
-    """Where the nose points in the picture."""
+    """Where the nose points in the picture, `right` or `left`."""
     fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0
     """Frames a second, as the nearest fraction that a video can hold."""
     size: Annotated[tuple[int, int], BeforeValidator(_read_size)] = (640, 480)
     """Width and height in pixels, even numbers, or ``"640x480"``."""
     exposure: Time = 1.0 / 120.0
-    """Of each frame."""
+    """Of each frame; 1/120 s by default."""
     field_of_view: Annotated[SignedLength, AfterValidator(_check_field)] | None = None
     """Width of the picture at the reference plane, 1 mm to 1 m; None: 166.8 mm, about nine of the paper's bodies. In a
     smaller field, as a microscope's, the ruler and the structure of the floor are finer."""

@@ -1,0 +1,381 @@
+"""Commands made from public functions: an option for each argument and for each field of an options table.
+
+Signatures, tables and docstrings are read from the source when a command is resolved, so that neither the start of the
+program nor a help page imports a model.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
+
+import typer
+from typer.core import TyperCommand
+
+from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.shared_options import COMPLETIONS, METAVARS, NAMES, PANELS, TEXTS, RobotArgument, Settings
+from spirillum.errors import InputError
+
+_SOURCE = Path(__file__).parents[2]
+_BY_UNIT = {"m": "LENGTH", "rad": "ANGLE", "s": "TIME", "rad/s": "RATE", "m/s": "VELOCITY"}
+_BY_FIELD_TYPE = {
+    "Length": "LENGTH",
+    "SignedLength": "LENGTH",
+    "LengthOrZero": "LENGTH",
+    "Time": "TIME",
+    "Rate": "RATE",
+    "Velocity": "VELOCITY",
+    "Angle": "ANGLE",
+    "Pitch": "ANGLE",
+    "Yaw": "ANGLE",
+}
+_EXAMPLES = {
+    "LENGTH": "0.5mm",
+    "ANGLE": "2deg",
+    "TIME": "2s",
+    "RATE": "1.2Hz",
+    "VELOCITY": "-2mm/s",
+    "phase": "90deg",
+    "camera.exposure": "5ms",
+    "camera.field_of_view": "5mm",
+    "until": "0.1mm",
+    "roughness": "20um",
+}
+"""Of quantities, by kind or argument."""
+_GIVEN_OTHERWISE = ("robot", "progress")
+"""Arguments of functions that every command gives in its own way."""
+
+
+class Declaration(NamedTuple):
+    """One argument of a function, or one field of its options tables."""
+
+    path: str
+    """`argument`, or `argument.field` of a table."""
+    annotation: str
+    default: Any
+    text: str
+    """Of the docstring."""
+
+    @property
+    def name(self) -> str:
+        """Of the command's parameter."""
+        return self.path.replace(".", "_") if self.path in NAMES else self.path.rpartition(".")[2]
+
+    @property
+    def table(self) -> str:
+        """The argument with a point, where it is a table; else empty."""
+        argument, point, _ = self.path.partition(".")
+        return f"{argument}." if point else ""
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it is on or off, and off or on otherwise."""
+        return "bool" in self.words and "None" not in self.words
+
+    @property
+    def words(self) -> set[str]:
+        """Names in the annotation."""
+        return set(re.findall(r"\w+", self.annotation))
+
+
+class Source(NamedTuple):
+    """What a command is made from."""
+
+    body: Callable[..., None]
+    target: str
+    without: Mapping[str, str]
+    """Arguments and fields that are no option, with the reason."""
+    completions: Mapping[str, Any]
+    robot: Any
+    """Annotation of the argument that names the robot; None for a function without one."""
+
+
+@dataclass
+class Request:
+    """A call of the public function of a command, with the arguments that were typed."""
+
+    source: Source
+    typed: dict[str, Any]
+    """Argument or `argument.field` to its value; what was not typed is left out."""
+    named_robot: str | None = None
+    settings: list[str] | None = None
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the function; the fields of a table together."""
+        found: dict[str, Any] = {}
+        for path, value in self.typed.items():
+            argument, _, field = path.partition(".")
+            if field:
+                found.setdefault(argument, {})[field] = value
+            else:
+                found[argument] = value
+        return found
+
+    @cached_property
+    def robot(self) -> Any:
+        """The robot with its fields set; None where none is named."""
+        if self.named_robot is None:
+            if self.settings:
+                raise InputError(
+                    f"set = {self.settings[0]} without a robot; allowed: with a preset's name or a robot file"
+                )
+            return None
+        fitted = self.typed.get("calibration"), self.typed.get("posterior")
+        return loaded_robot(self.named_robot, self.settings, *fitted)
+
+    def __call__(self, *more: Any, **others: Any) -> Any:
+        """Call the function, for the robot where it takes one; `others` join the typed arguments."""
+        module, _, name = self.source.target.partition(":")
+        first = () if self.source.robot is None else (self.robot,)  # a wrong robot is named before work begins
+        return getattr(import_module(module), name)(*first, *more, **{**self.arguments, **others})
+
+
+def from_function(
+    target: str,
+    *,
+    without: Mapping[str, str] | None = None,
+    complete: Mapping[str, Any] | None = None,
+    robot: Any = RobotArgument,
+) -> Callable[[Callable[..., None]], Any]:
+    """Decorator that gives a command the arguments of a public function as options.
+
+    The command takes the `Request` and its own options, which replace those of the same name.
+
+    Args:
+        target: the function, `module:name`.
+        without: arguments and fields that are no option of the command, with the reason.
+        complete: what the shell completes by argument, where it is not as in other commands.
+        robot: annotation of the argument that names the robot; None for a function without one.
+    """
+
+    def decorate(body: Callable[..., None]) -> Callable[[], None]:
+        def stub() -> None: ...
+
+        stub.__name__, stub.__doc__ = body.__name__, body.__doc__
+        stub.source = Source(body, target, without or {}, {**COMPLETIONS, **(complete or {})}, robot)  # type: ignore[attr-defined]
+        return stub
+
+    return decorate
+
+
+class FunctionCommand(TyperCommand):
+    """A command whose parameters are made when they are first needed."""
+
+    @cached_property
+    def _made(self) -> Any:
+        maker = typer.Typer(add_completion=False)
+        maker.command()(_complete(self._stub.source))
+        return typer.main.get_command(maker)
+
+    @property
+    def callback(self) -> Any:
+        """What the command does."""
+        return self._made.callback
+
+    @callback.setter
+    def callback(self, stub: Any) -> None:
+        self._stub = stub
+
+    @property
+    def params(self) -> Any:
+        """Arguments and options."""
+        return self._made.params
+
+    @params.setter
+    def params(self, _none: Any) -> None:
+        """There are none yet."""
+
+
+def _complete(source: Source) -> Callable[..., None]:
+    """The command with all its parameters."""
+    own = dict(list(inspect.signature(source.body).parameters.items())[1:])
+    hints = get_type_hints(source.body, include_extras=True)
+    made = {
+        item.name: (item, *_option(item, source.completions))
+        for item in declarations(source.target)
+        if item.name not in own and not {item.path, item.table} & source.without.keys()
+    }
+    parameters = []
+    if source.robot is not None:
+        needed = type(None) not in get_args(get_args(source.robot)[0])
+        parameters = [_parameter("robot", source.robot, inspect.Parameter.empty if needed else None)]
+    parameters += [_parameter(name, kind, default) for name, (_, kind, default) in made.items()]
+    parameters += [_parameter(name, hints[name], item.default) for name, item in own.items()]
+    if source.robot is not None:
+        parameters.insert(-1, _parameter("settings", Settings, None))
+
+    def run(robot: str | None = None, settings: list[str] | None = None, **given: Any) -> None:
+        typed = {
+            item.path: _as_argument(item, given[name])
+            for name, (item, _, default) in made.items()
+            if given[name] is not None and given[name] != default
+        }
+        source.body(Request(source, typed, robot, settings), **{name: given[name] for name in own})
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {item.name: item.annotation for item in parameters}
+    run.__doc__ = source.body.__doc__
+    return run
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
+
+
+def _as_argument(item: Declaration, value: Any) -> Any:
+    """The value of an argument; a switch turns the default round."""
+    return not item.default if item.is_switch else value
+
+
+def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Annotation and default of an option."""
+    last, words = item.path.rpartition(".")[2], item.words
+    option = NAMES.get(item.path, f"--{last.replace('_', '-')}")
+    unit = re.search(r"float in ([\w/]+)", item.text)
+    metavar = next((_BY_FIELD_TYPE[word] for word in words if word in _BY_FIELD_TYPE), None)
+    if metavar is None and {"str", "float"} <= words and unit is not None:
+        metavar = _BY_UNIT[unit[1]]
+    about: dict[str, Any] = {"help": _help(item, metavar), "rich_help_panel": PANELS.get(item.table or item.path)}
+    about |= {"autocompletion": completions.get(last)}
+    if "bool" in words:
+        return _switch(item, option, about)
+    default = item.default if item.default != () and metavar is None and "." not in item.path else None
+    kind: Any = str
+    if "Path" in words:
+        kind, metavar = Path, "FILE"
+    elif words & {"Sequence", "PerRobot", "Samples"}:
+        kind = list[str]
+    elif metavar is None and "tuple" not in words and words & {"int", "float"}:
+        kind = int if "int" in words else float
+    if kind == list[str]:
+        about["help"] = f"{str(about['help']).rstrip('.')}; repeatable."
+    if default is None:
+        kind |= None
+    elif isinstance(default, tuple):
+        default = _shown(default)
+    if "." in item.path and metavar is None and item.default not in (None, ()):
+        about["show_default"] = _shown(item.default)
+    return Annotated[kind, typer.Option(option, metavar=METAVARS.get(item.path, metavar), **about)], default
+
+
+def _shown(value: Any) -> str:
+    """A default as it is typed."""
+    return "x".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+def _switch(item: Declaration, option: str, about: dict[str, Any]) -> tuple[Any, Any]:
+    """A switch; one of three states where the function decides by default."""
+    if item.is_switch:
+        name = f"--no-{option[2:]}" if item.default and item.path not in NAMES else option
+        return Annotated[bool, typer.Option(name, **about)], False
+    return Annotated[bool | None, typer.Option(f"{option}/--no-{option[2:]}", show_default=False, **about)], None
+
+
+def _help(item: Declaration, metavar: str | None) -> str:
+    """The text of an argument for someone who types it: without Python's floats and None."""
+    if item.path in TEXTS:
+        return TEXTS[item.path]
+    text = re.sub(r",?( each)? with (its|their) units? (\([^)]*\) )?or (a float|floats) in [\w/]+", "", item.text)
+    text = text.replace("; None: ", "; else ").replace(" None: ", " Else: ").replace("``", "`")
+    text = f"do not {text}" if item.is_switch and item.default else text
+    text = f"{text[:1].upper()}{text[1:]}"
+    if metavar is None or "such as" in text:
+        return text
+    example = _EXAMPLES.get(item.path, _EXAMPLES[metavar])
+    first, mark, rest = text.rstrip(".").partition(";")
+    return f"{first}, such as {example}{mark}{rest}."
+
+
+@cache
+def declarations(target: str) -> tuple[Declaration, ...]:
+    """Arguments of a function and fields of its tables, without robot and progress."""
+    module, _, name = target.partition(":")
+    return tuple(_declared(module, name))
+
+
+def _declared(module: str, name: str) -> Iterator[Declaration]:
+    function = _found(module, name, ast.FunctionDef)
+    said, names = _arguments_said(ast.get_docstring(function) or ""), function.args
+    positional = [*names.posonlyargs, *names.args]
+    defaults = [None] * (len(positional) - len(names.defaults)) + list(names.defaults)
+    for item, default in zip([*positional, *names.kwonlyargs], [*defaults, *names.kw_defaults], strict=True):
+        if item.arg in _GIVEN_OTHERWISE:
+            continue
+        annotation = ast.unparse(item.annotation) if item.annotation is not None else ""
+        tables = [part for part in annotation.split(" | ") if "Mapping[str, Any]" in annotation and part.isidentifier()]
+        if table := next((part for part in tables if _is_table(module, part)), None):
+            yield from _fields(module, table, item.arg)
+        else:
+            yield Declaration(item.arg, annotation, _value(module, default), said.get(item.arg, ""))
+
+
+def _fields(module: str, table: str, argument: str) -> Iterator[Declaration]:
+    """Fields of an options table with the docstrings under them."""
+    home = _home(module, table)
+    found = _found(home, table, ast.ClassDef)
+    for item, behind in zip(found.body, found.body[1:], strict=False):
+        if not isinstance(item, ast.AnnAssign) or "ClassVar" in ast.unparse(item.annotation):
+            continue
+        text = behind.value.value if isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant) else ""
+        name, annotation = ast.unparse(item.target), ast.unparse(item.annotation)
+        yield Declaration(f"{argument}.{name}", annotation, _value(home, item.value), " ".join(str(text).split()))
+
+
+def _is_table(module: str, name: str) -> bool:
+    """Whether a name is a table of options."""
+    home = _home(module, name)
+    bases = [item.bases for item in _tree(home).body if isinstance(item, ast.ClassDef) and item.name == name]
+    return any(ast.unparse(base) == "Options" for found in bases for base in found)
+
+
+def _arguments_said(docstring: str) -> dict[str, str]:
+    """Texts of the arguments in a docstring."""
+    part = re.split(r"\n(?=\S)", docstring.partition("Args:\n")[2])[0]
+    entries = re.findall(r"^    (\w+): (.*(?:\n {8,}.*)*)", part, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in entries}
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    path = _SOURCE / module.replace(".", "/")
+    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return ast.parse(source.read_text(encoding="utf-8"))
+
+
+def _found(module: str, name: str, kind: type[Any]) -> Any:
+    """A function or class of a module."""
+    return next(item for item in _tree(module).body if isinstance(item, kind) and item.name == name)
+
+
+def _home(module: str, name: str) -> str:
+    """The module of this package that a name is imported from; the module itself for other names."""
+    for item in ast.walk(_tree(module)):
+        ours = isinstance(item, ast.ImportFrom) and str(item.module).startswith("spirillum")
+        if isinstance(item, ast.ImportFrom) and ours and any(alias.name == name for alias in item.names):
+            return str(item.module)
+    return module
+
+
+def _value(module: str, node: ast.expr | None) -> Any:
+    """A default: a literal, or a constant by its name; None for a formula."""
+    if node is None:
+        return None
+    if not isinstance(node, ast.Name):
+        with suppress(ValueError):
+            return ast.literal_eval(node)
+        return None
+    home = _home(module, node.id)
+    for item in _tree(home).body:
+        targets = item.targets if isinstance(item, ast.Assign) else [getattr(item, "target", None)]
+        if any(isinstance(target, ast.Name) and target.id == node.id for target in targets):
+            return _value(home, item.value)  # type: ignore[attr-defined]
+    raise LookupError(f"{module}: {node.id} is no constant")
