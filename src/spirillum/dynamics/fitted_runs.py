@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact
-from spirillum.fitted.fit_notes import CALIBRATED_HELD
+from spirillum.fitted.fit import CALIBRATED_HELD, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
 from spirillum.swimming.discrepancy import drawn_discrepancy
-from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
+from spirillum.swimming.model_choice import ModelChoice, choose_model
 from spirillum.swimming.steady_quantities import LEVEL
 
 if TYPE_CHECKING:
@@ -38,13 +36,7 @@ _OVER = ("", "_on", "_steady")
 
 
 def chosen_run(
-    model: str,
-    motion: str | None,
-    robot: Robot,
-    placement: Placement,
-    calibration: str | Path | None,
-    posterior: PosteriorFile | None,
-    contact: FittedContact,
+    model: str, motion: str | None, robot: Robot, placement: Placement, fit: Fit
 ) -> tuple[ModelChoice, str, list[str]]:
     """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
@@ -54,41 +46,30 @@ def chosen_run(
             friction, else `free`.
         robot: the robot.
         placement: where it starts.
-        calibration: calibration file; None without one.
-        posterior: posterior; None without one.
-        contact: roughness and dry friction of either.
+        fit: fitted values that are used.
 
     Returns:
         Both, and what was chosen instead of the usual, a sentence each.
     """
-    choice = choose_model(
-        model,
-        robot,
-        placement=placement,
-        calibration=calibration,
-        posterior=posterior,
-        tables_only=motion != "held",
-    )
+    choice = choose_model(model, robot, placement=placement, fit=fit, tables_only=motion != "held")
     said = [choice.caution] if choice.caution else []
     if not choice.fitted:
-        fitted = fitted_models(calibration, posterior)
-        if fitted and choice.model not in fitted:
-            source = calibration if posterior is None else posterior.source
+        if fit.models and choice.model not in fit.models:
             said.append(
-                f"{source} was fitted with model '{fitted[0]}' and the run takes '{choice.model}', on which its "
-                f"factors do not act; allowed: also --model {fitted[0]}"
+                f"{fit.name} was fitted with model '{fit.models[0]}' and the run takes '{choice.model}', on which its "
+                f"factors do not act; allowed: also --model {fit.models[0]}"
             )
         return choice, motion or "free", said
     said.append(f"the run takes model '{choice.model}': {choice.reason}")
     chosen = find_swimmer_model(choice.model)
-    if motion is None and chosen.placed and contact.friction_coefficient:
+    if motion is None and chosen.placed and fit.friction_coefficient:
         said.append("dry friction is fitted, and acts on a free robot: the run is free")
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed):
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
         said.append(f"model '{choice.model}' {why}: the run is held, with two degrees of freedom")
         return choice, "held", said
-    if motion != "held" and chosen.placed and posterior is None:
+    if motion != "held" and chosen.placed and fit.posterior is None:
         said.append(CALIBRATED_HELD)
     return choice, motion or "free", said
 

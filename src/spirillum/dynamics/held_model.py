@@ -16,6 +16,7 @@ import numpy as np
 from spirillum.arrays import PerRobot, Samples
 from spirillum.dynamics.held_equations import rates, steady_state
 from spirillum.errors import InputError
+from spirillum.fitted.fit import read_fit
 from spirillum.quantities import unit_of
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
@@ -128,7 +129,7 @@ def held_model(
         model=model,
         friction=friction,
         calibrated=calibrated,
-        calibration=calibration,
+        fit=read_fit(calibration),
         placement=placed if placed.is_given else None,
         band=False,
     )

@@ -32,6 +32,7 @@ from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roug
 from spirillum.dynamics.turning_field import Field, TurningField
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError, clipped
+from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
@@ -115,7 +116,7 @@ class Plant:
         model: str = AUTO,
         friction: str | None = None,
         calibrated: bool = True,
-        calibration: str | Path | None = None,
+        calibration: str | Path | Fit | None = None,
         placement: Placement | Mapping[str, Any] | None = None,
         weight: bool = True,
         roughness: str | float | None = None,
@@ -130,7 +131,7 @@ class Plant:
                 `slender`.
             friction: reading of the friction; None: the robot's own.
             calibrated: apply the robot's calibration factors for this model.
-            calibration: calibration file whose factors replace the robot's.
+            calibration: calibration file, or a fit read from one, whose factors replace the robot's.
             placement: `gap` or `eccentricity`, and `pitch`; with `tube` also yaw, ends and an imposed flow.
             weight: let weight and buoyancy act, if the masses are known.
             roughness: of the wall, with its unit or a float in m; None: 1e-4 of the body's radius.
@@ -145,7 +146,8 @@ class Plant:
         own = load(robot)
         if own.drive is None:
             raise InputError(f"{own.name} has no [drive]; allowed: a robot with one")
-        chosen = choose_model(model, own, placement=placed, calibration=calibration, tables_only=True)
+        fit = read_fit(calibration)
+        chosen = choose_model(model, own, placement=placed, fit=fit, tables_only=True)
         walled = chosen.model == "tube"
         if not walled:
             check_full(find_swimmer_model(chosen.model))
@@ -160,7 +162,7 @@ class Plant:
             model=chosen.model,
             friction=friction,
             calibrated=calibrated,
-            calibration=calibration,
+            fit=fit,
             placement=placed if walled else None,
             band=False,
         )

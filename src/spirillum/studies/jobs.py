@@ -34,7 +34,7 @@ def job_of(task: AnyTask, loaded: LoadedStudy, observed: ObservedArrays | None) 
     small = replace(loaded, study=study, robots=(), placements=(), question={}, cautions=())
     if not isinstance(task, ModelTask):
         return task.number, StudyJob(task, small, None)
-    if loaded.posterior is not None:
+    if loaded.fit.posterior is not None:
         small = replace(small, robots=tuple(loaded.robot_at(index) for index in task.indices.tolist()))
     seen = None if observed is None else observed_at(observed, task.indices)
     own: Indices = np.arange(task.size, dtype=np.intp)

@@ -236,8 +236,8 @@ def answer(task: ModelTask, loaded: LoadedStudy, observed: ObservedArrays | None
     reason = _reasons(task.batch, task.model)[:, None]
     reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
-    if loaded.posterior is not None and task.model == loaded.posterior.model:
-        part |= _intervals(task, loaded, loaded.posterior)
+    if loaded.fit.posterior is not None and task.model == loaded.fit.posterior.model:
+        part |= _intervals(task, loaded, loaded.fit.posterior)
     if observed is not None:
         tail, motor = observed.tail_rate[task.indices], observed.motor_rate[task.indices]
         found = [_swum(quick, r, tail, motor) for r in readings]

@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit_notes import Fitted, fitted_of, friction_acts
+from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
@@ -36,7 +36,7 @@ from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
 from spirillum.swimming.robot_preparation import prepared
@@ -201,15 +201,14 @@ _MORE = {
 }
 
 
-def predict(  # noqa: PLR0913 - the options of the command
+def predict(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = AUTO,
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = True,
-    calibration: str | Path | None = None,
-    posterior: str | Path | None = None,
+    fit: Fit = NO_FIT,
     posterior_for: str = "new",
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
@@ -232,9 +231,8 @@ def predict(  # noqa: PLR0913 - the options of the command
             the effective friction from (18).
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
-        calibration: calibration file whose factors replace the robot's.
-        posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
-            95 % interval, the model's discrepancy included.
+        fit: fitted values that replace the robot's; with a posterior these are its medians, and every quantity has a
+            95 % interval, the model discrepancy included.
         posterior_for: whose discrepancy the intervals hold: `new`, a tail like those that were fitted, or `measured`, a
             robot that was, of which the values are then the middle of what is known of it.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
@@ -247,23 +245,20 @@ def predict(  # noqa: PLR0913 - the options of the command
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.
     """
-    drawn, given = None, Placement.of(placement)
-    where = given
-    robot = load(robot)
+    drawn, given, robot = fit.posterior, Placement.of(placement), load(robot)
     names_friction = robot.friction.effective is not None
-    if posterior is not None:
-        drawn = posterior_alone(posterior, model, calibration, calibrated=calibrated)
+    if drawn is not None:
         robot = drawn.central(robot)
-        where = drawn.placed(robot, given)
-    choice = choose_model(model, robot, placement=where, calibration=calibration, posterior=drawn, motion=motion)
+    where = fit.placed(robot, given)
+    choice = choose_model(model, robot, placement=where, fit=fit, motion=motion)
     if band:
         _check_band(choice.model)
     ready, chosen, batch = prepared(
-        robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
+        robot, choice.model, fit=fit, resolution=resolution, placement=where if where.is_given else None
     )
     reading = friction_reading(ready.friction.reading if friction is None else friction)
-    rate, fitted = _rate(tail_rate, batch.placement), fitted_of(calibration, drawn)
-    case = _Case(ready, chosen, batch, reading, rate, calibrated, motion, fitted)
+    rate = _rate(tail_rate, batch.placement)
+    case = _Case(ready, chosen, batch, reading, rate, calibrated, motion, fit)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     whose = posterior_for_of(posterior_for, drawn, ready)
@@ -296,7 +291,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     if intervals is not None and whose == "measured":
         result = with_middles(result, intervals)
     acts = friction_acts(reading, rate)
-    idle = [] if drawn is None or over is None else fitted.outside_warnings(ready, chosen, drawn, friction=acts)
+    idle = [] if over is None else fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
         intervals = None
     warnings += idle or [*case.fitted_warnings(), *torque]
@@ -315,7 +310,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         interval_of="" if idle else interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
-        fitted_by="" if idle else fitted.source_of(ready, chosen, friction=acts),
+        fitted_by="" if idle else fit.source_of(ready, chosen, friction=acts),
     )
 
 
@@ -331,7 +326,7 @@ class _Case:
     """Rate of the tail, rad/s; None: the robot's drive."""
     calibrated: bool
     motion: str
-    fitted: Fitted
+    fit: Fit
 
     def swim(self, batch: RobotBatch, model: SwimmerModel | None = None) -> Swimming:
         """Steady swimming of the robot in some places, by its model or by another."""
@@ -340,7 +335,7 @@ class _Case:
             batch,
             model,
             [self.robot],
-            self.fitted.dry_friction(model),
+            self.fit.dry_friction(model),
             tail_rate=None if self.rate is None else np.array([self.rate]),
             friction=self.friction,
             calibrated=self.calibrated,
@@ -387,7 +382,7 @@ class _Case:
 
     def fitted_warnings(self) -> list[str]:
         """What to be careful about in what was fitted."""
-        return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
+        return self.fit.answer_warnings(self.robot, self.model, self.friction, self.rate)
 
     def why_not(self, result: Swimming) -> str:
         """Why there is no steady motion."""
