@@ -9,14 +9,14 @@ from typing import Any
 
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
-from spirillum.fitted.fit import FITTED_HELD, Fit, read_fit
+from spirillum.fitted.fit import FITTED_HELD, read_fit
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
 
@@ -76,8 +76,8 @@ def predict(  # noqa: PLR0913 - the options of the command
     own = load(robot)
     if beyond_stokes:
         own = without_reynolds_bound(own)
-    choice = _free_in_tube(own, model, motion, placement, fit)
-    if choice is None:
+    choice = choose_model(model, own, placement=Placement.of(placement), fit=fit, motion=motion)
+    if motion != "free" or choice.model != "tube":
         asked = InTube.of(in_tube)
         given = {
             "roughness": roughness,
@@ -91,7 +91,7 @@ def predict(  # noqa: PLR0913 - the options of the command
                 )
         return prediction.predict(
             own,
-            model=model,
+            model=choice,
             tail_rate=tail_rate,
             friction=friction,
             calibrated=calibrated,
@@ -138,15 +138,3 @@ def predict(  # noqa: PLR0913 - the options of the command
             *fit.run_warnings(answer.robot, answer.model, answer.friction),
         ),
     )
-
-
-def _free_in_tube(
-    robot: Robot, model: str, motion: str, placement: Placement | Mapping[str, Any] | None, fit: Fit
-) -> ModelChoice | None:
-    """Why the robot is followed in its tube; None where model and motion ask for something else."""
-    if motion != "free" or model not in ("tube", AUTO):
-        return None
-    if model == "tube":
-        return ModelChoice("tube")
-    choice = choose_model(AUTO, robot, placement=Placement.of(placement), fit=fit, motion="free")
-    return choice if choice.model == "tube" else None

@@ -36,9 +36,9 @@ def check_not_replaced(
         posterior: file of a posterior; None without one.
     """
     asked = tuple(fields)
-    for source, fit in ((calibration, {"calibration": calibration}), (posterior, {"posterior": posterior})):
-        if asked and source is not None:
-            check_kept(asked, robot, read_fit(**fit).central(robot), str(source))
+    for paths in ((calibration, None), (None, posterior)):
+        if asked and any(paths):
+            check_kept(asked, robot, read_fit(*paths).central(robot), str(paths[0] or paths[1]))
 
 
 def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:
