@@ -103,7 +103,7 @@ def test_command_line_says_a_want_of_memory_in_a_sentence(
 ) -> None:
     """Also where no estimate foresaw it."""
     from spirillum import cli
-    from spirillum.swimming import prediction
+    from spirillum.dynamics import prediction
 
     def starved(*_: object, **__: object) -> None:
         raise MemoryError

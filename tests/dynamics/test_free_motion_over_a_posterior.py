@@ -10,6 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics.free_draws import intervals_of_free_motion
 from spirillum.dynamics.free_motion import free_motion
+from spirillum.fitted.fit import fit_of_posterior
 from spirillum.fitted.posterior_file import PosteriorFile
 
 pytestmark = pytest.mark.slow
@@ -40,7 +41,7 @@ def posterior() -> PosteriorFile:
 def test_limits_are_those_of_the_draws_followed_by_themselves() -> None:
     """Laid down and followed alone, each draw comes to the same steady motion: to 0.1 %."""
     known = posterior()
-    found = free_motion(WIDE, posterior=known, roughness=ROUGH)
+    found = free_motion(WIDE, fit=fit_of_posterior(known), roughness=ROUGH)
     limits = intervals_of_free_motion(found, known, posterior_for="new")
     alone = [
         sp.predict(
@@ -61,7 +62,7 @@ def test_limits_are_those_of_the_draws_followed_by_themselves() -> None:
 
 def test_a_middle_without_a_steady_motion_has_no_intervals() -> None:
     known = posterior()
-    found = free_motion(WIDE, posterior=known, roughness=ROUGH)
+    found = free_motion(WIDE, fit=fit_of_posterior(known), roughness=ROUGH)
     orbiting = found._replace(run=found.run._replace(lying=replace(found.run.lying, state="orbits")))
     with pytest.raises(sp.InputError, match="its middle comes to no steady motion"):
         intervals_of_free_motion(orbiting, known, posterior_for="new")

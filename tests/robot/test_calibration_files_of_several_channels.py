@@ -6,7 +6,7 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.fitted.calibration_file import with_calibration
+from spirillum.fitted.fit import read_fit
 from spirillum.robot.load import load
 
 TABLES = """
@@ -48,8 +48,8 @@ def written(folder: Path, text: str) -> Path:
 
 def test_each_channel_takes_its_own(tmp_path: Path) -> None:
     path = written(tmp_path, TABLES)
-    wide = with_calibration(load("biorob2012-wide"), path)
-    narrow = with_calibration(load("biorob2012-narrow"), path)
+    wide = read_fit(path).central(load("biorob2012-wide"))
+    narrow = read_fit(path).central(load("biorob2012-narrow"))
     assert (wide.calibration["sbt"].body_drag, narrow.calibration["sbt"].body_drag) == (2.5, 4.5)
     assert (wide.friction.effective, narrow.friction.effective) == (None, 9e-6)
     assert set(wide.calibration) == {"sbt"}
@@ -57,7 +57,7 @@ def test_each_channel_takes_its_own(tmp_path: Path) -> None:
     assert wide.motor is not None
     assert wide.motor.torque_constant == 5e-4
     assert wide.model.rft.normal_factor == 1.2
-    other = with_calibration(load("biorob2012-wide", **{"channel.diameter": "33 mm"}), path)
+    other = read_fit(path).central(load("biorob2012-wide", **{"channel.diameter": "33 mm"}))
     assert other.calibration["sbt"].body_drag == 4.5
     answer = sp.predict(load("biorob2012-wide", **{"channel.diameter": "33 mm"}), calibration=path)
     assert any("outside its geometry" in warning for warning in answer.warnings)
@@ -65,7 +65,7 @@ def test_each_channel_takes_its_own(tmp_path: Path) -> None:
 
 def test_a_file_without_factors_leaves_the_robot_its_own(tmp_path: Path) -> None:
     path = written(tmp_path, '[fitted]\nviscosity = "3 Pa s"\n')
-    robot = with_calibration(load("biorob2012-wide"), path)
+    robot = read_fit(path).central(load("biorob2012-wide"))
     assert robot.fluid.viscosity == 3.0
     assert robot.calibration["sbt"].body_drag == 1.95
 
@@ -89,6 +89,6 @@ def test_a_file_without_factors_leaves_the_robot_its_own(tmp_path: Path) -> None
 )
 def test_wrong_files_are_refused(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(InputError) as caught:
-        with_calibration(load("biorob2012-wide"), written(tmp_path, text))
+        read_fit(written(tmp_path, text)).central(load("biorob2012-wide"))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)

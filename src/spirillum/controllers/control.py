@@ -30,6 +30,7 @@ from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
 from spirillum.processes import imap_unordered
 from spirillum.quantities import QUANTITIES, attributes
@@ -244,7 +245,7 @@ def control(
     """
     task, lab, arguments = task_of(task), Lab.of(lab), dict(plant or {})
     _check(controller, seed, seeds, workers, arguments)
-    robot = load(robot)
+    robot, arguments["calibration"] = load(robot), read_fit(arguments.get("calibration"))
     nominal = plant_of(robot, arguments, SampledErrors(1.0, 1.0), progress)
     lab, cautions = _without_unknown_flow(lab, nominal.model)
     job = ControlJob(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)

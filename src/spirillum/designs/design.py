@@ -23,7 +23,6 @@ from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
 from spirillum.designs.unknowns import SampledRobots, Unknowns, unknowns_of
 from spirillum.errors import InputError
-from spirillum.fitted.fit_notes import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.limits import all_hold, broken
@@ -376,7 +375,7 @@ def _warnings(
     reading = friction_reading(given.friction.reading)
     if not {"friction.effective", "friction", "shared_friction"} & set(stated.drawn.values):
         found += drive_warnings(known, stated.model, reading, swum, stated.tail_rate)
-    found += fitted_of(None, unknowns.posterior).answer_warnings(known, stated.model, reading, stated.tail_rate)
+    found += unknowns.fit.answer_warnings(known, stated.model, reading, stated.tail_rate)
     found += _near_step_out(built, swum)
     limits = reynolds_limits(stated.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
     found += [limit.caution() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]

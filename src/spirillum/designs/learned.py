@@ -244,7 +244,7 @@ def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> 
         space: the designs.
         unknowns: what is not known; a posterior's model answers for it.
     """
-    choice = choose_model(asked, robot, posterior=unknowns.posterior)
+    choice = choose_model(asked, robot, fit=unknowns.fit)
     if asked != AUTO or unknowns.posterior is not None:
         return choice
     own, strange = _changing_the_flow(space, unknowns)

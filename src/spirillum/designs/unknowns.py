@@ -13,7 +13,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.designs.space import Variable, variable_of
 from spirillum.errors import InputError
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.fit import NO_FIT, Fit, read_fit
+from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
@@ -40,7 +41,13 @@ class Unknowns:
     """With the middle of the posterior in place of its own values."""
     ranges: tuple[Variable, ...] = ()
     """Fields with the ranges over which they are uniform and independent."""
-    posterior: PosteriorFile | None = None
+    fit: Fit = NO_FIT
+    """The fit whose draws are unknown."""
+
+    @property
+    def posterior(self) -> PosteriorFile | None:
+        """Draws of the fit; None without one."""
+        return self.fit.posterior
 
     @property
     def known(self) -> bool:
@@ -92,6 +99,6 @@ def unknowns_of(
     if posterior is not None:
         if unknown:
             raise InputError("unknown together with a posterior; allowed: one of them")
-        found = read_posterior(posterior, *([] if model == AUTO else [model]))
-        return Unknowns(found.central(robot), posterior=found)
+        fit = read_fit(None, posterior, *([] if model == AUTO else [model]))
+        return Unknowns(fit.central(robot), fit=fit)
     return Unknowns(robot, tuple(variable_of(robot, path, given, "unknown") for path, given in (unknown or {}).items()))

@@ -23,6 +23,7 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
+from spirillum.fitted.fit import read_fit
 from spirillum.kernels import axial_motor as kernel
 from spirillum.notes import Note
 from spirillum.quantities import unit_of
@@ -168,7 +169,7 @@ def axial_robot(
         model=model,
         friction=friction,
         calibrated=calibrated,
-        calibration=calibration,
+        fit=read_fit(calibration),
         placement=placed if placed.is_given else None,
         band=False,
     )

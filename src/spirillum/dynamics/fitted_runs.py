@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact
-from spirillum.fitted.fit_notes import CALIBRATED_HELD
+from spirillum.fitted.fit import CALIBRATED_HELD, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes, notes_in
@@ -18,7 +16,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
 from spirillum.swimming.discrepancy import drawn_discrepancy
-from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
+from spirillum.swimming.model_choice import ModelChoice, choose_model
 from spirillum.swimming.steady_quantities import LEVEL
 
 if TYPE_CHECKING:
@@ -39,13 +37,7 @@ _OVER = ("", "_on", "_steady")
 
 
 def chosen_run(
-    model: str,
-    motion: str | None,
-    robot: Robot,
-    placement: Placement,
-    calibration: str | Path | None,
-    posterior: PosteriorFile | None,
-    contact: FittedContact,
+    model: str, motion: str | None, robot: Robot, placement: Placement, fit: Fit
 ) -> tuple[ModelChoice, str, list[Note]]:
     """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
@@ -55,35 +47,24 @@ def chosen_run(
             friction, else `free`.
         robot: the robot.
         placement: where it starts.
-        calibration: calibration file; None without one.
-        posterior: posterior; None without one.
-        contact: roughness and dry friction of either.
+        fit: fitted values that are used.
 
     Returns:
         Both, and what was chosen instead of the usual, a sentence each.
     """
-    choice = choose_model(
-        model,
-        robot,
-        placement=placement,
-        calibration=calibration,
-        posterior=posterior,
-    )
+    choice = choose_model(model, robot, placement=placement, fit=fit)
     said = [choice.caution] if choice.caution else []
     if not choice.fitted:
-        fitted = fitted_models(calibration, posterior)
-        if fitted and choice.model not in fitted:
-            source = calibration if posterior is None else posterior.source
+        if fit.models and choice.model not in fit.models:
             words = (
-                f"{source} was fitted with model '{fitted[0]}', and the run uses '{choice.model}', on which its "
-                "factors do "
-                f"not act; use --model {fitted[0]}"
+                f"{fit.name} was fitted with model '{fit.models[0]}', and the run uses '{choice.model}', on which its "
+                f"factors do not act; use --model {fit.models[0]}"
             )
             said.append(Note("fit-not-used", words, ("model",)))
         return choice, motion or "free", said
     said.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
     chosen = find_swimmer_model(choice.model)
-    if motion is None and chosen.placed and contact.friction_coefficient:
+    if motion is None and chosen.placed and fit.friction_coefficient:
         words = "dry friction is fitted and acts on a free robot: the run is a free motion"
         said.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
@@ -92,7 +73,7 @@ def chosen_run(
         words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
         said.append(Note("model-chosen", words, ("motion",)))
         return choice, "held", said
-    if motion != "held" and chosen.placed and posterior is None:
+    if motion != "held" and chosen.placed and fit.posterior is None:
         said.append(CALIBRATED_HELD)
     return choice, motion or "free", said
 

@@ -25,7 +25,7 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import Prediction
-from spirillum.swimming.robot_preparation import checked_batch, least_gap
+from spirillum.swimming.robot_preparation import check_domain, least_gap
 from spirillum.swimming.steady import friction_reading, requirements
 from spirillum.swimming.steady_quantities import STEADY, Swimming
 from spirillum.units import KINDS, parse_option, show
@@ -172,7 +172,8 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
         batch = RobotBatch.of(robot, Placement.of(asked))
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
-        batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": drawn}))
+        batch = RobotBatch.of(robot, Placement.of({**asked, "gap": drawn}))
+        check_domain(robot, Tube(), batch)
     notes = list(notes_in(now.attrs))
     if gap < drawn:
         words = (

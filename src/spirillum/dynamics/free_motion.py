@@ -31,9 +31,8 @@ from spirillum.dynamics.tube_simulation import (
 )
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
-from spirillum.fitted.fit_notes import fitted_of, friction_acts
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.calibration_file import FittedContact
+from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -103,8 +102,7 @@ def free_motion(
     *,
     tail_rate: str | float | None = None,
     friction: str | None = None,
-    calibration: str | Path | None = None,
-    posterior: PosteriorFile | None = None,
+    fit: Fit = NO_FIT,
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
     roughness: str | float | None = None,
@@ -118,8 +116,7 @@ def free_motion(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
         tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
         friction: reading of the friction; None: the robot's own.
-        calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
-        posterior: posterior of a calibration with `tube`, whose middle replaces the robot's values instead.
+        fit: fitted values that replace the robot's: friction, roughness, coefficient of dry friction.
         placement: where it is laid down, the ends of the channel, and a constant flow.
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
@@ -131,11 +128,11 @@ def free_motion(
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     _check(asked)
     own = load(robot)
-    contact = calibrated_contact(calibration)
-    if posterior is not None:
-        own, contact = posterior.central(own), posterior.contact()
-        placed = posterior.placed(own, placed)
-    ready, _, batch = prepared(own, "tube", calibration=calibration, placement=placed)
+    contact = fit.contact()
+    if fit.posterior is not None:
+        own = fit.central(own)
+        placed = fit.placed(own, placed)
+    ready, _, batch = prepared(own, "tube", fit=fit, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(
             "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: drive.kind = "
@@ -179,7 +176,7 @@ def free_motion(
     error = table.speed_error_at(run.lying.yaw) if known else float("nan")
     error = in_stokes_flow(error, *limits)
     acts = friction_acts(held.friction, held.tail_rate)
-    source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)
+    source = fit.source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
     found = replace(found, lying=run.lying)
     return FreeMotion(found, run, links, gap, laid, checked)

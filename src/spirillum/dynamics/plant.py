@@ -38,6 +38,7 @@ from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.dynamics.turning_field import Field, TurningField
 from spirillum.errors import InputError, clipped
+from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
@@ -123,7 +124,7 @@ class Plant:
         model: str = AUTO,
         friction: str | None = None,
         calibrated: bool = True,
-        calibration: str | Path | None = None,
+        calibration: str | Path | Fit | None = None,
         placement: Placement | Mapping[str, Any] | None = None,
         weight: bool = True,
         roughness: str | float | None = None,
@@ -138,7 +139,7 @@ class Plant:
                 `slender`.
             friction: reading of the friction; None: the robot's own.
             calibrated: apply the robot's calibration factors for this model.
-            calibration: calibration file whose factors replace the robot's.
+            calibration: calibration file, or a fit read from one, whose factors replace the robot's.
             placement: `gap` or `eccentricity`, and `pitch`; with `tube` also yaw, ends and an imposed flow.
             weight: let weight and buoyancy act, if the masses are known.
             roughness: of the wall, with its unit or a float in m; None: 1e-4 of the body's radius.
@@ -153,7 +154,8 @@ class Plant:
         own = load(robot)
         if own.drive is None:
             raise InputError(f"{own.name} has no [drive]; allowed: a robot with one")
-        chosen = choose_model(model, own, placement=placed, calibration=calibration)
+        fit = read_fit(calibration)
+        chosen = choose_model(model, own, placement=placed, fit=fit)
         walled = chosen.model == "tube"
         if not walled:
             check_full(find_swimmer_model(chosen.model))
@@ -168,7 +170,7 @@ class Plant:
             model=chosen.model,
             friction=friction,
             calibrated=calibrated,
-            calibration=calibration,
+            fit=fit,
             placement=placed if walled else None,
             band=False,
         )

@@ -9,15 +9,14 @@ from typing import Any
 
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
-from spirillum.fitted.fit_notes import FITTED_HELD, fitted_of
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.fit import FITTED_HELD, read_fit
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, check_calibrated, choose_model, posterior_alone
+from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
 
@@ -76,14 +75,12 @@ def predict(  # noqa: PLR0913 - the options of the command
         InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a
             turn.
     """
-    check_calibrated(calibration, calibrated=calibrated)
+    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated)
+    own = load(robot)
     if beyond_stokes:
-        robot = without_reynolds_bound(load(robot))
-    known = None
-    if posterior is not None and motion == "free" and model in ("tube", AUTO):
-        known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
-    choice = _free_in_tube(robot, model, motion, placement, calibration, known)
-    if choice is None:
+        own = without_reynolds_bound(own)
+    choice = choose_model(model, own, placement=Placement.of(placement), fit=fit, motion=motion)
+    if motion != "free" or choice.model != "tube":
         asked = InTube.of(in_tube)
         given = {
             "roughness": roughness,
@@ -96,13 +93,12 @@ def predict(  # noqa: PLR0913 - the options of the command
                     "'free'"
                 )
         return prediction.predict(
-            robot,
-            model=model,
+            own,
+            model=choice,
             tail_rate=tail_rate,
             friction=friction,
             calibrated=calibrated,
-            calibration=calibration,
-            posterior=posterior,
+            fit=fit,
             posterior_for=posterior_for,
             resolution=resolution,
             placement=placement,
@@ -110,8 +106,8 @@ def predict(  # noqa: PLR0913 - the options of the command
             motion=motion,
             progress=progress,
         )
-    whose = posterior_for_of(posterior_for, known, load(robot))
-    check_not_resolved(load(robot), resolution)
+    whose = posterior_for_of(posterior_for, fit.posterior, own)
+    check_not_resolved(own, resolution)
     if band:
         raise InputError(
             "band = True with motion 'free' in the tube, where the robot finds its own place; allowed: motion 'held'"
@@ -119,50 +115,29 @@ def predict(  # noqa: PLR0913 - the options of the command
     from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
     found = free_motion(
-        robot,
+        own,
         tail_rate=tail_rate,
         friction=friction,
-        calibration=calibration,
-        posterior=known,
+        fit=fit,
         placement=placement,
         roughness=roughness,
         in_tube=in_tube,
         progress=progress,
     )
     answer = replace(found.prediction, choice=choice)
-    if known is None:
+    if fit.posterior is None:
         return answer
     from spirillum.dynamics.free_draws import intervals_of_free_motion
 
-    intervals = intervals_of_free_motion(found, known, posterior_for=whose, progress=progress)
+    intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(
         answer,
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
-        interval_of=interval_statement(known, answer.robot, whose),
+        interval_of=interval_statement(fit.posterior, answer.robot, whose),
         warnings=(
             *answer.warnings,
             FITTED_HELD,
-            *fitted_of(None, known).run_warnings(answer.robot, answer.model, answer.friction),
+            *fit.run_warnings(answer.robot, answer.model, answer.friction),
         ),
     )
-
-
-def _free_in_tube(
-    robot: str | Path | Mapping[str, Any] | Robot,
-    model: str,
-    motion: str,
-    placement: Placement | Mapping[str, Any] | None,
-    calibration: str | Path | None,
-    posterior: PosteriorFile | None,
-) -> ModelChoice | None:
-    """Why the robot is followed in its tube; None where model and motion ask for something else."""
-    if motion != "free" or model not in ("tube", AUTO):
-        return None
-    if model == "tube":
-        return ModelChoice("tube")
-    where = Placement.of(placement)
-    choice = choose_model(
-        AUTO, load(robot), placement=where, calibration=calibration, posterior=posterior, motion="free"
-    )
-    return choice if choice.model == "tube" else None

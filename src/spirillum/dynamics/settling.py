@@ -25,6 +25,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
+from spirillum.fitted.fit import read_fit
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -260,7 +261,7 @@ def settle(
         robot,
         tail_rate=tail_rate,
         friction=friction,
-        calibration=calibration,
+        fit=read_fit(calibration),
         placement=placement,
         weight=weight,
         roughness=roughness,

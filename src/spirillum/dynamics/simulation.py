@@ -21,8 +21,8 @@ from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_con
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_field
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
-from spirillum.fitted.fit_notes import FITTED_HELD, fitted_of
+from spirillum.fitted.calibration_file import FittedContact
+from spirillum.fitted.fit import FITTED_HELD, NO_FIT, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
@@ -36,7 +36,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.freedom import check_full, motion_of
-from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
+from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
@@ -109,10 +109,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
-    check_calibrated(calibration, calibrated=calibrated)
-    known = None
-    if posterior is not None:
-        known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
+    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated)
+    known = fit.posterior
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
     number = drawn_number(draws, known)
@@ -121,18 +119,16 @@ def simulate(  # noqa: PLR0913 - the options of the command
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     own = load(robot)
     central = own if known is None else known.central(own)
-    contact = calibrated_contact(calibration) if known is None else known.contact()
-    choice, motion, said = chosen_run(model, motion, central, placed, calibration, known, contact)
+    contact = fit.contact()
+    choice, motion, said = chosen_run(model, motion, central, placed, fit)
     model = choice.model
-    posterior_name = "" if known is None else known.source
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
     walled = model == "tube" and not held
     fixed = placed if held and find_swimmer_model(model).placed else None
     if held:
-        source = calibration if known is None else known.source
-        _check_held(placed if fixed is None else Placement(), roughness, contact, str(source), weight=weight)
+        _check_held(placed if fixed is None else Placement(), roughness, contact, fit.name, weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled, drawn=known is not None)
@@ -149,13 +145,13 @@ def simulate(  # noqa: PLR0913 - the options of the command
             model=model,
             friction=friction,
             calibrated=calibrated,
-            calibration=calibration,
+            fit=fit if known is None else NO_FIT,  # a draw's values stand in its robot
             resolution=resolution,
             placement=there if walled or drawn is not None else fixed,
             band=False,
             progress=tell,
         )
-        steady = replace(steady, fitted_by=posterior_name or steady.fitted_by)
+        steady = steady if known is None else replace(steady, fitted_by=fit.name)
         if table is not None:
             return run_in_tube(steady, table, timing, there, touching, rough, about, weight, tell)
         return axial_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)
@@ -164,7 +160,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     if known is not None:
         reading = friction_reading(central.friction.reading if friction is None else friction)
         said += [FITTED_HELD] if walled else []
-        said += fitted_of(None, known).run_warnings(central, find_swimmer_model(model), reading)
+        said += fit.run_warnings(central, find_swimmer_model(model), reading)
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
         dataset = with_intervals(

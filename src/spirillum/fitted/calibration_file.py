@@ -188,16 +188,6 @@ def read_calibration(path: str | Path) -> CalibrationFile:
     raise refused_table(checked, str(path))
 
 
-def with_calibration(robot: Robot, path: str | Path) -> Robot:
-    """The robot with what a calibration file holds in place of its own.
-
-    Args:
-        robot: a checked robot.
-        path: TOML file with `[calibration.<model>]` tables, as in a robot file, or as `spirillum calibrate` writes it.
-    """
-    return calibrated_robot(robot, read_calibration(path))
-
-
 def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
 
@@ -226,16 +216,6 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
     near = [entry for entry in entries if _alike(diameter, entry.channel_diameter)]
     own = [entry.effective for entry in near if _is_of(robot, entry)]
     return own[0] if own else None, tuple(entry.effective for entry in near)
-
-
-def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
-    """Where a calibration file places a robot in its channel; None where it says nothing of that channel."""
-    return placement_in(read_calibration(path), robot)
-
-
-def calibrated_contact(path: str | Path | None) -> FittedContact:
-    """Roughness and dry friction of a calibration file; nothing without one."""
-    return FittedContact() if path is None else read_calibration(path).contact
 
 
 def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:

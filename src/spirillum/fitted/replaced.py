@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import with_calibration
-from spirillum.fitted.posterior_file import read_posterior
+from spirillum.fitted.fit import read_fit
 from spirillum.robot.robot import Robot
 
 
@@ -37,10 +36,9 @@ def check_not_replaced(
         posterior: file of a posterior; None without one.
     """
     asked = tuple(fields)
-    if asked and calibration is not None:
-        check_kept(asked, robot, with_calibration(robot, calibration), str(calibration))
-    if asked and posterior is not None:
-        check_kept(asked, robot, read_posterior(posterior).central(robot), str(posterior))
+    for paths in ((calibration, None), (None, posterior)):
+        if asked and any(paths):
+            check_kept(asked, robot, read_fit(*paths).central(robot), str(paths[0] or paths[1]))
 
 
 def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:

@@ -201,7 +201,7 @@ def _empty(loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
     if any(not find_swimmer_model(name).closed_form for name in models):
         part["error_estimate"] = empty
     part["outside"] = np.zeros_like(empty)
-    if loaded.posterior is not None and loaded.posterior.model in models:
+    if loaded.fit.posterior is not None and loaded.fit.posterior.model in models:
         part |= {f"{name}_interval_{end}": empty for name in WITH_INTERVALS for end in ("low", "high")}
     if observed is not None:
         part |= {f"{name}_at_observed_rate": empty for name in AT_RATES}

@@ -170,12 +170,12 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
         warnings.append(CONSTANT_TORQUE)
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
-    warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
-    warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
-    warnings += loaded.fitted.reading_warnings(loaded.study.friction)
-    warnings += loaded.fitted.model_warnings(loaded.study.models, loaded.study.friction)
+    warnings += loaded.fit.idle_warnings(loaded.robots, asked)
+    warnings += loaded.fit.origin_warnings(loaded.robots, asked)
+    warnings += loaded.fit.reading_warnings(loaded.study.friction)
+    warnings += loaded.fit.model_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
-        warnings += loaded.fitted.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
+        warnings += loaded.fit.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     return warnings + uneven_models(loaded.robots, models, factors)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,9 @@ from typing import Any
 from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import (
-    CalibrationFile,
     FittedFriction,
-    calibrated_robot,
-    placement_in,
-    read_calibration,
 )
-from spirillum.fitted.fit_notes import Fitted, fitted_of
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.fit import NO_FIT, Fit, read_fit
 from spirillum.fitted.replaced import check_kept, set_fields
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.notes import Note
@@ -49,10 +44,8 @@ class LoadedStudy:
     """One robot a channel of the grid, or the listed robots."""
     question: Mapping[str, Any]
     """All that decides the answer, for the fingerprint and the dataset's attributes."""
-    fitted: Fitted = field(default_factory=Fitted)
-    """B_eff of tails that a calibration knows, and what it rests on."""
-    posterior: PosteriorFile | None = None
-    """Draws over which answers have intervals."""
+    fit: Fit = NO_FIT
+    """Fitted values that act on the robots, or draws over which answers have intervals."""
     cautions: tuple[Note, ...] = ()
     """What to be careful about in the choice of the models, a sentence each."""
     placements: tuple[Placement, ...] = ()
@@ -65,7 +58,7 @@ class LoadedStudy:
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
         """B_eff of tails that a calibration knows."""
-        return self.fitted.friction
+        return self.fit.friction
 
     @property
     def fingerprint(self) -> str:
@@ -146,27 +139,26 @@ def load_study(
                 f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
                 "are followed with nothing fitted"
             )
-    fitted, drawn = _fitted(study, calibration, posterior)
+    fit = _fit(study, calibration, posterior)
     given = (*set_fields(overrides or {}), *study.vary)
-    robots = tuple(_fitted_robot(robot, fitted, drawn, given, str(posterior or calibration)) for robot in robots)
+    robots = tuple(_fitted_robot(robot, fit, given, str(posterior or calibration)) for robot in robots)
     _check_varied(study, overrides or {}, name)
-    study, cautions = _with_models(study, robots, calibration, drawn)
+    study, cautions = _with_models(study, robots, fit)
     try:
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
     _check_contact(study, robots, name)
-    placements = _fitted_places(study, robots, fitted, str(calibration))
-    known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
+    placements = _fitted_places(study, robots, fit)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
-    if known.friction:
-        question["friction"] = [item.model_dump() for item in known.friction]
+    if fit.friction:
+        question["friction"] = [item.model_dump() for item in fit.friction]
     if placements:
         question["placements"] = [place.model_dump() for place in placements]
-    if drawn:
-        question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
-    loaded = LoadedStudy(study, robots, question, known, drawn, cautions, placements)
-    if drawn and loaded.count > _LARGEST_WITH_INTERVALS:
+    if fit.posterior:
+        question["posterior"] = {"source": fit.posterior.source, "sha256": fit.posterior.sha256}
+    loaded = LoadedStudy(study, robots, question, fit, cautions, placements)
+    if fit.posterior and loaded.count > _LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {_LARGEST_WITH_INTERVALS}")
     return loaded
 
@@ -246,20 +238,16 @@ def _flat(fields: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any
             yield f"{above}{name}", value
 
 
-def _fitted(
-    study: Study, calibration: str | Path | None, posterior: str | Path | None
-) -> tuple[CalibrationFile | None, PosteriorFile | None]:
+def _fit(study: Study, calibration: str | Path | None, posterior: str | Path | None) -> Fit:
     if calibration is not None and posterior is not None:
         raise InputError("posterior together with a calibration; allowed: one of them")
-    file = None if calibration is None else read_calibration(calibration)
-    models = () if AUTO in study.models else study.models
-    drawn = None if posterior is None else read_posterior(posterior, *models)
-    if drawn is not None and drawn.places_robots:
+    fit = read_fit(calibration, posterior, *(() if AUTO in study.models else study.models))
+    if fit.posterior is not None and fit.posterior.places_robots:
         raise InputError(
-            f"{drawn.source} has a place of its own for the robots of each channel, and a study one for all; allowed: "
+            f"{fit.name} has a place of its own for the robots of each channel, and a study one for all; allowed: "
             "`predict` of each robot with it, or the study without"
         )
-    return file, drawn
+    return fit
 
 
 _VARIED = ("tail.wavelength", "tail.amplitude")
@@ -279,32 +267,28 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
         )
 
 
-def _fitted_places(
-    study: Study, robots: Sequence[Robot], file: CalibrationFile | None, source: str
-) -> tuple[Placement, ...]:
+def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
     """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks."""
-    if file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
+    if fit.file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
         return ()
-    if file.contact.friction_coefficient:
+    if fit.friction_coefficient:
         raise InputError(
-            f"{source} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each robot "
-            "with it"
+            f"{fit.name} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each "
+            "robot with it"
         )
     if study.placement.is_given:
         return ()
-    found = [placement_in(file, robot) for robot in robots]
+    found = [fit.calibrated_placement(robot) for robot in robots]
     if not any(found):
         return ()
     placements = tuple(place or Placement() for place in found)
     walled = next(SWIMMER_MODELS[model] for model in study.models if SWIMMER_MODELS[model].placed)
     if study.band and not all(left_open(place, walled) for place in placements):
-        raise InputError(f"band = true, but {source} says where the robots lie; allowed: the study without a band")
+        raise InputError(f"band = true, but {fit.name} says where the robots lie; allowed: the study without a band")
     return placements
 
 
-def _with_models(
-    study: Study, robots: Sequence[Robot], calibration: str | Path | None, posterior: PosteriorFile | None
-) -> tuple[Study, tuple[Note, ...]]:
+def _with_models(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Study, tuple[Note, ...]]:
     """The study with one model for all robots in place of `auto`, and what to be careful about in it."""
     if AUTO not in study.models:
         return study, ()
@@ -314,8 +298,7 @@ def _with_models(
             AUTO,
             loaded.robot_at(index),
             placement=study.placement,
-            calibration=calibration,
-            posterior=posterior,
+            fit=fit,
             tables_only=True,
             among=True,
         )
@@ -346,14 +329,9 @@ def _for_all(choices: Iterable[ModelChoice]) -> ModelChoice:
     return found
 
 
-def _fitted_robot(
-    robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None, kept: Sequence[str], source: str
-) -> Robot:
-    """The robot with what a calibration or the middle of a posterior says."""
-    if posterior is not None:
-        found = posterior.central(robot)
-    else:
-        found = robot if file is None else calibrated_robot(robot, file)
+def _fitted_robot(robot: Robot, fit: Fit, kept: Sequence[str], source: str) -> Robot:
+    """Return the robot with fitted values, which may not replace what was set."""
+    found = fit.central(robot)
     check_kept(kept, robot, found, source)
     return found
 

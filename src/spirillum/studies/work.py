@@ -204,7 +204,7 @@ class ModelTask(StudyTask):
     def job(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> StudyJob:
         """Return the task with its observations, and its robots where their posterior draws are requested."""
         small = super().job(loaded, observed).loaded
-        if loaded.posterior is not None:
+        if loaded.fit.posterior is not None:
             small = replace(small, robots=tuple(loaded.robot_at(index) for index in self.indices.tolist()))
         seen = None if observed is None else observed_at(observed, self.indices)
         return StudyJob(replace(self, indices=np.arange(self.size, dtype=np.intp)), small, seen)
@@ -223,8 +223,8 @@ class ModelTask(StudyTask):
         reason = _reasons(self.batch, self.model)[:, None]
         reason = np.where(np.isfinite(part["reynolds_number"]) & ~valid, REASONS.index("beyond-stokes"), reason)
         part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
-        if loaded.posterior is not None and self.model == loaded.posterior.model:
-            part |= _intervals(self, loaded, loaded.posterior)
+        if loaded.fit.posterior is not None and self.model == loaded.fit.posterior.model:
+            part |= _intervals(self, loaded, loaded.fit.posterior)
         if observed is not None:
             tail, motor = observed.tail_rate[self.indices], observed.motor_rate[self.indices]
             found = [_swum(quick, r, tail, motor) for r in readings]

@@ -12,7 +12,7 @@ from typing import Any
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import with_calibration
+from spirillum.fitted.fit import read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.load import load, with_resolution
@@ -181,7 +181,8 @@ def compare_models(
     names = _chosen(models)
     own = with_resolution(load(robot), resolution, *names)
     factors = calibration is not None if calibrated is None else calibrated
-    ready = own if calibration is None else with_calibration(own, calibration)
+    fit = read_fit(calibration)
+    ready = fit.central(own)
     reading = friction_reading(ready.friction.reading if friction is None else friction)
     place = Placement.of(placement)
     check_placement(place, *(find_swimmer_model(name) for name in names))
@@ -197,7 +198,7 @@ def compare_models(
                 tail_rate=tail_rate,
                 friction=reading,
                 calibrated=factors,
-                calibration=calibration,
+                fit=fit,
                 placement=place if find_swimmer_model(name).placed and place != Placement() else None,
                 band=False,
             )

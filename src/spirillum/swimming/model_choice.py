@@ -8,11 +8,9 @@ robot in unbounded fluid.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import read_calibration
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.fluid.tube.stages import StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -45,33 +43,12 @@ class ModelChoice:
     """Whether the robot breaks a requirement of the model with walls, which would answer for it otherwise."""
 
 
-def posterior_alone(
-    posterior: str | Path, model: str, calibration: str | Path | None, *, calibrated: bool
-) -> PosteriorFile:
-    """A posterior, read for the model that is asked for; it stands in place of every other calibration."""
-    if calibration is not None or not calibrated:
-        raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-    return read_posterior(posterior, *([] if model == AUTO else [model]))
-
-
-def check_calibrated(calibration: str | Path | None, *, calibrated: bool) -> None:
-    """Refuse a calibration file where calibration factors are not wanted.
-
-    Args:
-        calibration: calibration file; None without one.
-        calibrated: whether calibration factors are wanted.
-    """
-    if calibration is not None and not calibrated:
-        raise InputError("calibration together with no-calibration (calibrated = False); allowed: one of them")
-
-
 def choose_model(
     asked: str,
     robot: Robot,
     *,
     placement: Placement | None = None,
-    calibration: str | Path | None = None,
-    posterior: PosteriorFile | None = None,
+    fit: Fit = NO_FIT,
     tables_only: bool = False,
     motion: str = "held",
     among: bool = False,
@@ -82,15 +59,14 @@ def choose_model(
         asked: name of a model, or `auto`.
         robot: the robot.
         placement: where it lies in its channel, which only a model with walls can answer for.
-        calibration: calibration file whose values are used; None without one.
-        posterior: posterior whose values are used; None without one.
+        fit: fitted values that are used.
         tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
         motion: `held` or `free`, for which a table needs yawed poses.
         among: the robot is one of several that are compared.
     """
     if asked != AUTO:
         return ModelChoice(find_swimmer_model(asked, AUTO).name)
-    fitted = _fitted_choice(calibration, posterior)
+    fitted = _fitted_choice(fit)
     if fitted is not None:
         return fitted
     if robot.channel is None:
@@ -136,19 +112,8 @@ def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:
     return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0]), stage) is not None
 
 
-def fitted_models(calibration: str | Path | None, posterior: PosteriorFile | None) -> list[str]:
-    """Models with which a posterior or a calibration file was fitted; none where neither names one."""
-    if posterior is not None:
-        return [posterior.model]
-    if calibration is None:
-        return []
-    file = read_calibration(calibration)
-    return [file.provenance.model] if file.provenance.model else list(file.calibration)
-
-
-def _fitted_choice(calibration: str | Path | None, posterior: PosteriorFile | None) -> ModelChoice | None:
-    names = fitted_models(calibration, posterior)
-    source = calibration if posterior is None else posterior.source
+def _fitted_choice(fit: Fit) -> ModelChoice | None:
+    names = fit.models
     if len(names) > 1:
-        raise InputError(f"{source} holds factors for models {', '.join(names)}; allowed: --model with one of them")
-    return ModelChoice(names[0], f"{source} was fitted with it", fitted=True) if names else None
+        raise InputError(f"{fit.name} holds factors for models {', '.join(names)}; allowed: --model with one of them")
+    return ModelChoice(names[0], f"{fit.name} was fitted with it", fitted=True) if names else None

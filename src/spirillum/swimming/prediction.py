@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit_notes import Fitted, fitted_of, friction_acts
+from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
@@ -22,7 +22,6 @@ from spirillum.fluid.tube.progress_messages import TILTED
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -33,20 +32,15 @@ from spirillum.swimming.cautions import (
     calibration_warnings,
     no_band_warnings,
 )
-from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
+from spirillum.swimming.discrepancy import PosteriorFor
 from spirillum.swimming.drive_warnings import drive_warnings
-from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
+from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.robot_preparation import prepared
-from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_error
+from spirillum.swimming.scenario import Scenario, resolve_scenario
 from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.steady_state import SteadyState
-from spirillum.units import KINDS, parse_option, show
-
-__all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
+from spirillum.units import show
 
 
 @dataclass(frozen=True, repr=False)
@@ -206,15 +200,14 @@ _MORE = {
 }
 
 
-def predict(  # noqa: PLR0913 - the options of the command
+def predict(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str = AUTO,
+    model: str | ModelChoice = AUTO,
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = True,
-    calibration: str | Path | None = None,
-    posterior: str | Path | None = None,
+    fit: Fit = NO_FIT,
     posterior_for: str = "new",
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
@@ -231,15 +224,14 @@ def predict(  # noqa: PLR0913 - the options of the command
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         model: `sbt`, `rft`, `slender`, `tube`, or `auto`: what the posterior or the calibration was fitted with, else
-            `tube` for a robot in a channel and `slender` for one without.
+            `tube` for a robot in a channel and `slender` for one without; or a choice that was made.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
             the effective friction from (18).
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
-        calibration: calibration file whose factors replace the robot's.
-        posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
-            95 % interval, the model's discrepancy included.
+        fit: fitted values that replace the robot's; with a posterior these are its medians, and every quantity has a
+            95 % interval, the model discrepancy included.
         posterior_for: whose discrepancy the intervals hold: `new`, a tail like those that were fitted, or `measured`, a
             robot that was, of which the values are then the middle of what is known of it.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
@@ -252,32 +244,33 @@ def predict(  # noqa: PLR0913 - the options of the command
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.
     """
-    drawn, given = None, Placement.of(placement)
-    where = given
-    robot = load(robot)
-    names_friction = robot.friction.effective is not None
-    if posterior is not None:
-        drawn = posterior_alone(posterior, model, calibration, calibrated=calibrated)
-        robot = drawn.central(robot)
-        where = drawn.placed(robot, given)
-    choice = choose_model(model, robot, placement=where, calibration=calibration, posterior=drawn, motion=motion)
-    if band:
-        _check_band(choice.model)
-    ready, chosen, batch = prepared(
-        robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
+    scenario = resolve_scenario(
+        robot,
+        model=model,
+        tail_rate=tail_rate,
+        friction=friction,
+        calibrated=calibrated,
+        fit=fit,
+        posterior_for=posterior_for,
+        resolution=resolution,
+        placement=placement,
+        motion=motion,
     )
-    reading = friction_reading(ready.friction.reading if friction is None else friction)
-    rate, fitted = _rate(tail_rate, batch.placement), fitted_of(calibration, drawn)
-    case = _Case(ready, chosen, batch, reading, rate, calibrated, motion, fitted)
-    if rate is None and ready.drive is None:
-        raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
-    whose = posterior_for_of(posterior_for, drawn, ready)
+    if band:
+        _check_band(scenario.choice.model)
+    ready, chosen, batch, drawn = scenario.robot, scenario.model, scenario.batch, scenario.fit.posterior
     intervals, torque = None, []
     if drawn is not None:
         from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque  # loads compiled loops
 
         intervals = intervals_of(
-            ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
+            ready,
+            chosen,
+            drawn,
+            tail_rate=scenario.tail_rate,
+            friction=scenario.friction,
+            posterior_for=scenario.posterior_for,
+            placement=scenario.placement,
         )
         if not knows_torque(ready, chosen):
             intervals, torque = without_torque(intervals), [_NO_TORQUE]
@@ -285,30 +278,30 @@ def predict(  # noqa: PLR0913 - the options of the command
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
         tell(TILTED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
-    checks = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
-    result = case.swim(batch)
+    checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
+    result = scenario.swim(batch)
     if not result.valid[0]:
-        raise InputError(case.why_not(result))
+        raise InputError(scenario.why_not(result))
     warnings = [
         *ready.warnings,
-        *([choice.caution] if choice.caution else []),
-        *case.warnings(result, names_friction=names_friction),
+        *([scenario.choice.caution] if scenario.choice.caution else []),
+        *_case_warnings(scenario, result),
     ]
-    error = case.error_estimate(result, checks)
+    error = scenario.error_estimate(result, checks)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
-    over = band_of(batch, chosen, result, case.swim, tell) if with_band else None
+    over = band_of(batch, chosen, result, scenario.swim, tell) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
-    if intervals is not None and whose == "measured":
+    if intervals is not None and scenario.posterior_for == "measured":
         result = with_middles(result, intervals)
-    acts = friction_acts(reading, rate)
-    idle = [] if drawn is None or over is None else fitted.outside_warnings(ready, chosen, drawn, friction=acts)
+    acts = friction_acts(scenario.friction, scenario.tail_rate)
+    idle = [] if over is None else fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
         intervals = None
-    warnings += idle or [*case.fitted_warnings(), *torque]
+    warnings += idle or [*fit.answer_warnings(ready, chosen, scenario.friction, scenario.tail_rate), *torque]
     return Prediction(
         robot=ready,
         model=chosen,
-        friction=reading,
+        friction=scenario.friction,
         calibrated=calibrated and chosen.name in ready.calibration,
         batch=batch,
         swimming=result,
@@ -317,101 +310,25 @@ def predict(  # noqa: PLR0913 - the options of the command
         intervals=intervals,
         band=over,
         motion=motion_of(motion),
-        interval_of="" if idle else interval_statement(drawn, ready, whose),
-        choice=choice,
-        tail_rate=rate,
-        fitted_by="" if idle else fitted.source_of(ready, chosen, friction=acts),
+        interval_of="" if idle else interval_statement(drawn, ready, scenario.posterior_for),
+        choice=scenario.choice,
+        tail_rate=scenario.tail_rate,
+        fitted_by="" if idle else fit.source_of(ready, chosen, friction=acts),
     )
 
 
-@dataclass(frozen=True)
-class _Case:
-    """A robot in its place, its model, and all else that its steady motion follows from."""
-
-    robot: Robot
-    model: SwimmerModel
-    batch: RobotBatch
-    friction: FrictionReading
-    rate: float | None
-    """Rate of the tail, rad/s; None: the robot's drive."""
-    calibrated: bool
-    motion: str
-    fitted: Fitted
-
-    def swim(self, batch: RobotBatch, model: SwimmerModel | None = None) -> Swimming:
-        """Steady swimming of the robot in some places, by its model or by another."""
-        model = model or self.model
-        return swim_on_floor(
-            batch,
-            model,
-            [self.robot],
-            self.fitted.dry_friction(model),
-            tail_rate=None if self.rate is None else np.array([self.rate]),
-            friction=self.friction,
-            calibrated=self.calibrated,
-            motion=self.motion,
-        )
-
-    def checked(self) -> list[Swimming]:
-        """Steady swimming at other resolutions, which tell the error; none where the model is checked by none."""
-        return [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
-
-    def error_estimate(self, result: Swimming, checks: Sequence[Swimming]) -> float:
-        """Relative error of the forward velocity: the sum of what is known of it, see `SwimmerModel.checked_by`.
-
-        NaN for a model in closed form, and where inertia rules.
-        """
-        found = self.model.stated_speed_error(self.batch)
-        if checks:
-            speeds = [one.forward_velocity for one in (result, *checks)]
-            found = float(speed_error(speeds, self.model.unchecked_error(self.batch))[0])
-        return in_stokes_flow(found, *reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number))
-
-    def warnings(self, result: Swimming, *, names_friction: bool) -> list[Note]:
-        """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
-
-        Args:
-            result: the answer.
-            names_friction: whether the robot's user has set its effective friction.
-        """
-        known = self.robot if names_friction or not self.rate else _without_fitted_friction(self.robot)
-        return [
-            *(calibration_warnings(self.robot, self.model.name) if self.calibrated else ()),
-            *(limit.caution() for limit in broken(accuracy_limits(self.batch, self.model, result))),
-            *drive_warnings(known, self.model, self.friction, result, self.rate),
-            *_free_warnings(self.robot, self.motion),
-            *([_IN_A_FLOW] if self.batch.placement.flow else []),
-            *([_NO_WEIGHT] if self.model.placed and not self.has_weight_or_place() else []),
-        ]
-
-    def has_weight_or_place(self) -> bool:
-        """Whether it is known that the robot's weight keeps it on the floor, or where else it is."""
-        place = self.batch.placement
-        known = self.robot.body.mass is not None and self.robot.tail.density is not None
-        return known or place.gap is not None or place.eccentricity is not None
-
-    def fitted_warnings(self) -> list[Note]:
-        """What to be careful about in what was fitted."""
-        return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
-
-    def why_not(self, result: Swimming) -> str:
-        """Why there is no steady motion."""
-        limits = reynolds_limits(self.batch, result.reynolds_number, result.tail_reynolds_number)
-        if problem := stokes_flow_problem(self.batch, limits):
-            return problem
-        if self.rate is not None:
-            paper = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x"
-            return (
-                f"tail-rate = {self.rate:.4g} rad/s: motor and battery have no steady state there; allowed: a rate at "
-                f"which (17) has a root with a positive battery voltage{paper if self.friction == 'paper' else ''}"
-            )
-        if self.friction == "paper":
-            limit = calibrated_balance(self.batch, self.model, calibrated=self.calibrated).bb[0]
-            return (
-                f"friction.effective = {self.batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
-                f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
-            )
-        return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
+def _case_warnings(scenario: Scenario, result: Swimming) -> list[Note]:
+    """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out."""
+    robot, model, batch, rate = scenario.robot, scenario.model, scenario.batch, scenario.tail_rate
+    known = robot if scenario.names_friction or not rate else _without_fitted_friction(robot)
+    return [
+        *(calibration_warnings(robot, model.name) if scenario.calibrated else ()),
+        *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
+        *drive_warnings(known, model, scenario.friction, result, rate),
+        *_free_warnings(robot, scenario.motion),
+        *([_IN_A_FLOW] if batch.placement.flow else []),
+        *([_NO_WEIGHT] if model.placed and not scenario.has_weight_or_place() else []),
+    ]
 
 
 def free_in_tube(fitted_by: str) -> str:
@@ -450,15 +367,6 @@ def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Pos
 def _without_fitted_friction(robot: Robot) -> Robot:
     """The robot as its user knows it: nobody set the B_eff that a calibration brought."""
     return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
-
-
-def _rate(value: str | float | None, placement: Placement) -> float | None:
-    if value is None:
-        return None
-    rate = parse_option("tail-rate", value, KINDS["rate"])
-    if rate == 0 and not placement.flow:
-        raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
-    return rate
 
 
 def _check_band(model: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_placement, with_calibration
+from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
@@ -31,7 +31,7 @@ def prepared(
     robot: str | Path | Mapping[str, Any] | Robot,
     model: str,
     *,
-    calibration: str | Path | None = None,
+    fit: Fit = NO_FIT,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
@@ -40,34 +40,31 @@ def prepared(
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         model: name of a hydrodynamic model.
-        calibration: calibration file whose factors replace the robot's.
+        fit: fitted values that replace the robot's, and its placement where none is given.
         resolution: of the models `slender` and `tube`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls.
     """
-    ready = load(robot)
-    if calibration is not None:
-        ready = with_calibration(ready, calibration)
-        if not placement and find_swimmer_model(model).placed:
-            placement = calibrated_placement(ready, calibration)
+    ready, chosen = load(robot), find_swimmer_model(model)
+    if fit.posterior is None:  # the median of a posterior stands in the robot already
+        ready = fit.central(ready)
+    if not placement and chosen.placed:
+        placement = fit.calibrated_placement(ready)
     ready = with_resolution(ready, resolution, model)
-    chosen = find_swimmer_model(model)
-    placed = Placement.of(placement)
-    known = RobotBatch.of(ready, placed)
-    if np.all(all_hold(assembly_limits(known))):  # a table reaches closer to the wall than a direct solution
-        chosen = quickest(chosen, known)
-    return ready, chosen, checked_batch(ready, chosen, placed)
+    batch = RobotBatch.of(ready, Placement.of(placement))
+    if np.all(all_hold(assembly_limits(batch))):  # a table reaches closer to the wall than a direct solution
+        chosen = quickest(chosen, batch)
+    check_domain(ready, chosen, batch)
+    return ready, chosen, batch
 
 
-def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:
-    """The robot in its place, as a batch of one."""
-    batch = RobotBatch.of(robot, placement)
+def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
+    """Refuse a robot in its place, a batch of one, outside a model's domain."""
     check_placement(batch.placement, model)
     outside = broken(requirements(batch, quickest(model, batch)))
     if outside:
         raise InputError(
             f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_what_helps(batch, model, outside)}"
         )
-    return batch
 
 
 def _what_helps(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str:

@@ -1,4 +1,4 @@
-"""What has to be said where fitted numbers are used: whose B_eff it is, under which reading, and on what it rests."""
+"""The fit of a calibration: values and draws of its file, how they act on a robot, and the notes on them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
+from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedContact,
     FittedFriction,
     FittedValues,
+    calibrated_robot,
     friction_of_tails,
     placement_in,
     read_calibration,
 )
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.model import SwimmerModel
 from spirillum.notes import Note
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import show
 
@@ -40,19 +43,19 @@ CALIBRATED_HELD = Note(
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """What a calibration file or a posterior says of its friction and its origin."""
+class Fit:
+    """A calibration file or a posterior, read once; without either, a fit of nothing."""
 
     friction: tuple[FittedFriction, ...] = ()
     """B_eff, tail by tail."""
     reading: str = ""
-    """Reading of the friction under which it was inferred."""
+    """Friction model with which it was inferred."""
     synthetic: str = ""
     """Name of the observations, if they say that they are synthetic."""
     model: str = ""
     """Model whose torque B_eff was inferred with."""
-    drawn: bool = False
-    """Whether it is a posterior, so that answers have intervals."""
+    posterior: PosteriorFile | None = None
+    """The posterior, whose draws give answers intervals; None without one."""
     file: CalibrationFile | None = None
     """The calibration file; None without one."""
     name: str = ""
@@ -61,6 +64,33 @@ class Fitted:
     """Diameters of the channels in which it was fitted, m; none where the file does not say."""
     friction_coefficient: float | None = None
     """Coefficient of dry friction under a robot that was fitted; None: none was."""
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Models that were fitted; none where the file names none."""
+        if self.file is None or self.model:
+            return (self.model,) if self.model else ()
+        return tuple(self.file.calibration)
+
+    def central(self, robot: Robot) -> Robot:
+        """Return the robot with the fitted values, of a posterior its median, in place of its own."""
+        if self.posterior is not None:
+            return self.posterior.central(robot)
+        return robot if self.file is None else calibrated_robot(robot, self.file)
+
+    def contact(self, draw: int | None = None) -> FittedContact:
+        """Return the fitted roughness and dry friction, of a draw or of the posterior median."""
+        if self.posterior is not None:
+            return self.posterior.contact(draw)
+        return FittedContact() if self.file is None else self.file.contact
+
+    def placed(self, robot: Robot, placement: Placement, draw: int | None = None) -> Placement:
+        """Return a placement whose open fields are those of a posterior's draw, or of its median."""
+        return placement if self.posterior is None else self.posterior.placed(robot, placement, draw)
+
+    def calibrated_placement(self, robot: Robot) -> Placement | None:
+        """Return the placement of a calibration file for the robot's channel; None where it has none."""
+        return None if self.file is None else placement_in(self.file, robot)
 
     def dry_friction(self, model: SwimmerModel) -> float | None:
         """Coefficient of dry friction under a robot with a model: only one that places it knows of any."""
@@ -106,11 +136,9 @@ class Fitted:
         which = "this robot" if len(robots) == 1 else "these robots"
         return f"the channel of {which} (it was fitted in {fitted})"
 
-    def outside_warnings(
-        self, robot: Robot, model: SwimmerModel, posterior: PosteriorFile, *, friction: bool = True
-    ) -> list[Note]:
+    def outside_warnings(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> list[Note]:
         """Whether draws of a posterior leave a robot's answer as it is without them."""
-        if posterior.acts_on(robot, walls=model.placed, friction=friction):
+        if self.posterior is None or self.posterior.acts_on(robot, walls=model.placed, friction=friction):
             return []
         whom = self._not_for([robot], model)
         words = f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over poses are used"
@@ -198,7 +226,7 @@ class Fitted:
         sentences = []
         if unknown:
             words = f"B_eff of {unknown} of {len(robots)} tails was not fitted: the median of the fitted tails is used"
-            words += ", and intervals include their spread" if self.drawn else ""
+            words += ", and intervals include their spread" if self.posterior else ""
             sentences.append(Note("friction-not-fitted", words, ("friction.effective",)))
         if zero:
             words = f"the calibrated B_eff of {zero} of {len(robots)} tails is negative: zero is used"
@@ -216,39 +244,59 @@ def friction_acts(reading: str, rate: float | None) -> bool:
     return rate is None or reading == "body"
 
 
-def fitted_of(
-    calibration: str | Path | CalibrationFile | None, posterior: PosteriorFile | None, name: str = ""
-) -> Fitted:
-    """What the file that is used says.
+NO_FIT = Fit()
+"""The fit of nothing: a robot keeps its own values."""
+
+
+def read_fit(
+    calibration: str | Path | Fit | None = None,
+    posterior: str | Path | None = None,
+    *models: str,
+    calibrated: bool = True,
+) -> Fit:
+    """Read a calibration file or a posterior, once for a request.
 
     Args:
-        calibration: calibration file; None without one.
-        posterior: posterior; None without one.
-        name: name of the calibration file, where it was read before.
+        calibration: calibration file, or the fit that was read from it; None without one.
+        posterior: file of a posterior, which replaces every other calibration; None without one.
+        models: models of which the posterior may be; none: of any.
+        calibrated: whether the robot's calibration factors are applied.
     """
     if posterior is not None:
-        source = posterior.observations if posterior.synthetic else ""
-        rubbing = posterior.middle.get("friction_coefficient")
-        return Fitted(
-            posterior.frictions,
-            posterior.friction_reading,
-            source,
-            posterior.model,
-            drawn=True,
-            name=posterior.source,
-            friction_coefficient=None if rubbing is None else float(rubbing[0]),
-            channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
-        )
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        return fit_of_posterior(read_posterior(posterior, *models))
     if calibration is None:
-        return Fitted()
-    file = calibration if isinstance(calibration, CalibrationFile) else read_calibration(calibration)
+        return NO_FIT
+    if not calibrated:
+        raise InputError("calibration together with no-calibration (calibrated = False); allowed: one of them")
+    if isinstance(calibration, Fit):
+        return calibration
+    file = read_calibration(calibration)
     provenance = file.provenance
-    synthetic = (provenance.observations or "the calibration") if provenance.synthetic else ""
-    said = name or ("" if isinstance(calibration, CalibrationFile) else str(calibration))
-    reading, model = provenance.friction_reading, provenance.model
-    dry = file.contact.friction_coefficient
     places = {place.channel_diameter for place in file.placement} | {tail.channel_diameter for tail in file.friction}
-    channels = tuple(sorted(places))
-    return Fitted(
-        file.friction, reading, synthetic, model, file=file, name=said, channels=channels, friction_coefficient=dry
+    return Fit(
+        friction=file.friction,
+        reading=provenance.friction_reading,
+        synthetic=(provenance.observations or "the calibration") if provenance.synthetic else "",
+        model=provenance.model,
+        file=file,
+        name=str(calibration),
+        channels=tuple(sorted(places)),
+        friction_coefficient=file.contact.friction_coefficient,
+    )
+
+
+def fit_of_posterior(posterior: PosteriorFile) -> Fit:
+    """Return the fit whose draws are those of a posterior."""
+    coefficient = posterior.middle.get("friction_coefficient")
+    return Fit(
+        friction=posterior.frictions,
+        reading=posterior.friction_reading,
+        synthetic=posterior.observations if posterior.synthetic else "",
+        model=posterior.model,
+        posterior=posterior,
+        name=posterior.source,
+        channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
+        friction_coefficient=None if coefficient is None else float(coefficient[0]),
     )
