@@ -144,10 +144,11 @@ def _between_samples(trajectory: TrialTrajectory) -> tuple[Note, ...]:
     step = float(np.abs(np.diff(trajectory.tail_phase)).max())
     if step <= _LARGEST_STEP:
         return ()
-    return (
-        f"the tail turns by up to {np.degrees(step):.3g} deg from one sample of the run to the next: the film shows "
-        "what is interpolated between them, without what happens within a turn",
+    words = (
+        f"the tail turns by up to {np.degrees(step):.3g} deg between samples of the run: the video shows interpolated "
+        "poses; use more samples_per_turn"
     )
+    return (Note("drawn-otherwise", words, ("timing.samples_per_turn",)),)
 
 
 def _clearance(robot: Robot) -> float:
