@@ -12,12 +12,12 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.model import SwimmerModel
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model

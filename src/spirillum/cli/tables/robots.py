@@ -101,7 +101,8 @@ def preparation(answer: Answer) -> Blocks:
     rows = grid(f"{answer['robot']}: error of its table", "quantity", "largest error without yaw, %", "with yaw, %")
     for name, item in answer["error"].items():
         level = answer["error_without_yaw"][name]
-        rows.add_row(name.replace("_", " "), f"{100.0 * level['value']:.2g}", f"{100.0 * item['value']:.2g}")
+        yawed = "no yaw" if answer["stage"] == "straight" else f"{100.0 * item['value']:.2g}"
+        rows.add_row(name.replace("_", " "), f"{100.0 * level['value']:.2g}", yawed)
     yield rows
     valid = answer["valid"]
     ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")
