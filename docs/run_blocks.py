@@ -117,6 +117,12 @@ class _Session(doctest.DocTestRunner):
         super().report_failure(out, test, example, got)
 
 
+def _without_stack(output: str) -> str:
+    """Output without the stack of an exception, which names files of this machine."""
+    before, mark, stack = output.partition("Traceback (most recent call last):\n")
+    return f"{before}{mark}{stack.rstrip().splitlines()[-1]}\n" if mark else output
+
+
 def run_session(block: str, names: dict[str, Any], page: Path, problems: list[str]) -> str:
     """Run a pycon block as a doctest in the page's names; return it with its outputs renewed."""
     parser, session, report = doctest.DocTestParser(), _Session(), io.StringIO()
@@ -132,7 +138,7 @@ def run_session(block: str, names: dict[str, Any], page: Path, problems: list[st
             continue
         first, *more = piece.source.splitlines()
         output = piece.want if "..." in piece.want else session.got.get(piece.lineno, piece.want)
-        lines = [line or "<BLANKLINE>" for line in output.splitlines()]
+        lines = [line or "<BLANKLINE>" for line in _without_stack(output).splitlines()]
         renewed += [f"{line}\n" for line in (f">>> {first}", *(f"... {line}".rstrip() for line in more), *lines)]
     return "".join(renewed)
 
