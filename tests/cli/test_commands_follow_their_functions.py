@@ -6,22 +6,22 @@ import inspect
 import pytest
 
 from spirillum.cli.app import app, command_line
-from spirillum.cli.function_command import Source, declarations
+from spirillum.cli.function_command import FunctionSource, declarations
 from spirillum.robot.arguments import Options
 
-SOURCES: dict[str, Source] = {
+SOURCES: dict[str, FunctionSource] = {
     str(info.callback.__name__).replace("_", "-"): info.callback.source  # type: ignore[union-attr]
     for info in app.registered_commands
     if hasattr(info.callback, "source")
 }
 
 
-def function_of(source: Source) -> object:
+def function_of(source: FunctionSource) -> object:
     module, _, name = source.target.partition(":")
     return inspect.unwrap(getattr(importlib.import_module(module), name))
 
 
-def excepted(source: Source) -> set[str]:
+def excepted(source: FunctionSource) -> set[str]:
     """Arguments and fields that the exceptions of a command name, by a path or by a whole table."""
     return {
         item.path

@@ -35,12 +35,13 @@ def test_the_table_shows_numbers_differences_and_errors(run: Callable[..., Any],
     outcome = run("compare-models", WIDE, *TWO, "--tail-rate", "1.2Hz")
     found = sp.compare_models(WIDE, models=["sbt", "rft"], tail_rate="1.2 Hz")
     everything = run("compare-models", WIDE, *TWO, "--tail-rate", "1.2Hz", "--all")
+    noted = run("compare-models", WIDE, *TWO, "--tail-rate", "1.2Hz", "--notes")
     (row,) = [line for line in everything.out.splitlines() if line.startswith(" forward velocity, mm/s")]
     for answer in found.predictions.values():
         (own,) = [line for line in outcome.out.splitlines() if line.startswith(f" {answer.model.name} ")]
         assert f"{1e3 * answer.forward_velocity:.4g}" in row
         assert f"{1e3 * answer.forward_velocity:.4g}" in own
-        assert f"known error of {answer.model.name}: " in outcome.out
+        assert f"known error of {answer.model.name}: " in noted.out
     assert f"{100 * found.relative_difference('rft', 'forward_velocity'):+.1f}%" in own
     assert "against sbt" in everything.out
     tables = [line for line in (everything.out + outcome.out).splitlines() if "│" in line or "┃" in line]

@@ -153,6 +153,7 @@ GRANTED = {
     "--no-calibration": "asks for none where the robot has none for this model",
     "--all": "is of the tables: JSON holds all quantities",
     "--json": "is of the form",
+    "--notes": "is of the form",
     "--workers": "changes the time alone",
     "--live": "changes the pace alone",
 }

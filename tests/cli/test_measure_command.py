@@ -61,7 +61,8 @@ def test_two_readings_are_shown_without_interval_and_with_the_reason(run: Run, t
     outcome = run("measure", "a.mp4", *common, "-o", str(tmp_path / "out"))
     assert outcome.code == 0
     assert "95 % interval" not in outcome.out
-    assert "no interval of forward velocity, body rotation rate, tail rotation rate" in outcome.out.replace("\n", " ")
+    noted = run("measure", "a.mp4", *common, "--notes", "-o", str(tmp_path / "noted"))
+    assert "no interval of forward velocity, body rotation rate, tail rotation rate" in noted.out.replace("\n", " ")
 
 
 def test_feasibility_says_yes_and_no(run: Run, setup_file: str) -> None:

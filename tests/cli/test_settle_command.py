@@ -29,7 +29,7 @@ def settled_once(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("settled_once")
 def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -> None:
     picture = tmp_path / "settling.png"
-    tables = run("settle", WIDE, *QUICK, "-o", str(picture), "--until", "0.2mm")
+    tables = run("settle", WIDE, *QUICK, "-o", str(picture), "--until", "0.2mm", "--notes")
     assert tables.code == 0
     assert picture.stat().st_size > 10_000
     outcome = run("settle", WIDE, *QUICK, "--until", "0.2mm", "--json")

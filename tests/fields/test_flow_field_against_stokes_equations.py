@@ -278,7 +278,7 @@ def test_point_inside(moving: FlowField, point: list[float], part: str) -> None:
             ask(np.array([*free, point]))
         text = str(caught.value)
         assert "point 1 = (" in text
-        assert f"mm lies inside the {part}; allowed: points in the fluid" in text
+        assert f"mm is inside the {part}; allowed: points in the fluid" in text
 
 
 def test_point_inside_the_tail_turns_with_it(moving: FlowField) -> None:
@@ -287,7 +287,7 @@ def test_point_inside_the_tail_turns_with_it(moving: FlowField) -> None:
     assert np.all(moving.part_at(circles.reshape(-1, 3)) == "tail")
     outer, _ = around_the_wire(moving, 0.52e-3)
     assert not np.any(moving.inside(outer.reshape(-1, 3)))
-    with pytest.raises(InputError, match="lies inside the tail"):
+    with pytest.raises(InputError, match="is inside the tail"):
         moving.velocity(centres[:1])
     assert not np.all(moving.inside(centres * [1.0, -1.0, 1.0]))
 

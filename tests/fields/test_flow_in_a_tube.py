@@ -69,7 +69,7 @@ def test_planes_beside_the_tube_are_refused(robot: sp.Robot, plane: str, middle:
     for side in (-1.0, 1.0):
         plane_around(robot, plane, f"{middle + side * 19.99} mm", resolution=8, seat=seat)
         beyond = f"{middle + side * 20.01:g} mm"
-        with pytest.raises(sp.InputError, match=f"offset = {beyond} with plane = '{plane}': the plane lies outside"):
+        with pytest.raises(sp.InputError, match=f"offset = {beyond} with plane = '{plane}': the plane is outside"):
             plane_around(robot, plane, beyond, resolution=8, seat=seat)
 
 

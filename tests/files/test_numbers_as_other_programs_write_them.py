@@ -100,7 +100,7 @@ def test_columns_of_notes_are_free_and_named(tmp_path: Path) -> None:
         lines = [f"{head},{name},", *(f'{row},"first, run; 1,5",' for row in rows)]
         (tmp_path / "o.csv").write_text("\n".join(lines) + "\n")
         (warning,) = observations_answer(tmp_path / "o.csv")["warnings"]
-        assert warning == f"column {name or '(without a name)'}: not read, taken as notes"
+        assert warning == f"column {name or '(without a name)'}: not read, treated as comments"
         assert warning in read_experiment(tmp_path / "o.csv", [load("biorob2012-wide")]).doubts
     for name in ("tail_rate", "speed_mm_s", "Body rate", "forward_velocity_mm_s_ci", "amplitude"):
         (tmp_path / "o.csv").write_text("\n".join([f"{head},{name}", *(f"{row},1" for row in rows)]) + "\n")

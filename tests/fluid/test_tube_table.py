@@ -252,7 +252,7 @@ def test_yawed_places_keep_the_tail_off_the_glass(geometry: RobotGeometry, radiu
 
 
 def test_a_tail_much_wider_than_its_body_has_no_table(geometry: RobotGeometry) -> None:
-    with pytest.raises(sp.InputError, match="keeps the body far from the glass"):
+    with pytest.raises(sp.InputError, match="keeps the body far from the wall"):
         _ = Places(geometry._replace(amplitude=0.015), R).gaps
     assert Places(geometry._replace(amplitude=0.0095), R).gaps[0] > 0.1
 

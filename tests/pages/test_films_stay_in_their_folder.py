@@ -57,7 +57,7 @@ def test_films_on_their_way_count_with_all_their_bytes(
     coming.unlink()
     bench.films.room_for("mp4", 400)
     monkeypatch.setattr(films_module, "_LARGEST_FILM", 100)
-    with pytest.raises(TooLargeError, match="GB a film"):
+    with pytest.raises(TooLargeError, match="GB per video"):
         bench.films.room_for("mp4", 101)
 
 
@@ -120,7 +120,7 @@ def test_wrong_numbers_get_a_sentence_with_their_field(bench: MeasurementSession
     problems = bench.desk.checked()["problems"]
     assert any(one.startswith("tank.index") for one in problems)
     assert any(one.startswith("robot.axis_height") for one in problems)
-    with pytest.raises(InputError, match="no film"):
+    with pytest.raises(InputError, match="no video"):
         bench.measure()
 
 
@@ -137,7 +137,7 @@ def test_places_are_counted_when_they_are_given(bench: MeasurementSession, monke
     bench.films.room_for("mp4", 1).unlink()
     bench.films.room_for("mp4", 1)
     bench.films.room_for("mp4", 1)
-    with pytest.raises(TooLargeError, match="2 films are here already"):
+    with pytest.raises(TooLargeError, match="2 videos are uploaded already"):
         bench.films.room_for("mp4", 1)
 
 

@@ -97,11 +97,11 @@ def test_interrupted_band_resumes_where_it_stopped(
     done: list[int] = []
     original = BandTask.answer
 
-    def counted(task: Any, readings: Any) -> Any:
+    def counted(task: Any, loaded: Any, observed: Any) -> Any:
         if len(done) == 3:
             raise KeyboardInterrupt
         done.append(task.number)
-        return original(task, readings)
+        return original(task, loaded, observed)
 
     monkeypatch.setattr(BandTask, "answer", counted)
     with pytest.raises(KeyboardInterrupt):

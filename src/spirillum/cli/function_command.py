@@ -86,7 +86,7 @@ class Declaration(NamedTuple):
         return set(re.findall(r"\w+", self.annotation))
 
 
-class Source(NamedTuple):
+class FunctionSource(NamedTuple):
     """What a command is made from."""
 
     body: Callable[..., None]
@@ -102,7 +102,7 @@ class Source(NamedTuple):
 class Request:
     """A call of the public function of a command, with the arguments that were typed."""
 
-    source: Source
+    source: FunctionSource
     typed: dict[str, Any]
     """Argument or `argument.field` to its value; what was not typed is left out."""
     named_robot: str | None = None
@@ -161,7 +161,7 @@ def from_function(
         def stub() -> None: ...
 
         stub.__name__, stub.__doc__ = body.__name__, body.__doc__
-        stub.source = Source(body, target, without or {}, {**COMPLETIONS, **(complete or {})}, robot)  # type: ignore[attr-defined]
+        stub.source = FunctionSource(body, target, without or {}, {**COMPLETIONS, **(complete or {})}, robot)  # type: ignore[attr-defined]
         return stub
 
     return decorate
@@ -195,7 +195,7 @@ class FunctionCommand(TyperCommand):
         """There are none yet."""
 
 
-def _complete(source: Source) -> Callable[..., None]:
+def _complete(source: FunctionSource) -> Callable[..., None]:
     """The command with all its parameters."""
     own = dict(list(inspect.signature(source.body).parameters.items())[1:])
     hints = get_type_hints(source.body, include_extras=True)

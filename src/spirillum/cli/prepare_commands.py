@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -20,7 +20,7 @@ def prepare(
         typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
     ] = None,
     stage: Annotated[
-        Literal["straight", "yaw", "fine"],
+        str,
         typer.Option(help="straight (constrained motion), yaw (motion after release too) or fine (for publication)."),
     ] = "yaw",
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,

@@ -120,7 +120,7 @@ def unread_columns(table: Table) -> tuple[Note, ...]:
     if not names:
         return ()
     shown = ", ".join(name[:40] for name in names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
-    words = f"column{'' if len(names) == 1 else 's'} {shown}: not read, taken as remarks of yours"
+    words = f"column{'' if len(names) == 1 else 's'} {shown}: not read, treated as comments"
     return (Note("input-unused", words, names),)
 
 

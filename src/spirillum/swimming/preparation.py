@@ -17,7 +17,7 @@ from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
 from spirillum.fluid.tube.nodes import Places
-from spirillum.fluid.tube.stages import STAGES, StageName
+from spirillum.fluid.tube.stages import STAGES, stage_of
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.table_errors import RESPONSES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -105,7 +105,7 @@ Source = str | Path | Mapping[str, Any] | Robot
 def prepare(
     robot: Source,
     *,
-    stage: StageName = "yaw",
+    stage: str = "yaw",
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prepared:
@@ -131,7 +131,7 @@ def prepare(
 def prepare_all(
     robots: Sequence[Source],
     *,
-    stage: StageName = "yaw",
+    stage: str = "yaw",
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[Prepared, ...]:
@@ -152,14 +152,13 @@ def prepare_all(
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
-    if stage not in STAGES:
-        raise InputError(f"stage = {str(stage)[:40]!r}; allowed: {', '.join(STAGES)}")
+    chosen = stage_of(stage)
     loaded = [load(robot) for robot in robots]
     asked = [_checked(robot, several=len(loaded) > 1) for robot in loaded]
-    new = {key_of(*robot) for robot in asked if find_table(*robot, stage) is None}
+    new = {key_of(*robot) for robot in asked if find_table(*robot, chosen) is None}
     if new:
         check_cache_folder()
-    tables = prepared_tables(asked, stage=stage, workers=workers, progress=progress)
+    tables = prepared_tables(asked, stage=chosen, workers=workers, progress=progress)
     return tuple(
         Prepared(robot, table, kept=tables_are_kept() or table.key not in new)
         for robot, table in zip(loaded, tables, strict=True)

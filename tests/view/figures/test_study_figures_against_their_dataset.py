@@ -99,8 +99,8 @@ def test_legend_tells_models_and_bounds_apart(fig5: Any) -> None:
 @pytest.mark.usefixtures("unplaced")
 def test_figure_says_that_nothing_is_measured(paper_study: Any) -> None:
     for picture in figures_of(paper_study.isel(wavelength=[3])).values():
-        assert "nothing in this figure is measured" in picture.caption
-        assert any("nothing in this figure is measured" in text for text in texts(picture.figure()))
+        assert "this figure contains no measured data" in picture.caption
+        assert any("this figure contains no measured data" in text for text in texts(picture.figure()))
 
 
 @pytest.mark.parametrize("model", ["sbt", "rft"])

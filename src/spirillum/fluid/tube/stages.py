@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.tube.solids import Fineness
 
 StageName = Literal["straight", "yaw", "fine"]
@@ -97,3 +98,15 @@ FINE = Stage(
 )
 STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW, FINE)}
 """From the coarsest to the finest: each answers what those before it answer."""
+
+
+def stage_of(name: str) -> StageName:
+    """Return the name of a stage that a user gives.
+
+    Raises:
+        InputError: for a name of none.
+    """
+    for known in STAGES:
+        if name == known:
+            return known
+    raise InputError(f"stage = {name[:40]!r}{did_you_mean(name[:40], STAGES)}; allowed: {', '.join(STAGES)}")
