@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -47,6 +47,10 @@ _ELECTRICS = {
     "internal_resistance": rigid_links.INTERNAL_RESISTANCE,
     "duty": rigid_links.DUTY,
 }
+
+
+_Robot = TypeVar("_Robot", bound="FreeRobot")
+"""Instead of `Self`, which checks of shapes take in classes as a whole only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,13 +108,13 @@ class FreeRobot(ABC):
         """Times at which an imposed flow has a corner, s."""
         return np.zeros(0)
 
-    def at_duty(self, duty: float) -> Self:
+    def at_duty(self: _Robot, duty: float) -> _Robot:
         """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
         drive[rigid_links.DUTY] = duty
         return replace(self, drive=drive)
 
-    def between(self, start: float, stop: float) -> Self:  # noqa: ARG002 - of a tube
+    def between(self: _Robot, start: float, stop: float) -> _Robot:  # noqa: ARG002 - of a tube
         """The robot with what of an imposed flow matters from one time to another, s."""
         return self
 

@@ -341,7 +341,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
         seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            finest = FINE.fineness(np.inf, level=seat.pitch == 0 and seat.yaw == 0)
+            finest = FINE.fineness(np.inf, level=bool(seat.pitch == 0 and seat.yaw == 0))
             chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, finest))
     return chosen
 

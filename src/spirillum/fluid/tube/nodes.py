@@ -137,7 +137,7 @@ class Places:
     def fineness(self, t: float, seat: Seat) -> Fineness:
         """Resolution of the flow at a place."""
         gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
-        return self.stage.fineness(gap, level=seat.pitch == 0 and seat.yaw == 0)
+        return self.stage.fineness(float(gap), level=bool(seat.pitch == 0 and seat.yaw == 0))
 
     @cached_property
     def most_yaw(self) -> Samples:
