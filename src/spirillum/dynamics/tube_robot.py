@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -94,7 +94,7 @@ class TubeRobot(FreeRobot):
         kernel.gaps_of(state, self.data, found)
         return found
 
-    def between(self, start: float, stop: float) -> Self:
+    def between(self, start: float, stop: float) -> TubeRobot:
         """The robot with what of the imposed flow matters from one time to another: few rows are copied."""
         first = max(int(np.searchsorted(self.bends, start, "right")) - 1, 0)
         return replace(self, flow=self.flow[first : int(np.searchsorted(self.bends, stop, "left")) + 1])
