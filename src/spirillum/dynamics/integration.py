@@ -264,7 +264,7 @@ def _crossed(
         if moment > end:
             break
         if place < sites:
-            events.append(Event(moment, robot.contact_event(place, touches=watched[place] > 0)))
+            events.append(Event(moment, robot.contact_event(place, touches=bool(watched[place] > 0))))
             continue
         at(share, place)
         if place == sites + stiff_steps.CHARGE_LEFT:
