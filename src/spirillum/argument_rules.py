@@ -16,8 +16,7 @@ class Rule(NamedTuple):
     options: tuple[str, ...]
     """Names of the command's parameters."""
     conflict: str
-    """What follows the options in the sentence: what they conflict with, and what is allowed; words in braces are of
-    the request."""
+    """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
 
 
 _FIELDS = ("gap", "eccentricity", "pitch", "yaw", "tail_drop", "ends")

@@ -75,9 +75,9 @@ def test_a_robot_that_the_tube_does_not_know_is_answered_without_walls_and_says_
 
 def test_what_would_take_minutes_without_a_table_is_answered_without_walls(monkeypatch: Any) -> None:
     robot = sp.load(WIDE)
-    assert choose_model("auto", robot, tables_only=True).model == "tube"
+    assert choose_model("auto", robot, table="straight").model == "tube"
     monkeypatch.setattr(library, "find_table", lambda *_: None)
-    found = choose_model("auto", robot, placement=Placement(), tables_only=True)
+    found = choose_model("auto", robot, placement=Placement(), table="straight")
     assert found.model == "slender"
     assert "run `spirillum prepare`" in found.caution
     assert choose_model("auto", robot).model == "tube"

@@ -49,7 +49,7 @@ def torque_error(problem: Problem) -> float | None:
 
 
 def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivity: Mapping[str, Samples]) -> str:
-    """What the intervals of B_eff take as exact, and how far it moves with each constant; empty without B_eff."""
+    """Constants that the intervals of B_eff take as exact, with its sensitivity to each; empty without B_eff."""
     middle = np.array([item.value for item in friction])
     middle = np.abs(middle[np.isfinite(middle)])
     if middle.size == 0 or not np.median(middle) > 0:

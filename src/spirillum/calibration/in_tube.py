@@ -90,7 +90,7 @@ def _tables(
 
 
 def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
-    """What dry friction depends on."""
+    """Parameters of dry friction."""
     weight = weights_in_fluid(experiment.robots)
     if not np.all(weight > 0):
         place = int(np.argmin(weight > 0))

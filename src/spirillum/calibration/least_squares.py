@@ -185,7 +185,7 @@ def weighted_residuals(
     *,
     prior: float = 1.0,
 ) -> Samples:
-    """What least squares make small: means less predictions over their standard errors, and the prior's share."""
+    """Residuals of least squares: means less predictions over their standard errors, and the prior's share."""
     found: Samples = _residuals(problem, z[None], error, discrepancy, prior)[0]
     return found
 

@@ -16,7 +16,7 @@ from spirillum.cli.design_commands import design
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.function_command import FunctionCommand, Request, from_function
-from spirillum.cli.inputs import check_request, overrides_from
+from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
@@ -205,7 +205,7 @@ def study(
     from spirillum.cli import renderer
 
     if store is not None:
-        check_request(context, "store", rows=rows)
+        refuse_conflicts(context, "store", rows=rows)
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer
         from spirillum.results.study import study_answer

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from spirillum.calibration.methods import METHODS
-from spirillum.cli.inputs import check_request, loaded_robot, overrides_from
+from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
@@ -103,7 +103,7 @@ def calibrate(
     robots = [loaded_robot(name, settings) for name in robot]
     check_not_set(set_fields(overrides_from(settings)), free, model)
     if method in METHODS and method != "posterior":
-        check_request(context, "no posterior", method=method)
+        refuse_conflicts(context, "no posterior", method=method)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,

@@ -213,7 +213,7 @@ def control(
 
 
 def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
-    """What makes camera and remote of a run; None: the modelled ones."""
+    """Factory of camera and remote of a run; None: the modelled ones."""
     from spirillum.errors import InputError
 
     if seen_by not in _EYES:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.function_command import Request, from_function
-from spirillum.cli.inputs import check_request
+from spirillum.cli.inputs import refuse_conflicts
 from spirillum.cli.shared_options import Json, complete_robots, starting
 
 
@@ -64,10 +64,10 @@ def export(
     if target.suffix == ".mcap":
         from spirillum.exports.recording import export_run
 
-        check_request(context, "recording")
+        refuse_conflicts(context, "recording")
         renderer.show(export_run(str(request.named_robot), target, film=film, speed=speed).to_dict(), json=json)
         return
-    check_request(context, "no recording", ending=target.suffix or "no ending")
+    refuse_conflicts(context, "no recording", ending=target.suffix or "no ending")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
     with renderer.at_work("making the files", quiet=json):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.function_command import Request, from_function
-from spirillum.cli.inputs import check_request
+from spirillum.cli.inputs import refuse_conflicts
 from spirillum.cli.shared_options import (
     NO_FORM,
     Json,
@@ -82,7 +82,7 @@ def flow(
     model = request.typed.get("model", "auto")
     states = {"no plane": output is None, "no volume": volume is None, "run": run is not None}
     states["run with another model"] = run is not None and model not in ("auto", "tube")
-    check_request(context, *(state for state, holds in states.items() if holds))
+    refuse_conflicts(context, *(state for state, holds in states.items() if holds))
     fineness = request.arguments.get("resolution")
     if run is None:
         if request.named_robot is None or time is not None:

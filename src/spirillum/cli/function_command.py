@@ -87,7 +87,7 @@ class Declaration(NamedTuple):
 
 
 class FunctionSource(NamedTuple):
-    """What a command is made from."""
+    """Function, body and exceptions of a command."""
 
     body: Callable[..., None]
     target: str
@@ -178,7 +178,7 @@ class FunctionCommand(TyperCommand):
 
     @property
     def callback(self) -> Any:
-        """What the command does."""
+        """The function that runs the command."""
         return self._made.callback
 
     @callback.setter

@@ -39,7 +39,7 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
     ]
 
 
-def check_request(context: typer.Context, *states: str, **words: object) -> None:
+def refuse_conflicts(context: typer.Context, *states: str, **words: object) -> None:
     """Refuse typed options that conflict with the request, by the rules of the command.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import check_request, overrides_from
+from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import Json, Settings
 
 _FEASIBILITY = "Before an experiment"
@@ -93,7 +93,7 @@ def measure(
     if setup is None:
         raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
     overrides = overrides_from(settings)
-    check_request(context, "feasibility" if feasibility else "no feasibility")
+    refuse_conflicts(context, "feasibility" if feasibility else "no feasibility")
     if feasibility:
         from spirillum.measurement.feasibility import feasibility as verdict
 

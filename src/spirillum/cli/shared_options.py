@@ -111,7 +111,7 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "view": _complete_views,
     "direction": _complete_directions,
 }
-"""What the shell completes, by argument or field of a table."""
+"""Completions of the shell, by argument or field of a table."""
 NAMES = {
     "calibrated": "--no-calibration",
     "degradation.glare_moves": "--glare-fixed",

@@ -79,7 +79,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     own = load(robot)
     if beyond_stokes:
         own = without_reynolds_bound(own)
-    choice = choose_model(model, own, placement=Placement.of(placement), fit=fit, motion=motion)
+    choice = choose_model(model, own, placement=Placement.of(placement), fit=fit)
     if motion != "free" or choice.model != "tube":
         asked = InTube.of(in_tube)
         given = {

@@ -20,7 +20,6 @@ from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable, least_checked_gap
-from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import largest_yaw
@@ -201,7 +200,7 @@ def run_in_tube(
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
         weight=weight_words(links),
-        error_against=TabledTube.error_against,
+        error_against=table.error_against,
     )
 
 

@@ -42,7 +42,7 @@ class ResistanceModel(ABC):
     """True if the model gives only the entries along and about the motor axis; the others are NaN."""
     form: ClassVar[str | None] = None
     """Solution method, for a model that has more than one."""
-    error_against: ClassVar[str | None] = None
+    error_against: str | None = None
     """Basis of the error estimate, if that is not another resolution."""
     placed: ClassVar[bool] = False
     """Whether the result depends on the pose in the channel, `batch.placement`."""

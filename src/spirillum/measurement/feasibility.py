@@ -243,7 +243,7 @@ def _expected(
     from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
-        choice = choose_model(AUTO, robot, tables_only=True)
+        choice = choose_model(AUTO, robot, table="straight")
         answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
     except InputError as error:
         raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error

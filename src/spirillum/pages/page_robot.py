@@ -140,7 +140,7 @@ def build(settings: Settings, robot: Robot) -> Built:
     if robot.drive is None:
         raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
     asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
-    choice = choose_model(asked, robot, placement=placed, tables_only=True, motion="free")
+    choice = choose_model(asked, robot, placement=placed, table="yaw")
     preparable = asked == "auto" and choice.model != "tube" and robot.channel is not None
     needs = preparable and not has_table(RobotBatch.of(robot, placed), "yaw")
     walled = choice.model == "tube"

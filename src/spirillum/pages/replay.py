@@ -111,7 +111,7 @@ def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
     if times.size < 2:
         raise InputError("the trial has fewer than two frames; allowed: one in which the robot was tracked")
     length = min(float(times[-1] - times[0]), _LONGEST)
-    chosen = choose_model("auto", robot, tables_only=True)
+    chosen = choose_model("auto", robot, table="straight")
     run = simulate(robot, model=chosen.model, timing={"duration": length})
     return replay_of_run(run) | {
         "film": {"name": film, "start": float(times[0])},

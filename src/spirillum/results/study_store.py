@@ -103,7 +103,7 @@ class _Outcome(NamedTuple):
     warnings: str
     """Sentences, one a line."""
     notes: str
-    """The same with their codes, as JSON."""
+    """Notes with their codes, as JSON."""
     unanswered: int
 
 

@@ -299,7 +299,7 @@ def _with_models(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Study
             loaded.robot_at(index),
             placement=study.placement,
             fit=fit,
-            tables_only=True,
+            table="straight",
             among=True,
         )
         for index in range(loaded.count)

@@ -49,8 +49,7 @@ def choose_model(
     *,
     placement: Placement | None = None,
     fit: Fit = NO_FIT,
-    tables_only: bool = False,
-    motion: str = "held",
+    table: StageName | None = None,
     among: bool = False,
 ) -> ModelChoice:
     """The model that is asked for, or with `auto` the one that knows most about the robot.
@@ -60,8 +59,8 @@ def choose_model(
         robot: the robot.
         placement: where it lies in its channel, which only a model with walls can answer for.
         fit: fitted values that are used.
-        tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
-        motion: `held` or `free`, for which a table needs yawed poses.
+        table: stage of a table without which the model with walls would take minutes, and is not taken; None: it needs
+            no table, or makes its own.
         among: the robot is one of several that are compared.
     """
     if asked != AUTO:
@@ -76,7 +75,7 @@ def choose_model(
     if outside and (placement is None or not placement.is_given):
         reason = f"model '{WALLED}' has no answer for this robot on the floor of its channel"
         caution = walls_left_out(outside[0].sentence(), among=among)
-    elif not outside and tables_only and not has_table(batch, "yaw" if motion == "free" else "straight"):
+    elif not outside and table is not None and not has_table(batch, table):
         lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
         reason = f"{lacks if among else 'the robot has no table for its tube'} yet"
         without = f"{robot.with_tail} has no table" if among else "it has no table for its tube"

@@ -132,7 +132,7 @@ def resolve_scenario(
     where = fit.placed(central, given)
     choice = model
     if not isinstance(choice, ModelChoice):
-        choice = choose_model(choice, central, placement=where, fit=fit, motion=motion)
+        choice = choose_model(choice, central, placement=where, fit=fit)
     ready, chosen, batch = prepared(
         central, choice.model, fit=fit, resolution=resolution, placement=where if where.is_given else None
     )

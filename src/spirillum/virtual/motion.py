@@ -69,7 +69,7 @@ def steady_rates(
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 
-    choice = choose_model(motion.model or default_model, robot, placement=placement, tables_only=True)
+    choice = choose_model(motion.model or default_model, robot, placement=placement, table="straight")
     steady = predict(
         robot,
         model=choice.model,

@@ -10,7 +10,7 @@ axis, and by one about the robot's own that brings the tail's phase along.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -157,19 +157,21 @@ def _solved_tables(
     wanted = [place for some in nodes for place in some]
     found = iter(solutions(wanted, "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
-    held = [(_held_out(places) if places.stage.yawed else [], _held_out(places, yawed=False)) for places in every]
-    asked = [place for both in held for some in both for place in some]
-    true = iter(solutions(asked, "checking the table", progress, workers))
+    straight = [_held_out(places, yawed=False) for places in every]
+    yawed = [_held_out(places) if places.stage.yawed else [] for places in every]
+    checked = [pose for some in (*straight, *yawed) for pose in some]
+    true = iter(solutions(checked, "checking the table", progress, workers))
+    without = [_largest_errors(table, some, true) for table, some in zip(packed, straight, strict=True)]
+    errors = [
+        _largest_errors(table, some, true) if some else known
+        for table, some, known in zip(packed, yawed, without, strict=True)
+    ]
     wires = [_wire_error(places, workers) if places.stage.compares_wires else None for places in every]
-    tables = []
-    for places, some, table, both, wire in zip(every, nodes, packed, held, wires, strict=True):
-        with_yaw, without = (_largest_errors(table, checked, [next(true) for _ in checked]) for checked in both)
-        with_yaw = with_yaw if places.stage.yawed else without
-        seconds, name = (time.perf_counter() - start) / len(every), places.stage.name
-        tables.append(
-            TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds, wire, name)
-        )
-    return tables
+    seconds = (time.perf_counter() - start) / len(every)
+    return [
+        TubeTable(places.geometry, places.radius, table, error, level, len(some), seconds, wire, places.stage.name)
+        for places, some, table, error, level, wire in zip(every, nodes, packed, errors, without, wires, strict=True)
+    ]
 
 
 def _wire_error(places: Places, workers: int = 1) -> float | None:
@@ -347,12 +349,12 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
 
 
 def _largest_errors(
-    table: Samples, places: Sequence[NodeSolution], found: Sequence[Sequence[Samples]]
+    table: Samples, poses: Sequence[NodeSolution], true: Iterator[Sequence[Samples]]
 ) -> dict[str, float]:
-    """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
-    errors: list[Samples] = [np.zeros(len(RESPONSES))]
-    for place, answers in zip(places, found, strict=True):
-        (_, phases), seat = place.tails[0], place.seat
+    """Largest error of `RESPONSES` at poses, over their sizes in a turn of the tail; `true` gives their solutions."""
+    errors = []
+    for pose in poses:
+        (_, phases), seat, answers = pose.tails[0], pose.seat, next(true)
         own, *turn = np.empty((1 + PHASES, kernel.MOTIONS, kernel.MOTIONS))
         for phase, out in zip((phases[0], *even_phases()), (own, *turn), strict=True):
             kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phase, out)

@@ -20,7 +20,7 @@ _NEAR = 0.12
 
 @dataclass(frozen=True)
 class Stage:
-    """Nodes and resolution of a table; see `TablePoses` for the coordinates t and f."""
+    """Nodes and resolution of a table; see `spirillum.fluid.tube.nodes` for the coordinates t and f."""
 
     name: StageName
     up: tuple[float, ...]
@@ -60,7 +60,6 @@ class Stage:
         return self.resolutions[gap < _NEAR, level]
 
 
-_FINE = Fineness("standard", 0.01), Fineness("standard", 0.002)
 _COARSE = {
     (True, True): Fineness("standard", 0.01, 6),
     (True, False): Fineness("standard", 0.03, 4),
@@ -90,7 +89,11 @@ FINE = Stage(
     phases=9,
     few_phases=5,
     little_yawed=7,
-    resolutions={(near, level): _FINE[level] for near in (True, False) for level in (True, False)},
+    resolutions={
+        (near, level): Fineness("standard", 0.002 if level else 0.01)
+        for near in (True, False)
+        for level in (True, False)
+    },
     seconds=(10.0, 17.0),
     held_out=6,
     accuracy=1.0,

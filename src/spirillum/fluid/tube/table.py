@@ -177,6 +177,14 @@ class TubeTable:
     """Nodes and resolution."""
 
     @property
+    def error_against(self) -> str:
+        """Reference of the stated error of the forward velocity, in words."""
+        return (
+            f"solutions with finer wires: the largest error of {STAGES[self.stage].held_out} places between the nodes "
+            "of its table, and that of the wire and the solids"
+        )
+
+    @property
     def key(self) -> str:
         """Key of the table: a digest of robot and tube."""
         return key_of(self.geometry, self.radius)

@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.tube.stages import FINE
+from spirillum.fluid.tube.stages import STAGES
 from spirillum.fluid.tube.table import TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
@@ -72,15 +72,13 @@ class TabledTube(Tube):
     """The model `tube` for robots that have tables."""
 
     form = "table"
-    error_against = (
-        f"solutions with finer wires: the largest error of {FINE.held_out} places between the nodes of its table, and "
-        "that of the wire and the solids"
-    )
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
         """Evaluate from tables."""
         super().__init__()
         self._tables = tables
+        coarsest = min(tables.values(), key=lambda table: list(STAGES).index(table.stage), default=None)
+        self.error_against = None if coarsest is None else coarsest.error_against
 
     def table_of(self, batch: RobotBatch, index: int = 0) -> TubeTable:
         """The table of one robot."""

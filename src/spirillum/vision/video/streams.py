@@ -29,7 +29,7 @@ _FEW = 2
 _NEAR = 0.02
 """Least part of a video that is said to be missing."""
 _LOOSE = 0.5
-"""The same where its length is that of the whole file, sound included, s."""
+"""Least part of a video that is said to be missing where its length is that of the whole file, with sound, s."""
 
 
 class Stated(NamedTuple):
