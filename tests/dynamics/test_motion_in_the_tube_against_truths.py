@@ -457,7 +457,9 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: 1.0)  # the stand-in holds at any yaw and gap
     monkeypatch.setattr(tube_simulation, "least_checked_gap", lambda _: 0.0)
     steady, links, _ = made()
-    table = SimpleNamespace(packed=links.table, speed_error_at=lambda yaw: 0.02 if yaw else 0.01, key="name")
+    table = SimpleNamespace(
+        packed=links.table, speed_error_at=lambda yaw: 0.02 if yaw else 0.01, key="name", error_against="solutions"
+    )
     file = tmp_path / "flow.csv"
     file.write_text("# pulsating\ntime_s,flow_mm_s\n0,0\n1,2\n2,-1\n")
     asked = InTube.of({"azimuth": "20 deg", "wait": "2 s", "friction_coefficient": 0.2, "flow": file})
