@@ -1,0 +1,26 @@
+/* What all files of csrc/ share.
+ *
+ * A function that Python calls is EXPORTed. It has the name and the parameters of its stub in spirillum/kernels: arrays
+ * as pointers to their first element (C order), `int` as int64_t, `bool` as int64_t, then the dimensions that the stub's
+ * annotations name, each once, in the order in which they first appear. It allocates nothing unless it says so, keeps
+ * nothing between calls, and checks nothing: the Python layer has.
+ */
+#ifndef SPIRILLUM_CORE_H
+#define SPIRILLUM_CORE_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+#define PI 3.14159265358979323846
+
+static inline double clamped(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
+static inline double square(double x) { return x * x; }
+
+#endif

@@ -1,0 +1,198 @@
+"""How Python calls the loops that are written in C (csrc/): by stubs whose annotations are the contract.
+
+A stub has the name, the parameters and the documentation of a function of csrc/. Arrays are annotated with their dtype
+and shape (`Float64[Array, "n 8 8"]`); a named dimension has one length in all arguments of a call, and C gets the
+lengths behind the arguments, in the order in which their names first appear. `"..."` is an array of any shape.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+import os
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast, get_type_hints
+
+import numpy as np
+from jaxtyping import Complex128, Float32, Float64, Int64, UInt8
+
+if TYPE_CHECKING:
+    Array: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[Any]]
+else:
+    Array = np.ndarray
+
+__all__ = [
+    "Array",
+    "Complex128",
+    "Float32",
+    "Float64",
+    "Int64",
+    "UInt8",
+    "in_one_thread",
+    "native",
+    "rows_in_one_thread",
+]
+
+_SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
+_THREADS = int(os.environ.get("OMP_NUM_THREADS") or 0) or os.cpu_count() or 1
+_SHARES = 4
+"""Shares of the rows for each thread: some rows take longer than others."""
+
+_alone: ContextVar[bool] = ContextVar("alone", default=False)
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+_Sizes: TypeAlias = dict[str, int]
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """Return the compiled library, in its build for this processor.
+
+    Raises:
+        ImportError: It was not built.
+    """
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    try:
+        core = ctypes.CDLL(str(Path(__file__).with_name(f"_core{suffix}")))
+    except OSError as error:
+        raise ImportError(f"{error}; the compiled loops are built by 'pip install .' of the sources") from error
+    wide = Path(__file__).with_name(f"_core_v3{suffix}")
+    return ctypes.CDLL(str(wide)) if core.has_wide_vectors() and wide.exists() else core
+
+
+def sources_digest() -> str:
+    """Return the digest of the C sources that the library was compiled from."""
+    function = library().csrc_digest
+    function.restype = ctypes.c_char_p
+    return cast("bytes", function()).decode()
+
+
+def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F]:
+    """Turn a stub into a call of the C function of its name, or of `symbol`.
+
+    Args:
+        written: names of the arrays that the function writes to: these have to have the dtype of their annotation and
+            be contiguous; others are copied where they are not.
+        rows: a dimension, the first one of its arrays, over which threads may share the work.
+        symbol: name of the function in C, where another file has a stub of this name too.
+    """
+
+    def decorate(stub: _F) -> _F:
+        @cache
+        def prepared() -> _Call:
+            return _Call(stub, symbol or stub.__name__, frozenset(written))
+
+        @wraps(stub)
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            if keywords:
+                bound = inspect.signature(stub).bind(*arguments, **keywords)
+                bound.apply_defaults()
+                arguments = bound.args
+            if rows and not in_one_thread():
+                return prepared().in_threads(rows, arguments)
+            return prepared()(arguments)
+
+        return cast("_F", call)
+
+    return decorate
+
+
+def in_one_thread() -> bool:
+    """Whether the work of this process stays in one thread: the machine has no more, or other processes have them."""
+    return _THREADS == 1 or _alone.get()
+
+
+@contextmanager
+def rows_in_one_thread() -> Iterator[None]:
+    """While the block runs, rows are worked through by this thread alone: other processes have the other cores."""
+    token = _alone.set(True)
+    try:
+        yield
+    finally:
+        _alone.reset(token)
+
+
+class _ArrayArgument:
+    """Check of an array, and the pointer to it."""
+
+    def __init__(self, name: str, annotation: Any, *, is_written: bool) -> None:
+        self.name, self.is_written = name, is_written
+        self.dtype = np.dtype(annotation.dtypes[0].replace("bool_", "bool"))
+        shape = annotation.dim_str.split()
+        self.shape = None if shape == ["..."] else tuple(int(size) if size.isdigit() else size for size in shape)
+
+    def __call__(self, value: Any, sizes: _Sizes) -> np.ndarray[Any, Any]:
+        """Return the array as C takes it; add its named lengths to those of the call."""
+        if not isinstance(value, np.ndarray) or value.dtype != self.dtype or not value.flags.c_contiguous:
+            if self.is_written:
+                raise TypeError(f"{self.name} must be a contiguous array of {self.dtype}")
+            value = np.ascontiguousarray(value, dtype=self.dtype)
+        if self.shape is None:
+            return value
+        shape = value.shape
+        if len(shape) != len(self.shape):
+            raise ValueError(f"{self.name} has shape {shape}; expected {self.shape}")
+        for length, size in zip(shape, self.shape, strict=True):
+            if length != (sizes.setdefault(size, length) if isinstance(size, str) else size):
+                raise ValueError(f"{self.name} has shape {shape}; expected {self.shape} with {sizes}")
+        return value
+
+
+class _Call:
+    """A function of the library with the checks of its arguments."""
+
+    def __init__(self, stub: Callable[..., Any], symbol: str, written: frozenset[str]) -> None:
+        hints = get_type_hints(stub)
+        returned = hints.pop("return")
+        self._arguments = [
+            hint if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
+            for name, hint in hints.items()
+        ]
+        names = [size for a in self._arguments if isinstance(a, _ArrayArgument) for size in a.shape or ()]
+        self._sizes = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
+        self._function = library()[symbol]
+        self._function.restype = _SCALARS.get(returned)
+        self._function.argtypes = [
+            *(_SCALARS.get(a, ctypes.c_void_p) for a in self._arguments),
+            *(ctypes.c_int64 for _ in self._sizes),
+        ]
+        self._is_truth = returned is bool
+
+    def __call__(self, arguments: tuple[Any, ...]) -> Any:
+        sizes: _Sizes = {}
+        values = self._checked(arguments, sizes)
+        return self._run(values, sizes)
+
+    def in_threads(self, rows: str, arguments: tuple[Any, ...]) -> None:
+        """Let threads share the rows of the arrays whose first dimension has this name."""
+        sizes: _Sizes = {}
+        values = self._checked(arguments, sizes)
+        count = sizes[rows]
+        shared = [isinstance(a, _ArrayArgument) and bool(a.shape) and a.shape[0] == rows for a in self._arguments]
+
+        def run(low: int, high: int) -> None:
+            part = [value[low:high] if cut else value for value, cut in zip(values, shared, strict=True)]
+            self._run(part, sizes | {rows: high - low})
+
+        edges = np.linspace(0, count, min(_SHARES * _THREADS, count) + 1).astype(int).tolist()
+        with ThreadPoolExecutor(_THREADS) as pool:
+            list(pool.map(run, edges[:-1], edges[1:]))
+
+    def _checked(self, arguments: tuple[Any, ...], sizes: _Sizes) -> list[Any]:
+        if len(arguments) != len(self._arguments):
+            raise TypeError(f"{len(self._arguments)} arguments are needed, {len(arguments)} are given")
+        return [
+            expected(value, sizes) if isinstance(expected, _ArrayArgument) else expected(value)
+            for value, expected in zip(arguments, self._arguments, strict=True)
+        ]
+
+    def _run(self, values: list[Any], sizes: _Sizes) -> Any:
+        pointers = (value.ctypes.data if isinstance(value, np.ndarray) else value for value in values)
+        result = self._function(*pointers, *(sizes[name] for name in self._sizes))
+        return bool(result) if self._is_truth else result
