@@ -152,11 +152,11 @@ def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np
     out = np.empty((3, 5, kernel.PARAMETERS))
     room = kernel.contact_offset(places.rings, R, 0.0)
     for n, t in enumerate((0.0, 0.5 * places.gaps[0], places.gaps[0])):
-        kernel.rest_coefficients(table, (1.0 - t) * room, 0.0, out[n])
+        kernel.outer_coefficients(table, (1.0 - t) * room, 0.0, out[n])
     np.testing.assert_allclose(out[1], 0.5 * (out[0] + out[2]), atol=1e-12)
     step = 1e-7 * places.gaps[0]
     above = np.empty_like(out[0])
-    kernel.rest_coefficients(table, (1.0 - places.gaps[0] - step) * room, 0.0, above)
+    kernel.outer_coefficients(table, (1.0 - places.gaps[0] - step) * room, 0.0, above)
     np.testing.assert_allclose((above - out[2]) / step, (out[2] - out[0]) / places.gaps[0], rtol=1e-4, atol=1e-5)
 
 

@@ -328,7 +328,7 @@ def _yawed_seats(places: Places) -> list[Seat]:
 def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, interpolated from the table without yaw."""
     out = np.empty((count, kernel.PARAMETERS))
-    kernel.rest_coefficients(straight, seat.offset, seat.pitch, out)
+    kernel.outer_coefficients(straight, seat.offset, seat.pitch, out)
     return out
 
 

@@ -20,8 +20,7 @@ from spirillum.fluid.tube.table import TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
-from spirillum.kernels.tube_places import PHASES, mean_resistances
-from spirillum.kernels.tube_table import INSIDE, MOTIONS, largest_yaw, mean_resistance_at
+from spirillum.kernels.tube_table import INSIDE, MOTIONS, PHASES, largest_yaw, mean_resistance_at, mean_resistances
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 
@@ -61,8 +60,7 @@ def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: S
     """
     found = np.empty((gap.size, MOTIONS, MOTIONS))
     which = np.broadcast_to(np.arange(len(tables)), gap.shape)
-    # Copies: for arrays that cannot be written to the loop would be compiled again.
-    mean_resistances(tables, which.flatten(), gap.flatten(), pitch.flatten(), yaw.flatten(), found)
+    mean_resistances(tables, which.ravel(), gap.ravel(), pitch.ravel(), yaw.ravel(), PHASES, found)
     axes = along_the_tube(pitch, yaw)
     whole: Samples = np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
     return whole
