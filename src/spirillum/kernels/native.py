@@ -90,7 +90,7 @@ def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F
 
         @wraps(stub)
         def call(*arguments: Any, **keywords: Any) -> Any:
-            if keywords:
+            if keywords or len(arguments) < stub.__code__.co_argcount:
                 bound = inspect.signature(stub).bind(*arguments, **keywords)
                 bound.apply_defaults()
                 arguments = bound.args
@@ -165,8 +165,6 @@ class _Call:
         self._is_truth = returned is bool
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
-        if len(arguments) != len(self._arguments):
-            raise TypeError(f"{len(self._arguments)} arguments are needed, {len(arguments)} are given")
         sizes: _Sizes = {}
         values = [
             value if expected is None else expected.checked(value, sizes)

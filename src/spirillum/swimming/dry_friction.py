@@ -20,6 +20,7 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, MeanFlow, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
+from spirillum.kernels.axial_motor import contact_drag
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.links import links_of
@@ -55,12 +56,9 @@ def with_dry_friction(r: AxialWhole, force: Values, radius: Values, tail_rate: V
         radius: a, m, (...).
         tail_rate: omega, rad/s, (...).
     """
-    from spirillum.kernels.axial_contact import contact_drag  # compiled: loaded where there is dry friction
-
     shape = np.broadcast_shapes(r.shape[:-2], *(np.shape(item) for item in (force, radius, tail_rate)))
-    # Copies: for arrays that cannot be written to the loop would be compiled again.
-    full = np.broadcast_to(r, (*shape, 3, 3)).flatten().reshape(-1, 3, 3)
-    pressed, radii, rates = (np.broadcast_to(item, shape).flatten() for item in (force, radius, tail_rate))
+    full = np.broadcast_to(r, (*shape, 3, 3)).reshape(-1, 3, 3)
+    pressed, radii, rates = (np.broadcast_to(item, shape).ravel() for item in (force, radius, tail_rate))
     drag = np.empty(len(full))
     contact_drag(full, pressed, radii, rates, _SMOOTH, drag)
     k, two = drag.reshape(shape), np.full(1, 2.0)
