@@ -2,6 +2,7 @@
 
 import gc
 import os
+import runpy
 import signal
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -66,8 +67,13 @@ class _Durations:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Record durations where asked to, in the process that sees all reports."""
-    if config.getoption("--record-durations") and "PYTEST_XDIST_WORKER" not in os.environ:
+    """In the process that sees all reports: compile csrc/ where it has changed, record durations where asked to."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        return
+    build = runpy.run_path(str(Path(__file__).parents[1] / "csrc" / "build.py"))
+    if not build["is_current"]():
+        build["compile_all"]()
+    if config.getoption("--record-durations"):
         config.pluginmanager.register(_Durations())
 
 

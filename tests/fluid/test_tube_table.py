@@ -38,6 +38,7 @@ from spirillum.fluid.tube.table import TubeTable, key_of, packed_from, to_bytes
 from spirillum.fluid.tube.table_errors import RESPONSES, response_errors, response_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
+from spirillum.kernels.film_table import film_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
 from spirillum.robot.tube_pose import Seat
@@ -127,7 +128,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
         found, left = at(table, e, pitch, 0.0, phase)
         assert left == kernel.INSIDE
         thin = np.zeros((6, 6))
-        kernel.film_at(film, e, pitch, 0.0, thin)
+        film_at(film, e, pitch, 0.0, thin)
         factor = lower(smooth(t, f, phases), phase)
         expected = factor @ factor.T
         expected[:6, :6] += kernel.cut_of_film(t) * thin
@@ -177,8 +178,8 @@ def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndar
     yaw, e = 0.03, 0.006
     turned, level = at(table, e, 0.0, yaw)[0], at(straight, e, 0.0)[0]
     thin = np.zeros((2, 6, 6))
-    kernel.film_at(film, e, 0.0, yaw, thin[0])
-    kernel.film_at(film, e, 0.0, 0.0, thin[1])
+    film_at(film, e, 0.0, yaw, thin[0])
+    film_at(film, e, 0.0, 0.0, thin[1])
     w = kernel.cut_of_film(1.0 - e / kernel.contact_offset(places.rings, R, 0.0))
     turned[:6, :6] -= w * thin[0]
     level[:6, :6] -= w * thin[1]

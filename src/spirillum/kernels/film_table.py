@@ -1,4 +1,4 @@
-"""Resistance of the lubrication film between a body of revolution and a tube's wall: csrc/film.c, and its packed form."""
+"""Resistance of the lubrication film between a body of revolution and its tube: csrc/film.c, and its packed form."""
 
 from __future__ import annotations
 

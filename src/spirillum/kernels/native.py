@@ -61,7 +61,9 @@ def library() -> ctypes.CDLL:
     try:
         core = ctypes.CDLL(str(Path(__file__).with_name(f"_core{suffix}")))
     except OSError as error:
-        raise ImportError(f"{error}; the compiled loops are built by 'pip install .' of the sources") from error
+        raise ImportError(
+            f"{error}; the compiled loops are built by 'pip install .' or 'python csrc/build.py'"
+        ) from error
     wide = Path(__file__).with_name(f"_core_v3{suffix}")
     return ctypes.CDLL(str(wide)) if core.has_wide_vectors() and wide.exists() else core
 

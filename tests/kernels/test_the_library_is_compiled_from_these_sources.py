@@ -1,0 +1,46 @@
+"""The library is that of csrc/, compiles without a warning, and its stubs check what they are given."""
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.kernels import native
+from spirillum.kernels.film_table import film_coordinates, spline_weights
+from spirillum.kernels.tube_table import contact_offset
+
+BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
+
+
+@pytest.fixture(scope="module")
+def build() -> dict[str, Any]:
+    return runpy.run_path(str(BUILD))
+
+
+def test_the_library_states_the_digest_of_its_sources(build: dict[str, Any]) -> None:
+    assert native.sources_digest() == build["digest"]()
+
+
+def test_the_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: Path) -> None:
+    assert all(path.stat().st_size > 10_000 for path in build["compile_all"](tmp_path, build["STRICT"]))
+
+
+def test_a_result_of_another_type_or_order_is_refused() -> None:
+    with pytest.raises(TypeError, match="out must be a contiguous array of float64"):
+        spline_weights(0.5, 0.0, 1.0, 4, np.empty(4, dtype=np.float32))
+    with pytest.raises(TypeError, match="out must be a contiguous array of float64"):
+        spline_weights(0.5, 0.0, 1.0, 4, np.empty(8)[::2])
+
+
+def test_another_shape_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"out has shape \(4,\); expected \(5,\)"):
+        film_coordinates(np.ones(15), 0.0, 0.0, 0.0, np.empty(4))
+
+
+def test_an_argument_of_another_type_or_order_is_copied() -> None:
+    rings = np.array([[1.0, 2.0, 3.0, 4.0], [-1.0, 2.0, 3.0, 4.0]])
+    expected = contact_offset(rings, 9.0, 0.1)
+    assert contact_offset(np.asfortranarray(rings), 9.0, 0.1) == contact_offset(rings.astype(np.float32), 9.0, 0.1)
+    assert contact_offset(rings=rings, radius=9, pitch=np.float32(0.1)) == pytest.approx(expected, rel=1e-6)
