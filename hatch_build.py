@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import runpy
-import shutil
-import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +15,19 @@ class CoreBuildHook(BuildHookInterface[Any]):
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
-        """Ask for the compiler that comes as a wheel only where the system has none."""
-        return [] if os.environ.get("SPIRILLUM_CC") or shutil.which("cc") else ["ziglang>=0.13"]
+        """Ask for the compiler that comes as a wheel only where it is needed."""
+        return ["ziglang>=0.13"] if self._build()["needs_zig"]() else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile, and name the wheel after this platform: it holds for any Python."""
+        """Compile, and name the wheel after its platform: it holds for any Python."""
         del version
-        build = runpy.run_path(str(Path(self.root) / "csrc" / "build.py"))
+        build = self._build()
+        command, tag = build["compiler"]()
         libraries = build["compile_all"]()
-        self.app.display_info(f"compiled csrc/ with {' '.join(build['compiler']())}")
+        self.app.display_info(f"compiled csrc/ for {tag} by {' '.join(command)}")
         build_data["artifacts"] += [path.relative_to(self.root).as_posix() for path in libraries]
         build_data["pure_python"] = False
-        build_data["tag"] = f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
+        build_data["tag"] = f"py3-none-{tag}"
+
+    def _build(self) -> dict[str, Any]:
+        return runpy.run_path(str(Path(self.root) / "csrc" / "build.py"))

@@ -11,11 +11,14 @@ import platform
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
+from typing import NamedTuple
 
 SOURCES = Path(__file__).parent
 PACKAGE = SOURCES.parent / "src/spirillum/kernels"
-SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+SUFFIXES = {"win": ".dll", "mac": ".dylib"}
+"""Of libraries, by the first letters of a wheel's tag; else .so."""
 FLAGS = (
     *("-std=c11", "-O3", "-shared", "-fPIC", "-fvisibility=hidden"),
     # The same numbers on every processor: no fused products, no sums in another order; `errno` and traps are not read.
@@ -23,15 +26,45 @@ FLAGS = (
 )
 STRICT = ("-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-Werror")
 """Of the project's own tests: a compiler of tomorrow may warn of more."""
-VARIANTS = {"": (), "_v3": ("-march=x86-64-v3",)}
-"""Builds by the end of their names: for every processor, and for those with 256-bit vectors (x86-64 since 2013)."""
+WIDE = ("-mavx2", "-mfma", "-mbmi2")
+"""Of a second build for x86-64, which processors since 2013 take."""
+ZIG = [sys.executable, "-m", "ziglang", "cc"]
+TARGETS = {
+    "manylinux_2_17_x86_64": "x86_64-linux-gnu.2.17",
+    "manylinux_2_17_aarch64": "aarch64-linux-gnu.2.17",
+    "macosx_11_0_arm64": "aarch64-macos.11.0",
+    "macosx_11_0_x86_64": "x86_64-macos.11.0",
+    "win_amd64": "x86_64-windows-gnu",
+}
+"""What zig calls the platform of a wheel."""
 
 
-def compiler() -> list[str]:
-    """Return the command that compiles C: `SPIRILLUM_CC`, the system's `cc`, or that of the `ziglang` wheel."""
+class Compiler(NamedTuple):
+    """How C is compiled."""
+
+    command: list[str]
+    tag: str
+    """Platform that is compiled for, as the names of wheels have it."""
+
+    @property
+    def suffix(self) -> str:
+        """End of a library's name."""
+        return SUFFIXES.get(self.tag[:3], ".so")
+
+
+def compiler() -> Compiler:
+    """Return the compiler: `SPIRILLUM_CC`, the system's `cc` or zig for this machine, zig for `SPIRILLUM_WHEEL`."""
+    if tag := os.environ.get("SPIRILLUM_WHEEL"):
+        return Compiler([*ZIG, "-target", TARGETS[tag]], tag)
+    own = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     if stated := os.environ.get("SPIRILLUM_CC"):
-        return stated.split()
-    return [found] if (found := shutil.which("cc")) else [sys.executable, "-m", "ziglang", "cc"]
+        return Compiler(stated.split(), own)
+    return Compiler([found] if (found := shutil.which("cc")) else ZIG, own)
+
+
+def needs_zig() -> bool:
+    """Whether the compiler is the one that comes as a wheel."""
+    return compiler().command[: len(ZIG)] == ZIG
 
 
 def digest() -> str:
@@ -44,20 +77,22 @@ def digest() -> str:
 
 def is_current() -> bool:
     """Whether the package's library was compiled from these sources."""
-    library = PACKAGE / f"_core{SUFFIX}"
+    library = PACKAGE / f"_core{compiler().suffix}"
     return library.exists() and digest().encode() in library.read_bytes()
 
 
 def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = ()) -> list[Path]:
-    """Compile csrc/ for this machine into a folder; return the libraries, each replaced as a whole."""
-    command = [*compiler(), *FLAGS, *flags, f'-DCSRC_DIGEST="{digest()}"']
+    """Compile csrc/ into a folder; return the libraries, each replaced as a whole."""
+    command, tag = compiler()
     files = [str(path) for path in sorted(SOURCES.glob("*.c"))]
-    variants = VARIANTS if platform.machine().lower() in {"x86_64", "amd64"} else {"": ()}
+    machine = tag if tag in TARGETS else platform.machine().lower()
+    variants = {"": (), "_v3": WIDE} if machine.endswith(("x86_64", "amd64")) else {"": ()}
     libraries = []
     for name, more in variants.items():
-        library = folder / f"_core{name}{SUFFIX}"
-        partial = library.with_name(f"{library.stem}.{os.getpid()}{SUFFIX}")
-        subprocess.run([*command, *more, "-o", str(partial), *files, "-lm"], check=True)  # noqa: S603
+        library = folder / f"_core{name}{compiler().suffix}"
+        partial = library.with_name(f"{library.stem}.{os.getpid()}{library.suffix}")
+        names = [*FLAGS, *flags, *more, f'-DCSRC_DIGEST="{digest()}"', "-o", str(partial), *files, "-lm"]
+        subprocess.run([*command, *names], check=True)  # noqa: S603
         partial.replace(library)
         libraries.append(library)
     return libraries
