@@ -1,0 +1,224 @@
+/* The motion of two rigid links in a tube: film, walls, contact and dry friction.
+ *
+ * Unknowns are the seven rates q = (U, Omega_b, omega_m) in body axes about the origin. Forces balance without inertia:
+ *
+ *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n
+ *
+ * M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint;
+ * N_c the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of
+ * dry friction, made smooth below the sliding speed v_r. See contacts.c and dry_friction.c.
+ *
+ * The place: offset e of the origin from the tube's axis, azimuth A about +x from the lowest place, pitch p away from
+ * the wall and yaw psi against the local axes (X along the tube, z_loc towards its axis, y_loc = z_loc x X), and the
+ * phase of the tail in the roll-free axes F of the body.
+ */
+#include "motion.h"
+
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table) {
+    const Tube *tube = (const Tube *)(packed + sizeof(Links) / sizeof(double));
+    const Wire *wire = (const Wire *)(tube + 1);
+    const Site *sites = (const Site *)(wire + 1);
+    const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
+    const double *flow = (const double *)(stations + (int64_t)tube->stations);
+    return (TubeRobot){
+        .links = (const Links *)packed, .tube = tube, .wire = wire, .sites = sites, .stations = stations,
+        .flow = (const double(*)[2])flow,
+        .site_count = (int64_t)tube->sites, .station_count = (int64_t)tube->stations,
+        .flow_count = (packed + size - flow) / 2, .table = table_opened(table),
+    };
+}
+
+/* Note offset, azimuth, pitch, yaw and roll of the body against F; on the axis the azimuth is 0. */
+static void note_place(const State *y, const double rotation[3][3], double radius, Seen *seen) {
+    const double side = y->position[1], up = y->position[2], e = hypot(side, up);
+    double z_y = 0.0, z_z = 1.0;
+    if (e > 1e-9 * radius) {
+        z_y = -side / e;
+        z_z = -up / e;
+    }
+    const double y_y = z_z, y_z = -z_y; /* y_loc = z_loc x X */
+    const double d_y = rotation[1][0], d_z = rotation[2][0];
+    seen->offset = e;
+    seen->azimuth = atan2(-z_y, z_z);
+    seen->pitch = asin(clamped(d_y * z_y + d_z * z_z, -1.0, 1.0));
+    seen->yaw = atan2(d_y * y_y + d_z * y_z, rotation[0][0]);
+    /* y' of F is across the axis and along the plane of X and y_loc; z' = d x y'. */
+    const double f[3] = {-sin(seen->yaw), cos(seen->yaw) * y_y, cos(seen->yaw) * y_z};
+    const double along = rotation[0][1] * f[0] + rotation[1][1] * f[1] + rotation[2][1] * f[2];
+    const double across = rotation[0][2] * f[0] + rotation[1][2] * f[1] + rotation[2][2] * f[2]; /* = -e_2.z' */
+    seen->turn = atan2(-across, along);
+}
+
+/* Imposed mean velocity, m/s: straight between its times, constant beyond. */
+static double imposed_flow(const TubeRobot *robot, double time) {
+    const double(*flow)[2] = robot->flow;
+    int64_t before = 0, after = robot->flow_count - 1;
+    if (time >= flow[after][0]) return flow[after][1];
+    if (time <= flow[0][0]) return flow[0][1];
+    while (after - before > 1) {
+        const int64_t middle = (before + after) / 2;
+        *(flow[middle][0] < time ? &before : &after) = middle;
+    }
+    const double share = (time - flow[before][0]) / (flow[after][0] - flow[before][0]);
+    return flow[before][1] + share * (flow[after][1] - flow[before][1]);
+}
+
+/* The fluid about the robot, in body axes. */
+typedef struct {
+    double matrix[RATES][RATES]; /* against q, SI */
+    double stream[RATES];        /* force of an imposed flow */
+    double opened[RATES];        /* mean flow of open ends per q */
+} Fluid;
+
+static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
+    const Tube *tube = robot->tube;
+    const Pose pose = {seen->offset, seen->pitch, seen->yaw};
+    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS];
+    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, free_of_roll);
+    turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
+    const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
+    seen->mean_flow = tube->ends == IMPOSED ? imposed_flow(robot, time) : 0.0;
+    for (int i = 0; i < RATES; i++) {
+        fluid->opened[i] = opened * m[i][7];
+        fluid->stream[i] = tube->viscosity * m[i][7] * seen->mean_flow;
+        for (int j = 0; j < RATES; j++)
+            fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
+    }
+}
+
+/* Contacts of a state, and the gaps on the way to them. */
+typedef struct {
+    const TubeRobot *robot;
+    const State *y;
+    double rotation[3][3];
+    Balance *balance; /* forces and contacts that are added to */
+    Seen *seen;
+    double *gaps;     /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
+} Touch;
+
+/* Add one contact to the balance, and its push to the force. */
+static void add_contact(Touch *t, const Nearest *at, double rotor) {
+    const Tube *tube = t->robot->tube;
+    if (!(at->gap < tube->roughness) || t->balance->count >= MOST_CONTACTS) return;
+    const double load = asperity_load(at->gap, tube->roughness, tube->load);
+    t->seen->pressed += asperity_energy(at->gap, tube->roughness, tube->load);
+    t->seen->contact_force += load;
+    for (int i = 0; i < RATES; i++) t->balance->force[i] -= load * at->j[i];
+    Contact *contact = t->balance->contacts + t->balance->count++;
+    contact->load = tube->coefficient * load;
+    sliding_rows(at, t->rotation, rotor, contact->rows);
+}
+
+/* Squared distance of a station of the wire from the tube's axis, m^2. */
+static double station_square(const Touch *t, const Station *station) {
+    const double c = cos(t->y->phase), s = sin(t->y->phase);
+    const double at[3] = {station->x, c * station->y - s * station->z, s * station->y + c * station->z};
+    double d[2];
+    for (int n = 0; n < 2; n++) {
+        const double *row = t->rotation[n + 1];
+        d[n] = t->y->position[n + 1] + row[0] * at[0] + row[1] * at[1] + row[2] * at[2];
+    }
+    return d[0] * d[0] + d[1] * d[1];
+}
+
+/* Look for contacts of the wire where its stations are farthest from the axis. */
+static void touch_wire(Touch *t) {
+    const TubeRobot *robot = t->robot;
+    const Tube *tube = robot->tube;
+    const int64_t last = robot->station_count - 1;
+    if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
+    double before = 0.0, here = station_square(t, robot->stations);
+    for (int64_t k = 0; k <= last; k++) {
+        const double after = k < last ? station_square(t, robot->stations + k + 1) : 0.0;
+        if (here >= before && here > after && t->balance->count < MOST_CONTACTS) {
+            const Station *at = robot->stations + k;
+            const double bracket[3] = {at[k > 0 ? -1 : 0].xi, at->xi, at[k < last ? 1 : 0].xi};
+            const Nearest nearest = wire_nearest(robot->wire, t->y, t->rotation, tube->radius, bracket);
+            t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
+            add_contact(t, &nearest, 1.0);
+        }
+        before = here;
+        here = after;
+    }
+}
+
+/* Look for all contacts. */
+static void touch(Touch *t) {
+    const TubeRobot *robot = t->robot;
+    t->seen->film = t->seen->tail_gap = INFINITY;
+    t->seen->pressed = t->seen->contact_force = 0.0;
+    for (int64_t n = 0; n < robot->site_count; n++) {
+        const Site *site = robot->sites + n;
+        const Nearest nearest = site_nearest(site, t->y, t->rotation, robot->tube->radius);
+        if (site->rotor == 0.0) t->seen->film = smaller(t->seen->film, nearest.gap);
+        if (t->gaps) t->gaps[n] = nearest.gap;
+        add_contact(t, &nearest, site->rotor);
+    }
+    touch_wire(t);
+    if (t->gaps) t->gaps[robot->site_count] = t->seen->tail_gap;
+}
+
+/* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
+ * a trial inside the wall has none, and the next one must not begin with them. */
+static double solve_rates(Balance *b, const Drive *drive, double current, Seen *seen) {
+    double *q = seen->rates, left[RATES];
+    bool finite = true;
+    for (int i = 0; i < RATES; i++) finite = finite && isfinite(q[i]);
+    for (int i = 0; i < RATES && !finite; i++) q[i] = 0.0;
+    b->along = driven_rate(drive);
+    b->prescribed = drive->kind == RATE && drive->duty > 0.0;
+    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, 0.0, 1.0);
+    b->force[b->along] += torque;
+    if (drive->fixed != 0.0) {
+        b->force[JOINT] = q[JOINT] = 0.0;
+        for (int64_t n = 0; n < b->count; n++) b->contacts[n].rows[0][JOINT] = b->contacts[n].rows[1][JOINT] = 0.0;
+    }
+    if (b->prescribed) q[b->along] += drive->given - q[SPIN] - q[JOINT];
+    seen->balance = balance_rates(b, q, left);
+    return b->prescribed ? left[b->along] : torque;
+}
+
+/* Note force and power of dry friction, sums over contacts. */
+static void note_sliding(const Balance *b, Seen *seen) {
+    seen->contact_friction = seen->contact_power = 0.0;
+    for (int64_t n = 0; n < b->count; n++) {
+        const Sliding s = sliding_at(b->contacts + n, seen->rates, b->slow);
+        seen->contact_friction += s.drag * hypot(s.u, s.v);
+        seen->contact_power += s.drag * (s.u * s.u + s.v * s.v);
+    }
+}
+
+/* Write what is observed in a state, and its time derivative. */
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
+    const Links *links = robot->links;
+    Balance balance = {.count = 0, .slow = robot->tube->sliding};
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
+    Fluid fluid;
+    double field[RATES];
+    axes_of(y, t.rotation);
+    note_place(y, t.rotation, robot->tube->radius, seen);
+    set_fluid(robot, y->phase, time, seen, &fluid);
+    weight_loads(&links->weight, y->phase, t.rotation, balance.force);
+    touch(&t);
+    field_loads(&links->drive, time, t.rotation, field);
+    assemble(fluid.matrix, links, balance.a);
+    for (int i = 0; i < RATES; i++) balance.force[i] += field[i] + fluid.stream[i];
+    seen->drive_torque = solve_rates(&balance, &links->drive, y->current, seen);
+    note_powers(fluid.matrix, links, field, seen);
+    seen->flow_power = 0.0;
+    for (int i = 0; i < RATES; i++) {
+        seen->mean_flow += fluid.opened[i] * seen->rates[i];
+        seen->flow_power += fluid.stream[i] * seen->rates[i];
+    }
+    note_sliding(&balance, seen);
+    differentiate(y, &links->drive, t.rotation, seen, dy);
+}
+
+/* Gap at every site, and last the smallest of the wire (infinite far from the wall), m. */
+void tube_robot_gaps(const TubeRobot *robot, const State *y, double *gaps) {
+    Balance balance = {.count = 0};
+    Seen seen = {.film = INFINITY};
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = &seen, .gaps = gaps};
+    axes_of(y, t.rotation);
+    touch(&t);
+}
