@@ -2,6 +2,7 @@
 #ifndef SPIRILLUM_CONTACTS_H
 #define SPIRILLUM_CONTACTS_H
 
+#include "cavitation.h"
 #include "links.h"
 
 /* A site on body or coupling: a ring about the motor axis that carries a ball; the columns of kernels/contacts.py. */
@@ -47,16 +48,29 @@ typedef struct {
     double u, v, drag; /* sliding velocity, m/s, and dry friction over it, N s/m */
 } Sliding;
 
-/* Forces that balance: A q + sum of dry friction = f; see dry_friction.c. */
+/* A slice of the lubrication film under the body's straight side: its velocities per rate. */
+typedef struct {
+    double gap, bend;                              /* h0, R', m */
+    double length;                                 /* along the body, m */
+    double opening[RATES], entrainment[RATES];     /* V and u per rate */
+} Slice;
+
+enum { MOST_SLICES = 24 };
+
+/* Forces that balance: A q + sum of dry friction - lift of cavitation = f; see dry_friction.c. */
 typedef struct {
     double a[RATES][RATES], force[RATES];
     Contact contacts[MOST_CONTACTS];
     int64_t count;
+    Slice slices[MOST_SLICES]; /* of a film that may cavitate */
+    int64_t slice_count;
+    double viscosity, bound;   /* Pa s; the film's pressure is not below -p_c, Pa */
     double slow;      /* v_r, below which dry friction is smooth, m/s */
     int along;        /* the rate along which a torque keeps a prescribed spin */
     bool prescribed;  /* whether the spin q_3 + q_6 is */
 } Balance;
 
+Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]);
 Sliding sliding_at(const Contact *contact, const double q[RATES], double slow);
 double balance_rates(const Balance *balance, double q[RATES], double left[RATES]);
 

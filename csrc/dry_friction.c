@@ -4,7 +4,8 @@
  *
  * for seven rates q, with N_c the loads at contacts and J_c q their sliding velocities (2,). Where A is symmetric the
  * left side is the gradient of a convex function. A joint friction as printed in (15) makes A unsymmetric, still with a
- * positive definite symmetric part.
+ * positive definite symmetric part. The lift of a film that cavitates, with the film's linear resistance in A, is the
+ * gradient of a convex function too; see cavitation.c.
  */
 #include "contacts.h"
 
@@ -23,6 +24,15 @@ Sliding sliding_at(const Contact *contact, const double q[RATES], double slow) {
     return (Sliding){u, v, contact->load / sqrt(u * u + v * v + slow * slow)};
 }
 
+Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]) {
+    LineContact contact = {.gap = slice->gap, .bend = slice->bend};
+    for (int i = 0; i < RATES; i++) {
+        contact.opening += slice->opening[i] * q[i];
+        contact.entrainment += slice->entrainment[i] * q[i];
+    }
+    return cavitation_lift(&contact, balance->viscosity, balance->bound);
+}
+
 static int skipped_row(const Balance *b) { return b->prescribed ? b->along : -1; }
 
 /* What rates leave of the balance; its size, in the measure of A's diagonal, without the row of a torque. */
@@ -34,6 +44,11 @@ static double residual(const Balance *b, const double q[RATES], double left[RATE
     for (const Contact *c = b->contacts; c < b->contacts + b->count; c++) {
         const Sliding s = sliding_at(c, q, b->slow);
         for (int i = 0; i < RATES; i++) left[i] += s.drag * (c->rows[0][i] * s.u + c->rows[1][i] * s.v);
+    }
+    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
+        const Lift lift = lift_at(b, s, q);
+        for (int i = 0; i < RATES; i++)
+            left[i] -= s->length * (lift.normal * s->opening[i] + lift.along * s->entrainment[i]);
     }
     double size = 0.0;
     for (int i = 0; i < RATES; i++)
@@ -54,6 +69,15 @@ static double scale_of(const Balance *b, const double q[RATES]) {
     return sqrt(found);
 }
 
+/* Take the derivative of a slice's lift from the derivative of the balance. */
+static void add_slice(const Slice *s, Lift lift, double h[RATES][RATES]) {
+    for (int i = 0; i < RATES; i++) {
+        const double v = s->length * (s->opening[i] * lift.of_opening[0] + s->entrainment[i] * lift.of_opening[1]);
+        const double u = s->length * (s->opening[i] * lift.of_entrainment[0] + s->entrainment[i] * lift.of_entrainment[1]);
+        for (int j = 0; j < RATES; j++) h[i][j] -= v * s->opening[j] + u * s->entrainment[j];
+    }
+}
+
 /* The derivative of the balance in q, with the direction of sliding replaced by the duals w in one place.
  *
  * mu_c N_c J_c' (1 - (w v' + v w')/(2 s)) J_c/s with v = J_c q, s = sqrt(|v|^2 + v_r^2): positive definite, and the
@@ -72,6 +96,7 @@ static void set_tangent(const Balance *b, const Duals duals, const double q[RATE
             for (int j = 0; j < RATES; j++) h[i][j] += x * c->rows[0][j] + z * c->rows[1][j];
         }
     }
+    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) add_slice(s, lift_at(b, s, q), h);
 }
 
 /* Largest share of a step from w that stays in the unit circle. */

@@ -35,6 +35,10 @@ typedef struct {
     double offset, azimuth, pitch, yaw, turn;           /* e, A, p, psi; roll of the body against F; see tube_motion.c */
     double outside;                                     /* 0 inside the table, else the range that was left */
     double balance;                                     /* what the solution leaves of the forces, 1 */
+    /* Forces towards the wall at the body's mid-length, N, which sum to zero: of weight and buoyancy, of the film, of the
+     * fluid besides (the tail's side force, an imposed flow) and of the asperities. */
+    double weight_load, film_load, outer_load, contact_load;
+    double lift;                                        /* what the bound of the film's pressure adds away from it, N */
 } Seen;
 
 enum { STATES = sizeof(State) / sizeof(double), SEEN = sizeof(Seen) / sizeof(double) };

@@ -33,6 +33,7 @@ typedef struct {
     double radius, roughness, load;  /* R, m; s, m; load at half of it, N */
     double coefficient, sliding;     /* mu_c; v_r, m/s */
     double viscosity, ends, length;  /* Pa s; one of the kinds; L_eff, m */
+    double cavitation;               /* the film's pressure is not below -p_c, Pa; infinite: without a bound */
     double sites, stations;          /* their numbers */
 } Tube;
 

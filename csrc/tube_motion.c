@@ -2,8 +2,9 @@
  *
  * Unknowns are the seven rates q = (U, Omega_b, omega_m) in body axes about the origin. Forces balance without inertia:
  *
- *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n
+ *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n + L(q),
  *
+ * where L is the lift of a film that cavitates, over the rates; see set_slices and cavitation.c.
  * M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint;
  * N_c the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of
  * dry friction, made smooth below the sliding speed v_r. See contacts.c and dry_friction.c.
@@ -66,6 +67,7 @@ static double imposed_flow(const TubeRobot *robot, double time) {
 /* The fluid about the robot, in body axes. */
 typedef struct {
     double matrix[RATES][RATES]; /* against q, SI */
+    double film[6][6];           /* of it, the film's, against U and Omega_b */
     double stream[RATES];        /* force of an imposed flow */
     double opened[RATES];        /* mean flow of open ends per q */
 } Fluid;
@@ -73,9 +75,10 @@ typedef struct {
 static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
     const Tube *tube = robot->tube;
     const Pose pose = {seen->offset, seen->pitch, seen->yaw};
-    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS];
-    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, free_of_roll);
+    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
+    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
     turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
+    turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
     const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
     seen->mean_flow = tube->ends == IMPOSED ? imposed_flow(robot, time) : 0.0;
     for (int i = 0; i < RATES; i++) {
@@ -158,6 +161,49 @@ static void touch(Touch *t) {
     if (t->gaps) t->gaps[robot->site_count] = t->seen->tail_gap;
 }
 
+static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
+static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
+
+/* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin.
+ *
+ * Their velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference,
+ * with v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. The table's
+ * film loses pressure at the ends of the body, which slices do not know: they are as long in all as they have its
+ * resistance to a motion along the normal, so that what is left of the film stays positive. */
+static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Fluid *fluid,
+                       const Seen *seen, Balance *b) {
+    const Film *film = &robot->table.film;
+    const double a = film->body, radius = robot->tube->radius, half = 0.5 * (film->front - film->rear);
+    b->slice_count = 0;
+    b->viscosity = robot->tube->viscosity;
+    b->bound = robot->tube->cavitation;
+    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * a)) return;
+    double normal[3] = {0.0}, sliced = 0.0;
+    for (int n = 0; n < MOST_SLICES; n++) {
+        const double angle = PI * (n + 0.5) / MOST_SLICES;
+        const Site site = {.x = film->rear + half * (1.0 - cos(angle)), .ring = a};
+        const Nearest at = site_nearest(&site, y, rotation, radius);
+        Slice *s = b->slices + b->slice_count++;
+        double rows[2][RATES];
+        sliding_rows(&at, rotation, 0.0, rows);
+        *s = (Slice){.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a),
+                     .length = half * sin(angle) * PI / MOST_SLICES};
+        const double *t = rows[1];
+        const double axis[RATES] = {t[0], t[1], t[2], 0.0, -site.x * t[2], site.x * t[1], 0.0};
+        for (int i = 0; i < RATES; i++) {
+            s->opening[i] = -at.j[i];
+            s->entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
+        }
+        for (int i = 0; i < 3; i++) normal[i] += at.normal[i] / MOST_SLICES;
+        sliced += s->length * 3.0 * PI * b->viscosity * sqrt(2.0 * s->gap) * pow(s->bend, 1.5) / squared(s->gap);
+    }
+    double whole = 0.0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) whole += b->viscosity * normal[i] * fluid->film[i][j] * normal[j];
+    const double share = smaller(whole / sliced, 1.0);
+    for (int64_t n = 0; n < b->slice_count; n++) b->slices[n].length *= share;
+}
+
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
  * a trial inside the wall has none, and the next one must not begin with them. */
 static double solve_rates(Balance *b, const Drive *drive, double current, Seen *seen) {
@@ -188,21 +234,65 @@ static void note_sliding(const Balance *b, Seen *seen) {
     }
 }
 
+/* Component of a force in body axes towards the wall at the body's mid-length. */
+static double towards_wall(const double force[3], const double rotation[3][3], double azimuth) {
+    double found = 0.0;
+    for (int i = 0; i < 3; i++) found += force[i] * (sin(azimuth) * rotation[1][i] - cos(azimuth) * rotation[2][i]);
+    return found;
+}
+
+/* Note the forces towards the wall, which sum to zero, and take from the fluid's power what the film's bound saves. */
+static void note_loads(const Balance *b, const Fluid *fluid, const double weight[RATES], const double asperities[RATES],
+                       const double rotation[3][3], Seen *seen) {
+    const double *q = seen->rates, mu = b->viscosity;
+    double film[3], outer[3], contact[3], lift[3] = {0.0};
+    for (int i = 0; i < 3; i++) {
+        film[i] = 0.0;
+        outer[i] = fluid->stream[i];
+        contact[i] = asperities[i];
+        for (int j = 0; j < 6; j++) film[i] -= mu * fluid->film[i][j] * q[j];
+        for (int j = 0; j < RATES; j++) outer[i] -= fluid->matrix[i][j] * q[j];
+        outer[i] -= film[i];
+    }
+    for (int64_t n = 0; n < b->count; n++) {
+        const Sliding s = sliding_at(b->contacts + n, q, b->slow);
+        for (int i = 0; i < 3; i++)
+            contact[i] -= s.drag * (b->contacts[n].rows[0][i] * s.u + b->contacts[n].rows[1][i] * s.v);
+    }
+    for (int64_t n = 0; n < b->slice_count; n++) {
+        const Slice *s = b->slices + n;
+        const Lift of_slice = lift_at(b, s, q);
+        for (int i = 0; i < RATES; i++) {
+            const double force = s->length * (of_slice.normal * s->opening[i] + of_slice.along * s->entrainment[i]);
+            if (i < 3) lift[i] += force;
+            seen->dissipated_power -= force * q[i];
+        }
+    }
+    seen->weight_load = towards_wall(weight, rotation, seen->azimuth);
+    seen->outer_load = towards_wall(outer, rotation, seen->azimuth);
+    seen->contact_load = towards_wall(contact, rotation, seen->azimuth);
+    seen->lift = -towards_wall(lift, rotation, seen->azimuth);
+    seen->film_load = towards_wall(film, rotation, seen->azimuth) - seen->lift;
+}
+
 /* Write what is observed in a state, and its time derivative. */
 void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
     const Links *links = robot->links;
     Balance balance = {.count = 0, .slow = robot->tube->sliding};
     Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
     Fluid fluid;
-    double field[RATES];
+    double field[RATES], weight[RATES], asperities[RATES];
     axes_of(y, t.rotation);
     note_place(y, t.rotation, robot->tube->radius, seen);
     set_fluid(robot, y->phase, time, seen, &fluid);
-    weight_loads(&links->weight, y->phase, t.rotation, balance.force);
+    weight_loads(&links->weight, y->phase, t.rotation, weight);
+    for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);
+    for (int i = 0; i < RATES; i++) asperities[i] = balance.force[i];
+    set_slices(robot, y, t.rotation, &fluid, seen, &balance);
     field_loads(&links->drive, time, t.rotation, field);
     assemble(fluid.matrix, links, balance.a);
-    for (int i = 0; i < RATES; i++) balance.force[i] += field[i] + fluid.stream[i];
+    for (int i = 0; i < RATES; i++) balance.force[i] += weight[i] + field[i] + fluid.stream[i];
     seen->drive_torque = solve_rates(&balance, &links->drive, y->current, seen);
     note_powers(fluid.matrix, links, field, seen);
     seen->flow_power = 0.0;
@@ -211,6 +301,7 @@ void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen 
         seen->flow_power += fluid.stream[i] * seen->rates[i];
     }
     note_sliding(&balance, seen);
+    note_loads(&balance, &fluid, weight, asperities, t.rotation, seen);
     differentiate(y, &links->drive, t.rotation, seen, dy);
 }
 

@@ -41,11 +41,13 @@ static void add_station(const StandIn *s, const double station[2], const double 
             for (int j = 0; j < 6; j++) out[i][j] += station[1] * weights[row] * rows[row][i] * rows[row][j];
 }
 
-static int stand_in_resistance(const Table *table, Pose pose, double phase, double out[MOTIONS][MOTIONS]) {
+static int stand_in_resistance(const Table *table, Pose pose, double phase, double film[6][6],
+                               double out[MOTIONS][MOTIONS]) {
     const StandIn *s = (const StandIn *)table->outline;
     const double p = pose.pitch, psi = pose.yaw;
     double f[3][3] = {{cos(p) * cos(psi), cos(p) * sin(psi), sin(p)}, {-sin(psi), cos(psi), 0.0}};
     cross(f[0], f[1], f[2]);
+    for (int i = 0; i < 36; i++) film[i / 6][i % 6] = 0.0;
     turn_about_axis(&s->rest[0][0], phase, &out[0][0], MOTIONS);
     for (int n = 0; n < 5; n++) add_station(s, s->stations[n], f, pose.offset, out);
     return fabs(p) > s->largest;
@@ -57,5 +59,6 @@ static int stand_in_resistance(const Table *table, Pose pose, double phase, doub
 
 EXPORT void stand_in_at(const double *table, double offset, double *out) {
     const Table opened = stand_in_opened(table);
-    stand_in_resistance(&opened, (Pose){offset, 0.0, 0.0}, 0.0, (double(*)[MOTIONS])out);
+    double film[6][6];
+    stand_in_resistance(&opened, (Pose){offset, 0.0, 0.0}, 0.0, film, (double(*)[MOTIONS])out);
 }

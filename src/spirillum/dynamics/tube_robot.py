@@ -55,7 +55,7 @@ class TubeRobot(FreeRobot):
     observed: ClassVar[int] = rigid_links.SEEN
 
     tube: Samples
-    """The tube (8,), see `kernels.tube_motion`."""
+    """The tube (9,), see `kernels.tube_motion`."""
     wire: Samples
     """The wire (6,), see `kernels.contacts`."""
     sites: Samples
@@ -137,6 +137,8 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     tube[kernel.COEFFICIENT], tube[kernel.SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
     tube[kernel.VISCOSITY] = robot.fluid.viscosity
     tube[kernel.ENDS], tube[kernel.LENGTH] = around.ends, around.length
+    bound = robot.fluid.cavitation_pressure
+    tube[kernel.CAVITATION] = np.inf if bound is None else bound
     names, sites = _sites(robot)
     wire = _wire(robot)
     return TubeRobot(

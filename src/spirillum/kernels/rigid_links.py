@@ -20,7 +20,7 @@ FRICTION_POWER, DISSIPATED_POWER, DRIVE_POWER = 9, 10, 11  # W; the last of fiel
 PRESSED = 12  # energy of pressed roughness, J
 OBSERVED = 13
 TAIL_GAP, OUTSIDE = 18, 24  # what the integrator reads besides, see `tube_motion`
-SEEN = 26  # places of all that is observed, wherever the robot swims
+SEEN = 31  # places of all that is observed, wherever the robot swims
 
 # The drive.
 KIND, FIXED, DUTY = 0, 1, 2  # one of the kinds below; whether the joint is fixed; duty of the remote

@@ -18,13 +18,16 @@ CONTACT_POWER, FLOW_POWER = 15, 16  # lost to dry friction, and from the imposed
 MEAN_FLOW = 17  # m/s; behind it TAIL_GAP, the smallest gap of the wire, m, where it is near the wall
 OFFSET, AZIMUTH, WALL_PITCH, WALL_YAW, TURN = 19, 20, 21, 22, 23  # e, A, p, psi; roll of the body against F
 BALANCE = 25  # what the solution leaves of the forces, 1; before it OUTSIDE, 0 inside the table, else the range left
+# Forces towards the wall at the body's mid-length, N, which sum to zero; what the bound of the film's pressure lifts.
+WEIGHT_LOAD, FILM_LOAD, OUTER_LOAD, CONTACT_LOAD, LIFT = 26, 27, 28, 29, 30
 
 # The tube.
 RADIUS, ROUGHNESS, LOAD = 0, 1, 2  # R, m; s, m; load at half of it, N
 COEFFICIENT, SLIDING = 3, 4  # mu_c; v_r, m/s
 VISCOSITY, ENDS, LENGTH = 5, 6, 7  # Pa s; one of the kinds below; L_eff, m
-SITES, STATIONS = 8, 9  # their numbers
-TUBE = 10
+CAVITATION = 8  # the film's pressure is not below -p_c, Pa; infinite: without a bound
+SITES, STATIONS = 9, 10  # their numbers
+TUBE = 11
 CLOSED, OPEN, IMPOSED = 0.0, 1.0, 2.0  # kinds of ends
 
 
@@ -44,7 +47,7 @@ def packed(
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
         weight: submerged weight of body and rotor, and its first moments, (8,).
         drive: drive and motor, (23,).
-        tube: the tube, (8,) up to the numbers of sites and stations.
+        tube: the tube, (9,) up to the numbers of sites and stations.
         wire: the wire, see `contacts`, (6,).
         sites: sites of body and coupling, see `contacts`, (n, 5).
         stations: stations along the wire, see `contacts`, (m, 4).
