@@ -49,6 +49,23 @@ typedef struct {
     Table table;
 } TubeRobot;
 
+/* How `advance` ended: the time was reached; the steps are used up; something watched has changed its sign in the last
+ * step; no step is small enough. */
+enum { DONE, PAUSED, CROSSED, STUCK };
+
+/* What a run is watched for, behind the gaps less the roughness: room to the tube's end, charge left, the table's range. */
+enum { ROOM, CHARGE_LEFT, WITHIN, WATCHED };
+
+/* Where the tube and the battery end: half the channel, its middle, nose and tip on the motor axis, m; charge, A s. */
+typedef struct {
+    double channel, middle, nose, tip, most_charge;
+} Limits;
+
+/* Between calls: time, length of the next step; time and length of the last step taken; samples answered in a call. */
+typedef struct {
+    double time, step, last_time, last_step, answered;
+} Memory;
+
 TwoLinks two_links_opened(const double *packed, int64_t size);
 void two_links_rates(const TwoLinks *robot, const State *y, double time, Seen *seen, State *dy);
 double two_links_film(const TwoLinks *robot, const State *y);

@@ -66,28 +66,11 @@ static const int ACTS[ACTING] = {
 static const double WIDER = 30.0;     /* steps of central differences over those of differences to one side */
 static const double SMALLEST = 1e-12; /* step over the time that it would be without */
 
-/* How `advance` ended: the time was reached; the steps are used up; something watched has changed its sign in the last
- * step; no step is small enough. */
-enum { DONE, PAUSED, CROSSED, STUCK };
-
-/* What a run is watched for, behind the gaps less the roughness: room to the tube's end, charge left, the table's range. */
-enum { WATCHED = 3, MOST_WATCHED = MOST_CONTACTS + WATCHED };
-
-/* Where the tube and the battery end: half the channel, its middle, nose and tip on the motor axis, m; charge, A s. */
-typedef struct {
-    double channel, middle, nose, tip, charge;
-} Limits;
-
 /* Sizes of the state's components below which nothing matters; a small change of time, s (0: nothing depends on it); a
  * time of the order of the run's, s. */
 typedef struct {
     double state[STATES], later, whole;
 } Sizes;
-
-/* Between calls: time, length of the next step; time and length of the last step taken; samples answered in a call. */
-typedef struct {
-    double time, step, last_time, last_step, answered;
-} Memory;
 
 /* A robot of either kind: without a table it is one without a tube. */
 typedef struct {
@@ -134,9 +117,9 @@ static double watch(const Robot *robot, const double *state, double outside, con
     const double along = 1.0 - 2.0 * (j * j + k * k) / (w * w + i * i + j * j + k * k);
     const double x = y->position[0] - limits->middle;
     double *other = gaps + count - WATCHED;
-    other[0] = limits->channel - larger(x + limits->nose * along, -x - limits->tip * along);
-    other[1] = limits->charge - y->charge;
-    other[2] = outside == 0.0 ? 1.0 : -1.0;
+    other[ROOM] = limits->channel - larger(x + limits->nose * along, -x - limits->tip * along);
+    other[CHARGE_LEFT] = limits->most_charge - y->charge;
+    other[WITHIN] = outside == 0.0 ? 1.0 : -1.0;
     return smallest;
 }
 
@@ -333,7 +316,7 @@ typedef struct {
     bool clip;      /* whether a step ends at `stop` */
     Memory *memory;
     int64_t count;  /* of what is watched */
-    double now[MOST_WATCHED], rates[STATES]; /* at the end of the step */
+    double now[MOST_CONTACTS + WATCHED], rates[STATES]; /* at the end of the step */
     Step step;
 } Run;
 
