@@ -1,7 +1,7 @@
 /* What all files of csrc/ share.
  *
  * A function that Python calls is EXPORTed. It has the name and the parameters of its stub in spirillum/kernels: arrays
- * as pointers to their first element (C order), `int` as int64_t, `bool` as int64_t, then the dimensions that the stub's
+ * as pointers to their first element (C order), `int` and `bool` as int64_t, then the dimensions that the stub's
  * annotations name, each once, in the order in which they first appear. It allocates nothing unless it says so, keeps
  * nothing between calls, and checks nothing: the Python layer has.
  */
@@ -20,7 +20,10 @@
 
 #define PI 3.14159265358979323846
 
-static inline double clamped(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
-static inline double square(double x) { return x * x; }
+/* A NaN in the first place stays: a trial outside of everything must not look like one on the border. */
+static inline double larger(double a, double b) { return b > a ? b : a; }
+static inline double smaller(double a, double b) { return b < a ? b : a; }
+static inline double clamped(double x, double low, double high) { return smaller(larger(x, low), high); }
+static inline double squared(double x) { return x * x; }
 
 #endif

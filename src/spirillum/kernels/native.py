@@ -86,16 +86,14 @@ def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F
     def decorate(stub: _F) -> _F:
         @cache
         def prepared() -> _Call:
-            return _Call(stub, symbol or stub.__name__, frozenset(written))
+            return _Call(stub, symbol or stub.__name__, frozenset(written), rows)
 
         @wraps(stub)
         def call(*arguments: Any, **keywords: Any) -> Any:
-            if keywords:
+            if keywords or len(arguments) < stub.__code__.co_argcount:
                 bound = inspect.signature(stub).bind(*arguments, **keywords)
                 bound.apply_defaults()
                 arguments = bound.args
-            if rows and not in_one_thread():
-                return prepared().in_threads(rows, arguments)
             return prepared()(arguments)
 
         return cast("_F", call)
@@ -119,80 +117,87 @@ def rows_in_one_thread() -> Iterator[None]:
 
 
 class _ArrayArgument:
-    """Check of an array, and the pointer to it."""
+    """Check of an array."""
 
     def __init__(self, name: str, annotation: Any, *, is_written: bool) -> None:
         self.name, self.is_written = name, is_written
-        self.dtype = np.dtype(annotation.dtypes[0].replace("bool_", "bool"))
+        self.dtype = np.dtype(annotation.dtypes[0])
         shape = annotation.dim_str.split()
         self.shape = None if shape == ["..."] else tuple(int(size) if size.isdigit() else size for size in shape)
 
-    def __call__(self, value: Any, sizes: _Sizes) -> np.ndarray[Any, Any]:
+    def checked(self, value: Any, sizes: _Sizes) -> np.ndarray[Any, Any]:
         """Return the array as C takes it; add its named lengths to those of the call."""
         if not isinstance(value, np.ndarray) or value.dtype != self.dtype or not value.flags.c_contiguous:
             if self.is_written:
                 raise TypeError(f"{self.name} must be a contiguous array of {self.dtype}")
-            value = np.ascontiguousarray(value, dtype=self.dtype)
+            value = np.asarray(value).astype(self.dtype, order="C", casting="same_kind")
         if self.shape is None:
             return value
         shape = value.shape
-        if len(shape) != len(self.shape):
-            raise ValueError(f"{self.name} has shape {shape}; expected {self.shape}")
-        for length, size in zip(shape, self.shape, strict=True):
-            if length != (sizes.setdefault(size, length) if isinstance(size, str) else size):
-                raise ValueError(f"{self.name} has shape {shape}; expected {self.shape} with {sizes}")
+        fits = len(shape) == len(self.shape)
+        for length, size in zip(shape, self.shape, strict=False):
+            fits &= length == (sizes.setdefault(size, length) if isinstance(size, str) else size)
+        if not fits:
+            raise ValueError(f"{self.name} has shape {shape}; expected {self.shape} with {sizes}")
         return value
 
 
 class _Call:
     """A function of the library with the checks of its arguments."""
 
-    def __init__(self, stub: Callable[..., Any], symbol: str, written: frozenset[str]) -> None:
+    def __init__(self, stub: Callable[..., Any], symbol: str, written: frozenset[str], rows: str) -> None:
         hints = get_type_hints(stub)
         returned = hints.pop("return")
         self._arguments = [
-            hint if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
+            None if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
             for name, hint in hints.items()
         ]
-        names = [size for a in self._arguments if isinstance(a, _ArrayArgument) for size in a.shape or ()]
+        names = [size for argument in self._arguments if argument for size in argument.shape or ()]
         self._sizes = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
+        self._rows = rows
         self._function = library()[symbol]
         self._function.restype = _SCALARS.get(returned)
         self._function.argtypes = [
-            *(_SCALARS.get(a, ctypes.c_void_p) for a in self._arguments),
+            *(_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()),
             *(ctypes.c_int64 for _ in self._sizes),
         ]
+        self._is_whole = [hint in {int, bool} for hint in hints.values()]
         self._is_truth = returned is bool
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
         sizes: _Sizes = {}
-        values = self._checked(arguments, sizes)
+        values = [
+            value if expected is None else expected.checked(value, sizes)
+            for value, expected in zip(arguments, self._arguments, strict=True)
+        ]
+        if self._rows and not in_one_thread():
+            return self._run_in_threads(values, sizes)
         return self._run(values, sizes)
 
-    def in_threads(self, rows: str, arguments: tuple[Any, ...]) -> None:
+    def _run(self, values: list[Any], sizes: _Sizes) -> Any:
+        pointers = [
+            int(value) if is_whole else _pointer(value) if isinstance(value, np.ndarray) else value
+            for value, is_whole in zip(values, self._is_whole, strict=True)
+        ]
+        result = self._function(*pointers, *[sizes[name] for name in self._sizes])
+        return bool(result) if self._is_truth else result
+
+    def _run_in_threads(self, values: list[Any], sizes: _Sizes) -> None:
         """Let threads share the rows of the arrays whose first dimension has this name."""
-        sizes: _Sizes = {}
-        values = self._checked(arguments, sizes)
-        count = sizes[rows]
-        shared = [isinstance(a, _ArrayArgument) and bool(a.shape) and a.shape[0] == rows for a in self._arguments]
+        count = sizes[self._rows]
+        shared = [bool(argument and argument.shape) and argument.shape[0] == self._rows for argument in self._arguments]
 
         def run(low: int, high: int) -> None:
             part = [value[low:high] if cut else value for value, cut in zip(values, shared, strict=True)]
-            self._run(part, sizes | {rows: high - low})
+            self._run(part, sizes | {self._rows: high - low})
 
         edges = np.linspace(0, count, min(_SHARES * _THREADS, count) + 1).astype(int).tolist()
         with ThreadPoolExecutor(_THREADS) as pool:
             list(pool.map(run, edges[:-1], edges[1:]))
 
-    def _checked(self, arguments: tuple[Any, ...], sizes: _Sizes) -> list[Any]:
-        if len(arguments) != len(self._arguments):
-            raise TypeError(f"{len(self._arguments)} arguments are needed, {len(arguments)} are given")
-        return [
-            expected(value, sizes) if isinstance(expected, _ArrayArgument) else expected(value)
-            for value, expected in zip(arguments, self._arguments, strict=True)
-        ]
 
-    def _run(self, values: list[Any], sizes: _Sizes) -> Any:
-        pointers = (value.ctypes.data if isinstance(value, np.ndarray) else value for value in values)
-        result = self._function(*pointers, *(sizes[name] for name in self._sizes))
-        return bool(result) if self._is_truth else result
+def _pointer(array: np.ndarray[Any, Any]) -> Any:
+    """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
+    if array.size and array.flags.writeable:
+        return ctypes.byref(ctypes.c_char.from_buffer(array))
+    return array.ctypes.data
