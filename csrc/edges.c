@@ -117,7 +117,8 @@ EXPORT void edge_scores(
             const int64_t g = group[i] * rows;
             const double u = (double)c + floor(pixels[i][0] + first_u + 0.5), v = floor(pixels[i][1] + first_v + 0.5);
             if (0.0 <= u && u < (double)width && -(double)rows < v && v < (double)height) {
-                const int64_t row = (int64_t)v, low = row < 0 ? -row : 0, high = rows < height - row ? rows : height - row;
+                const int64_t row = (int64_t)v, low = row < 0 ? -row : 0, rest = height - row;
+                const int64_t high = rows < rest ? rows : rest;
                 const double n_u = normals[i][0], n_v = normals[i][1];
                 const double *along = slope_u + (int64_t)u * height + row, *down = slope_v + (int64_t)u * height + row;
                 for (int64_t r = low; r < high; r++) together[r] += along[r] * n_u + down[r] * n_v;

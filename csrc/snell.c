@@ -53,7 +53,8 @@ static double undistorted(const Camera *c, double far) {
     double r = far;
     for (int k = 0; k < STEPS; k++) {
         const double r2 = r * r;
-        const double step = (r * (1.0 + r2 * (c->k1 + r2 * c->k2)) - far) / (1.0 + r2 * (3.0 * c->k1 + 5.0 * r2 * c->k2));
+        const double slope = 1.0 + r2 * (3.0 * c->k1 + 5.0 * r2 * c->k2);
+        const double step = (r * (1.0 + r2 * (c->k1 + r2 * c->k2)) - far) / slope;
         r -= step;
         if (fabs(step) < 1e-14) break;
     }
