@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.kernels.raster import Shading, draw
+from spirillum.kernels.raster import draw
 from spirillum.robot.surface import mass_properties
 from spirillum.virtual.optics import VirtualLens, backdrop, spots, tank_of
 from spirillum.virtual.pictures import Painter
@@ -19,8 +19,8 @@ def coverage(corners: np.ndarray, faces: np.ndarray, heights: np.ndarray, size: 
     depth = np.full((rows, columns, 16), -1e30, dtype=np.float32)
     picture = np.zeros((rows, columns, 16, 3), dtype=np.float32)
     seen = np.column_stack([corners, heights])
-    shading = Shading(*(np.ones((len(faces), 3)) for _ in range(4)))
-    draw(seen, faces, shading, places, np.arange(16), 3, 2, depth, picture)
+    light = np.ones((len(faces), 3))
+    draw(seen, faces, light, light, light, light, places, 0, 1, 3, 2, depth, picture)
     return np.asarray((depth > -1e29).mean(axis=-1))
 
 

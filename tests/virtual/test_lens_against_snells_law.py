@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from spirillum.kernels.sightlines import sightline
 from spirillum.virtual.optics import VirtualLens
 from spirillum.virtual.trajectory import lab_to_camera
 
@@ -39,8 +38,8 @@ def test_a_pixel_and_its_point_agree(case: VirtualLens, points: np.ndarray) -> N
 def test_rays_bend_at_the_surface_by_snells_law(case: VirtualLens, points: np.ndarray) -> None:
     for point in points:
         u, v, _ = case.seen(point[None])[0]
-        ray = sightline(u, v, case.camera, case.turn)
-        crossing = np.array([ray.x, ray.y, case.surface])
+        x, y, *_ = case.sightlines(np.array([[u, v]]))[0]
+        crossing = np.array([x, y, case.surface])
         above, below = np.array([0.0, 0.0, case.eye]) - crossing, point - crossing
         sin_air = np.hypot(*above[:2]) / np.linalg.norm(above)
         sin_oil = np.hypot(*below[:2]) / np.linalg.norm(below)
@@ -52,14 +51,14 @@ def test_light_takes_the_shortest_optical_path(points: np.ndarray) -> None:
     case = lens()
     for point in points[:8]:
         u, v, _ = case.seen(point[None])[0]
-        ray = sightline(u, v, case.camera, case.turn)
+        at_x, at_y, *_ = case.sightlines(np.array([[u, v]]))[0]
 
         def path(x: float, y: float, point: np.ndarray = point) -> float:
             at = np.array([x, y, case.surface])
             return float(np.linalg.norm([x, y, case.surface - case.eye]) + case.index * np.linalg.norm(point - at))
 
-        least = path(ray.x, ray.y)
-        assert all(path(ray.x + a, ray.y + b) > least for a, b in ((1e-4, 0), (-1e-4, 0), (0, 1e-4), (0, -1e-4)))
+        least = path(at_x, at_y)
+        assert all(path(at_x + a, at_y + b) > least for a, b in ((1e-4, 0), (-1e-4, 0), (0, 1e-4), (0, -1e-4)))
 
 
 def test_near_the_axis_oil_seems_shallower_by_its_index() -> None:

@@ -33,7 +33,7 @@ def test_all_places_against_one_after_the_other() -> None:
     normals = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     found, first = np.empty((9, 14)), (-14.0, -7.5)
     u, v = (np.ascontiguousarray(slopes[..., k]) for k in (0, 1))
-    edge_scores(u, v, pixels, normals, group, 5, first, found)
+    edge_scores(u, v, pixels, normals, group, *first, np.empty((2, 5, found.shape[1])), found)
     assert 20 < np.count_nonzero(found) < found.size
     for place in np.ndindex(found.shape):
         moved = pixels + np.array(first) + np.array(place)

@@ -42,7 +42,7 @@ class H264Writer:
         size = 2 * len(self._colours) // 3, self._colours.shape[1], 3
         if image.shape != size:
             raise ValueError(f"a frame of shape {image.shape} in a film of frames of shape {size}")
-        film_colours(np.ascontiguousarray(image), self._colours)
+        film_colours(image, self._colours)
         frame = self._av.VideoFrame.from_ndarray(self._colours, format="yuv420p")
         frame.colorspace, frame.color_range = _BT709, _LIMITED_RANGE
         frame.pts = self._next if number is None else number

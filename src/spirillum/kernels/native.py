@@ -132,7 +132,7 @@ class _ArrayArgument:
         if not isinstance(value, np.ndarray) or value.dtype != self.dtype or not value.flags.c_contiguous:
             if self.is_written:
                 raise TypeError(f"{self.name} must be a contiguous array of {self.dtype}")
-            value = np.ascontiguousarray(value, dtype=self.dtype)
+            value = np.asarray(value).astype(self.dtype, order="C", casting="same_kind")
         if self.shape is None:
             return value
         shape = value.shape

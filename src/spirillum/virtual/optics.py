@@ -8,20 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.raster import project
-from spirillum.kernels.sightlines import (
-    Backdrop,
-    FloorWaves,
-    GlassTube,
-    RefractingCamera,
-    Ruler,
-    sightline,
-    still_picture,
-)
+from spirillum.kernels.sightlines import project, sightlines, still_picture
 from spirillum.robot.robot import Robot
 from spirillum.virtual.solids import linear
 
@@ -66,10 +58,11 @@ class VirtualLens:
         return 0.5 * (self.size[0] - 1), 0.5 * (self.size[1] - 1)
 
     @property
-    def camera(self) -> RefractingCamera:
-        """Its numbers, as the kernels take them."""
+    def camera(self) -> Samples:
+        """Its numbers, as `kernels.sightlines` takes them."""
         focal = -self.focal if self.leftwards else self.focal
-        return RefractingCamera(self.eye, self.surface, self.index, focal, *self.centre, *self.distortion)
+        head = self.eye, self.surface, self.index, focal, *self.centre, *self.distortion
+        return np.array([*head, *self.turn.flat])
 
     def seen(self, points: Samples) -> Samples:
         """Pixel u, v and height z of points.
@@ -79,7 +72,17 @@ class VirtualLens:
         """
         points = np.ascontiguousarray(points, dtype=float)
         found = np.empty_like(points)
-        project(points, self.camera, self.turn, found)
+        project(points, self.camera, found)
+        return found
+
+    def sightlines(self, pixels: Samples) -> Samples:
+        """Lines of sight of pixels, (n, 2), below the surface.
+
+        Returns:
+            (n, 5): x and y where they cross it, m, and the unit vector away from the camera.
+        """
+        found = np.empty((len(pixels), 5))
+        sightlines(pixels, self.camera, found)
         return found
 
     def points(self, pixels: Samples, height: float) -> Samples:
@@ -92,12 +95,9 @@ class VirtualLens:
         Returns:
             (n, 3), m.
         """
-        found = np.empty((len(pixels), 3))
-        for place, (u, v) in enumerate(np.asarray(pixels, dtype=float)):
-            ray = sightline(float(u), float(v), self.camera, self.turn)
-            depth = (self.surface - height) / -ray.dz
-            found[place] = ray.x + ray.dx * depth, ray.y + ray.dy * depth, height
-        return found
+        rays = self.sightlines(pixels)
+        places = rays[:, :2] + rays[:, 2:4] * ((self.surface - height) / -rays[:, 4:])
+        return np.column_stack([places, np.full(len(places), height)])
 
 
 _SPACING = 2e-3
@@ -150,6 +150,19 @@ class Tank:
     def outside(self) -> float:
         """Outer radius of the tube, 0 without one."""
         return 0.0 if self.tube is None else self.tube + _GLASS
+
+
+class Backdrop(NamedTuple):
+    """The still parts as the camera sees them; linear light, single precision."""
+
+    light: np.ndarray
+    """Without the robot, (rows, columns, 3)."""
+    over: np.ndarray
+    """Transmission of the glass between robot and camera, (rows, columns)."""
+    shine: np.ndarray
+    """Light mirrored by the glass, (rows, columns)."""
+    floor: np.ndarray
+    """x and y of the floor behind each pixel, m, (rows, columns, 2)."""
 
 
 def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False) -> Tank:
@@ -210,14 +223,14 @@ def backdrop(tank: Tank, lens: VirtualLens) -> Backdrop:
     end, paper = tank.ruler + _LINE_LENGTH * tank.shrunk, _PAPER * tank.shrunk
     line_width = min(_LINE_WIDTH, 0.25 * tank.spacing)
     start = math.inf if tank.grid else tank.ruler - paper
-    ruler = Ruler(start, tank.ruler, end, end + paper, tank.spacing, line_width)
+    ruler = np.array([start, tank.ruler, end, end + paper, tank.spacing, line_width])
     half_length = -1.0 if tank.tube is None else 0.5 * tank.tube_length
-    tube = GlassTube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
+    tube = np.array([tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION])
     azimuth, phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2)).T
     wavenumber = 2 * np.pi * np.array(_MOTTLE) / tank.shrunk
     amplitude = np.full(len(_MOTTLE), 0.012)
-    waves = FloorWaves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
-    still_picture(lens.camera, lens.turn, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), still)
+    waves = np.column_stack([wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase, amplitude])
+    still_picture(lens.camera, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), *still)
     if tank.grid:
         _print_grid(still, tank.spacing, colours[0])
     return still

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.raster import Lamps, Shading, Shadow, blend, develop, draw
-from spirillum.kernels.sightlines import Backdrop
+from spirillum.kernels.raster import blend, develop, draw
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.virtual.artifacts import ViewArtifacts
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.optics import Tank, VirtualLens, backdrop, spots, tint
-from spirillum.virtual.solids import MATERIALS, RenderedSolid, joined, part_of, solids_of
+from spirillum.virtual.optics import Backdrop, Tank, VirtualLens, backdrop, spots, tint
+from spirillum.virtual.solids import MATERIALS, Lamps, RenderedSolid, Shading, joined, part_of, solids_of
 from spirillum.virtual.trajectory import CameraFramePose, TrialTrajectory
 
 _GLASS = 1.47
@@ -77,7 +76,7 @@ class Cover:
             turn: rotation of the body, (3, 3).
         """
         normals = self.solid.normals @ turn.T + _ENCODED
-        return Shading(self._red, self._green, *(np.ascontiguousarray(normals[..., k]) for k in (0, 1)))
+        return Shading(self._red, self._green, normals[..., 0], normals[..., 1])
 
     def decoded(self, depth: Samples, samples: Samples) -> Glass:
         """Cover in a window of samples with the colours of `encoded`; the samples are cleared.
@@ -217,7 +216,7 @@ class Painter:
         self._lamps = _lamps(tank.view, side)
         self._cover = Cover(robot, lens.index, self.still, self._lamps, side) if covered else None
         self._tint = tint(lens.surface - tank.tube_height)
-        self._spots = np.swapaxes(spots(_SIDE), 1, 2)
+        self._spots = np.ascontiguousarray(np.swapaxes(spots(_SIDE), 1, 2))
         self._depth = np.empty(0, dtype=np.float32)
         self._samples = np.empty(0, dtype=np.float32)
 
@@ -242,10 +241,9 @@ class Painter:
 
         def sample(part: tuple[RenderedSolid, Samples, list[Samples]], shading: Shading) -> None:
             solid, _, moments = part
+            every = len(moments)  # each time has a share of every pixel's samples
             for number, pixels in enumerate(moments):
-                which = np.arange(number, _SAMPLES, len(moments))  # each time has a share of every pixel's samples
-                places = np.ascontiguousarray(self._spots[:, :, which])
-                draw(pixels, solid.faces, shading, places, which, left, top, depth, samples)
+                draw(pixels, solid.faces, *shading, self._spots, number, every, left, top, depth, samples)
 
         glass = None
         if self._cover is not None:
@@ -254,7 +252,8 @@ class Painter:
             self._cover.refract(picture, glass, left, top, float(middle.position[2]))
         for part in parts:
             sample(part, part[0].shading(part[1], self._lamps))
-        blend(depth, samples, left, top, self.still, self._shadow(middle), self._tint, picture)
+        _, *still = self.still
+        blend(depth, samples, left, top, *still, self._shadow(middle), self._tint, picture)
         if self._cover is not None and glass is not None:
             self._cover.shine(picture, glass, left, top)
         return picture
@@ -299,13 +298,13 @@ class Painter:
         shape = (rows, columns, _SAMPLES)
         return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
 
-    def _shadow(self, pose: CameraFramePose) -> Shadow:
-        """Soft shadow; the lamp is a little to one side."""
+    def _shadow(self, pose: CameraFramePose) -> Samples:
+        """Soft shadow, as `blend` takes it; the lamp is a little to one side."""
         half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
         x, y, z = (float(value) for value in pose.position)
         drop = (-0.1 if self.lens.leftwards else 0.1) * z
-        axis_x, axis_y = (float(value) for value in pose.body[:2, 0])
-        return Shadow(x, y - drop, axis_x, axis_y, half - 0.6 * radius, 0.95 * radius, 0.22 * radius, _SHADOW)
+        edge = 0.95 * radius, 0.22 * radius
+        return np.array([x, y - drop, *pose.body[:2, 0], half - 0.6 * radius, *edge, _SHADOW])
 
 
 def _lamps(view: str, side: float) -> Lamps:
@@ -314,7 +313,7 @@ def _lamps(view: str, side: float) -> Lamps:
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     halfway = towards + np.array([0.0, 0.0, 1.0])
     halfway /= np.linalg.norm(halfway, axis=1, keepdims=True)
-    return Lamps(towards, np.array([strength for *_, strength in _LAMPS[view]]), halfway)
+    return Lamps(towards, halfway, np.array([strength for *_, strength in _LAMPS[view]]))
 
 
 _TEXT = "synthetic"

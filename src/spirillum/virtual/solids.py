@@ -6,12 +6,13 @@ Edges are short enough that refraction bends none visibly.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.kernels.raster import Lamps, Materials, Shading, shade
+from spirillum.kernels.raster import shade
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, corner_normals
@@ -107,6 +108,30 @@ def linear(colours: Samples) -> Samples:
     return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
 
 
+class Lamps(NamedTuple):
+    """Lamps far away, in the camera's frame."""
+
+    towards: Samples
+    """Unit vector towards each lamp, (k, 3)."""
+    halfway: Samples
+    """Unit vector halfway between lamp and camera, (k, 3)."""
+    strength: Samples
+    """(k,)."""
+
+
+class Shading(NamedTuple):
+    """Colours of triangles, and the light on their corners."""
+
+    colour: Samples
+    """Linear colour of diffuse light, (m, 3)."""
+    gloss: Samples
+    """Linear colour of specular light, (m, 3)."""
+    diffuse: Samples
+    """Diffuse light of each corner, (m, 3)."""
+    specular: Samples
+    """Specular light of each corner, (m, 3)."""
+
+
 @dataclass(frozen=True)
 class RenderedSolid:
     """A rigid part of the robot, in its own axes, m."""
@@ -127,8 +152,8 @@ class RenderedSolid:
     def shading(self, turn: Samples, lamps: Lamps) -> Shading:
         """Colours, and light on the corners."""
         shading = Shading(self.colours, self.gloss, *(np.empty((len(self.faces), 3)) for _ in range(2)))
-        materials = Materials(*np.ascontiguousarray(np.transpose(list(MATERIALS.values()))))
-        shade(self.normals, turn, lamps, materials, self.kind, shading)
+        materials = np.array(list(MATERIALS.values()))
+        shade(self.normals, turn, *lamps, materials, self.kind, shading.diffuse, shading.specular)
         return shading
 
 

@@ -365,9 +365,9 @@ class BodyFinder:
             known, slopes = edges.known, edges.slopes
             if known.sum() < 12:
                 return lost
-            used = np.empty(known.size)
+            used, work = np.empty(known.size), np.empty((2, known.size))
             shifts = np.where(known, edges.shifts, 0.0)
-            level = robust_change(shifts, slopes, 1.0 / edges.variance, used, change)
+            level = robust_change(shifts, slopes, 1.0 / edges.variance, work, used, change)
             pose = pose + change
             if step > rough and float(np.abs(slopes @ change).max()) < 0.01:
                 break

@@ -91,7 +91,7 @@ class Contour:
         return out
 
     def thinned(self, stride: int) -> Contour:
-        """Every `stride`-th of the points, without gaps: loops are compiled anew for arrays that have some."""
+        """Every `stride`-th of the points."""
         return self.some(np.arange(len(self.group)) % stride == 0)
 
     def some(self, chosen: np.ndarray) -> Contour:

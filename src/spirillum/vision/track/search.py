@@ -97,7 +97,7 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
     slope_u, slope_v, usual = _slopes(image, still, bounds, factor, SEARCH.coarse_blur)
     length, height = slope_u.shape
     shift = np.array([-0.5 * SEARCH.column_step, -0.5 * height])
-    scores = np.empty((SEARCH.column_step, height + 1))
+    scores, work = np.empty((SEARCH.column_step, height + 1)), np.empty((2, len(GROUPS), height + 1))
     peaks, places, headings = [], [], []
     for column in range(SEARCH.column_step // 2, length + SEARCH.column_step // 2, SEARCH.column_step):
         start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
@@ -107,7 +107,7 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
         for heading in (np.deg2rad(SEARCH.headings) + turn).tolist():
             pixels, normals, _, _ = contour.places(BodyPose(float(at[0]), float(at[1]), heading), optics)
             small = (pixels - np.array([left, top])) / factor - 0.5 + 0.5 / factor
-            edge_scores(slope_u, slope_v, small, normals, contour.group, len(GROUPS), tuple(shift), scores)
+            edge_scores(slope_u, slope_v, small, normals, contour.group, *shift, work, scores)
             best = np.argpartition(scores, -SEARCH.peaks, axis=None)[-SEARCH.peaks :]
             peaks.append(scores.ravel()[best])
             places.append(start + factor * (shift + np.column_stack(np.divmod(best, scores.shape[1]))))
@@ -175,13 +175,14 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate
     slope_u, slope_v, _ = _slopes(image, still, part, 1, SEARCH.fine_blur, bounded=False)
     best = PoseCandidate(start.pose, 0.0)
     reach = SEARCH.reach
-    scores, shift = np.empty((2 * reach + 1, 2 * reach + 1)), np.full(2, -float(reach))
+    count, shift = 2 * reach + 1, np.full(2, -float(reach))
+    scores, work = np.empty((count, count)), np.empty((2, len(GROUPS), count))
     for _ in range(2):
         pose = best.pose
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
             heading = pose.heading + float(turn)
             pixels, normals, _, _ = contour.places(BodyPose(pose.x, pose.y, heading), optics)
-            edge_scores(slope_u, slope_v, pixels - low, normals, contour.group, len(GROUPS), tuple(shift), scores)
+            edge_scores(slope_u, slope_v, pixels - low, normals, contour.group, *shift, work, scores)
             if scores.max() > best.score:
                 place = shift + np.unravel_index(np.argmax(scores), scores.shape)
                 middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + place

@@ -254,7 +254,7 @@ class Stripes:
         scale = along @ normal
         scale = np.maximum(scale * np.sign(scale[scale.size // 2]), 0.0)
         profile = np.empty((self.angles.size, 3))
-        profile_of_rows(image, first, last, _ROWS, profile)
+        profile_of_rows(image, first, last, np.empty((3, _ROWS)), profile)
         if "white" not in self.names:
             profile[self._dazzled(profile)] = np.nan
         return profile, scale
@@ -274,7 +274,7 @@ class Stripes:
         answer, losses = np.full(8, np.nan), np.empty(max(24, round(self.period / np.deg2rad(4.0))))
         settings = self.period, STRIPES.lamp_tint, cut, 0.3 * appearance.residual, appearance.blur
         known = profile, scale, appearance.trust, self.angles, appearance.shade, self.order, appearance.palette
-        stripe_fit(*known, settings, losses, answer)
+        stripe_fit(*known, *settings, np.empty((self.angles.size, 17)), losses, answer)
         return answer
 
     def _refined(

@@ -29,6 +29,8 @@ _NEAR = np.linspace(0.84, 1.16, 17)
 """Wavelengths over that of the robot file among which the apparent one is interpolated."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Candidate amplitudes where the tail does not fit, over that of the robot file."""
+_PHASES = 2.0 * np.pi * np.arange(TAIL.phases) / TAIL.phases
+_TURNS = np.column_stack([np.cos(_PHASES), np.sin(_PHASES)])
 
 
 class _Strip(NamedTuple):
@@ -237,26 +239,24 @@ class TailWave:
         )
 
     def _ridge(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> Samples:
-        ridge = np.empty((self.xi.size, self.columns))
-        ridge_of(image, strip.middle, strip.across, contrast, self.inner, ridge)
+        ridge = np.empty((len(strip.middle), self.columns))
+        ridge_of(image, strip.middle, strip.across, contrast, self.inner, np.empty((2, self.columns)), ridge)
         return ridge
 
     def _scores(self, ridge: Samples, strip: _Strip, wave: Samples) -> Samples:
         scores = np.empty(TAIL.phases)
-        wave_scores(ridge, self.xi, strip.tilt, wave, self.step, TAIL.row_stride, scores)
+        wave_scores(ridge, self.xi, strip.tilt, wave, self.step, TAIL.row_stride, _TURNS, scores)
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
         """Contrast of the best phase against the others, over the root mean square ridge of the strip.
 
-        Only the rows are filtered that the scores are summed over. They have no gaps: the loops are compiled once.
+        Only the rows are filtered that the scores are summed over.
         """
-        xi, *rows = (np.ascontiguousarray(rows[:: TAIL.row_stride]) for rows in (self.xi, *strip))
+        xi, *rows = (rows[:: TAIL.row_stride] for rows in (self.xi, *strip))
         few = _Strip(*rows)
-        ridge = np.empty((len(few.middle), self.columns))
-        ridge_of(image, few.middle, few.across, contrast, self.inner, ridge)
-        scores = np.empty(TAIL.phases)
-        wave_scores(ridge, xi, few.tilt, self.wave, self.step, 1, scores)
+        ridge, scores = self._ridge(image, few, contrast), np.empty(TAIL.phases)
+        wave_scores(ridge, xi, few.tilt, self.wave, self.step, 1, _TURNS, scores)
         if not np.isfinite(scores).all():
             return np.nan
         return float((scores.max() - np.median(scores)) / (np.sqrt(np.nanmean(ridge**2)) + 0.5))
@@ -276,7 +276,7 @@ class TailWave:
         apart = np.abs((np.arange(count) - best + count // 2) % count - count // 2) > count / 6
         likely = TAIL.offset * self.width, TAIL.tilt * (self.xi[-1] - self.xi[0])
         settings = (2.0 * np.pi * best / count, self.step, self.width, self.usual, *likely)
-        wave_fit(ridge, self.xi, strip.tilt, self.wave, settings, answer)
+        wave_fit(ridge, self.xi, strip.tilt, self.wave, *settings, np.empty((self.xi.size, 10)), answer)
         return answer, float(scores[apart].max() / scores[best])
 
     def _curve(self, strip: _Strip, answer: Samples) -> Samples:
@@ -389,11 +389,8 @@ class TailWave:
         found = []
         for rows in (slice(None, middle), slice(middle, None)):
             half = copy(self)
-            half.xi = np.ascontiguousarray(self.xi[rows])
-            parts = [
-                (np.ascontiguousarray(ridge[rows]), _Strip(*(np.ascontiguousarray(part[rows]) for part in strip)))
-                for ridge, strip in ridges
-            ]
+            half.xi = self.xi[rows]
+            parts = [(ridge[rows], _Strip(*(part[rows] for part in strip))) for ridge, strip in ridges]
             scores = half.scores_by_wavelength(parts, 1.0)
             if scores is None:
                 return False

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import edge_misfits
 from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
 
@@ -95,10 +94,12 @@ def edge_shifts(
         colours: of the stripes in their order, (stripes, 3).
         angle: of the body, rad.
     """
+    from scipy.special import ndtr
+
     count = len(colours)
     width = 2.0 * np.pi / count
     shifts = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
-    found, losses = np.full(count, np.nan), np.empty(shifts.size)
+    found = np.full(count, np.nan)
     for edge in range(count):
         place = (angle + (edge - 0.5) * width + np.pi) % (2.0 * np.pi) - np.pi
         before, after = colours[edge - 1], colours[edge]
@@ -108,7 +109,9 @@ def edge_shifts(
         seen = levels[near]
         if near.sum() < WIDTHS.fewest or not np.isfinite(seen).all():
             continue
-        edge_misfits(seen, angles[near] - place, blur[near], shade[near], before, after, shifts, losses)
+        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])[..., None]  # of the stripe behind the edge
+        misses = seen - shade[near, 3:] - shade[near, :3] * (before + (after - before) * share)
+        losses = np.sum(misses**2, axis=(1, 2))
         best = int(np.argmin(losses))
         if not 0 < best < shifts.size - 1:
             continue
