@@ -14,8 +14,14 @@
  */
 #if defined(__clang__)
 #pragma clang fp contract(fast)
+#if defined(__AVX2__)
+#pragma clang attribute push(__attribute__((target("fma"))), apply_to = function)
+#endif
 #elif defined(__GNUC__)
 #pragma GCC optimize("fp-contract=fast")
+#if defined(__AVX2__)
+#pragma GCC target("fma")
+#endif
 #endif
 #include "core.h"
 

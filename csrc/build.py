@@ -26,7 +26,7 @@ FLAGS = (
 )
 STRICT = ("-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-Werror")
 """Of the project's own tests: a compiler of tomorrow may warn of more."""
-WIDE = ("-mavx2", "-mfma", "-mbmi2")
+WIDE = ("-mavx2", "-mbmi2")
 """Of a second build for x86-64, which processors since 2013 take."""
 ZIG = [sys.executable, "-m", "ziglang", "cc"]
 TARGETS = {
