@@ -14,14 +14,13 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
-import importlib.util
 import math
 import runpy
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,7 +34,7 @@ _LOBATTO = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math
 class StandIn:
     """Makes tables; holds the engine that reads them."""
 
-    def __init__(self, steps: ModuleType) -> None:
+    def __init__(self, steps: SimpleNamespace) -> None:
         self.steps = steps
 
     @staticmethod
@@ -89,13 +88,10 @@ def stand_in() -> Iterator[StandIn]:
     """Let the engine run on the stand-in."""
     from spirillum.dynamics import free_robot, integration, return_map
     from spirillum.kernels import native as calls
+    from spirillum.kernels import stiff_steps
 
     library = ctypes.CDLL(str(_library()))
-    spec = importlib.util.find_spec("spirillum.kernels.stiff_steps")
-    assert spec is not None
-    assert spec.loader is not None
-    steps = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(steps)
+    steps = SimpleNamespace(**runpy.run_path(stiff_steps.__file__))  # whose calls have not found their library yet
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calls, "library", lambda: library)
         for module in (free_robot, integration, return_map):

@@ -1,7 +1,8 @@
 """Rates and steps of free robots as csrc/ finds them, against the same balances assembled with NumPy and SciPy."""
 
 import ctypes
-import importlib.util
+import runpy
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,6 @@ from spirillum.robot.batch import RobotBatch
 RADIUS, VISCOSITY, MU, SLOW = 0.02, 0.9, 0.2, 1e-5
 DRIVES = [(kind, fixed) for kind in (0.0, 1.0, 2.0, 3.0) for fixed in (0.0, 1.0) if (kind, fixed) != (0.0, 1.0)]
 WIDE = next(Path(native.__file__).parent.glob("_core_v3.*"), Path("none"))
-SPEC = importlib.util.find_spec("spirillum.kernels.stiff_steps")
 CURRENT, JOINT_AXIS, ROBOT_AXIS = rigid_links.CURRENT, np.eye(7)[6], np.eye(7)[3]
 
 
@@ -227,13 +227,12 @@ def test_both_builds_find_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> N
     """Without fused products or sums in another order, so that a run is the same on every processor."""
     found = []
     for path in (WIDE.with_stem("_core"), WIDE):
-        monkeypatch.setattr(native, "library", lambda core=ctypes.CDLL(str(path)): core)
-        steps = importlib.util.module_from_spec(SPEC)
-        SPEC.loader.exec_module(steps)
+        monkeypatch.setattr(native, "library", partial(ctypes.CDLL, str(path)))
+        rates = runpy.run_path(stiff_steps.__file__)["rates"]
         for seed in range(20):
             case, dy = Case(0.0, 0.0, 1e-3, seed), np.empty(19)
             none = np.zeros((0, 6))
             data = two_links.packed(case.drag, case.friction, case.weight, np.full(4, np.inf), none, case.drive)
-            steps.rates(dy, 0.7, case.state, data, none.ravel())
+            rates(dy, 0.7, case.state, data, none.ravel())
             found.append(dy)
     np.testing.assert_array_equal(found[:20], found[20:])
