@@ -64,7 +64,7 @@ typedef struct {
     int64_t count;
     Slice slices[MOST_SLICES]; /* of a film that may cavitate */
     int64_t slice_count;
-    double viscosity, bound;   /* Pa s; the film's pressure is not below -p_c, Pa */
+    double viscosity, bound;   /* of the slices, Pa s; their pressure is not below -p_c, Pa */
     double slow;      /* v_r, below which dry friction is smooth, m/s */
     int along;        /* the rate along which a torque keeps a prescribed spin */
     bool prescribed;  /* whether the spin q_3 + q_6 is */

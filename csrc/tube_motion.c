@@ -167,15 +167,16 @@ static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the 
 /* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin.
  *
  * Their velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference,
- * with v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. The table's
- * film loses pressure at the ends of the body, which slices do not know: they are as long in all as they have its
- * resistance to a motion along the normal, so that what is left of the film stays positive. */
+ * with v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. A film loses
+ * pressure at the ends of the body, which slices do not know: their pressure is scaled so that they have the resistance
+ * of the table's film to a motion along the normal. What is left of the film then stays positive, too. */
 static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Fluid *fluid,
                        const Seen *seen, Balance *b) {
     const Film *film = &robot->table.film;
-    const double a = film->body, radius = robot->tube->radius, half = 0.5 * (film->front - film->rear);
+    const double mu = robot->tube->viscosity, a = film->body, radius = robot->tube->radius;
+    const double half = 0.5 * (film->front - film->rear);
     b->slice_count = 0;
-    b->viscosity = robot->tube->viscosity;
+    b->viscosity = mu;
     b->bound = robot->tube->cavitation;
     if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * a)) return;
     double normal[3] = {0.0}, sliced = 0.0;
@@ -195,13 +196,12 @@ static void set_slices(const TubeRobot *robot, const State *y, const double rota
             s->entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
         }
         for (int i = 0; i < 3; i++) normal[i] += at.normal[i] / MOST_SLICES;
-        sliced += s->length * 3.0 * PI * b->viscosity * sqrt(2.0 * s->gap) * pow(s->bend, 1.5) / squared(s->gap);
+        sliced += s->length * 3.0 * PI * mu * sqrt(2.0 * s->gap) * pow(s->bend, 1.5) / squared(s->gap);
     }
     double whole = 0.0;
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) whole += b->viscosity * normal[i] * fluid->film[i][j] * normal[j];
-    const double share = smaller(whole / sliced, 1.0);
-    for (int64_t n = 0; n < b->slice_count; n++) b->slices[n].length *= share;
+        for (int j = 0; j < 3; j++) whole += mu * normal[i] * fluid->film[i][j] * normal[j];
+    b->viscosity *= smaller(whole / sliced, 1.0);
 }
 
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
@@ -242,9 +242,9 @@ static double towards_wall(const double force[3], const double rotation[3][3], d
 }
 
 /* Note the forces towards the wall, which sum to zero, and take from the fluid's power what the film's bound saves. */
-static void note_loads(const Balance *b, const Fluid *fluid, const double weight[RATES], const double asperities[RATES],
+static void note_loads(const Balance *b, double mu, const Fluid *fluid, const double weight[RATES], const double asperities[RATES],
                        const double rotation[3][3], Seen *seen) {
-    const double *q = seen->rates, mu = b->viscosity;
+    const double *q = seen->rates;
     double film[3], outer[3], contact[3], lift[3] = {0.0};
     for (int i = 0; i < 3; i++) {
         film[i] = 0.0;
@@ -301,7 +301,7 @@ void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen 
         seen->flow_power += fluid.stream[i] * seen->rates[i];
     }
     note_sliding(&balance, seen);
-    note_loads(&balance, &fluid, weight, asperities, t.rotation, seen);
+    note_loads(&balance, robot->tube->viscosity, &fluid, weight, asperities, t.rotation, seen);
     differentiate(y, &links->drive, t.rotation, seen, dy);
 }
 

@@ -1,0 +1,75 @@
+"""Runs on a film that cavitates: forces and energies close, and the lift is that of Reynolds' equation."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import spirillum as sp
+from spirillum.kernels.cavitation import lift_of_cavitation
+
+
+@cache
+def run(pressure: str, wait: str = "60 s") -> xr.Dataset:
+    """Three seconds of the paper's robot in the wide tube after a waiting time."""
+    robot = sp.load("biorob2012-wide", **{"fluid.cavitation_pressure": pressure})
+    return sp.simulate(robot, model="tube", timing={"duration": "3 s"}, in_tube={"wait": wait})
+
+
+@pytest.mark.parametrize("pressure", ["none", "100 kPa", "10 kPa"])
+def test_the_forces_towards_the_wall_sum_to_zero(pressure: str) -> None:
+    found = run(pressure)
+    total = found["weight_load"] + found["film_load"] + found["outer_load"] + found["contact_load"]
+    assert float(np.abs(total).max()) < 1e-6 * float(found["weight_load"].mean())
+    # Asperities push away from the wall; their normals at both ends of the body differ a little.
+    np.testing.assert_allclose(found["contact_load"], -found["contact_force"], rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("pressure", ["100 kPa", "10 kPa"])
+def test_energy_is_conserved(pressure: str) -> None:
+    found = run(pressure)
+    spent = found["friction_energy"] + found["dissipated_energy"] + found["contact_energy"]
+    stored = found["potential_energy"] - found["potential_energy"][0]
+    left = found["drive_energy"] - spent - stored
+    assert float(np.abs(left).max()) < 1e-6 * float(found["drive_energy"][-1])
+    assert (np.diff(found["dissipated_energy"]) > 0).all()
+
+
+def test_a_bound_that_is_never_reached_changes_nothing() -> None:
+    never, free = run("1e9 Pa"), run("none")
+    assert (never["lift"] == 0.0).all()
+    # Trial steps inside the wall see the bound, so that the steps in time differ, within their tolerance.
+    np.testing.assert_allclose(never["position"][-1], free["position"][-1], rtol=1e-6, atol=1e-10)
+
+
+def test_the_less_tension_the_oil_bears_the_less_the_asperities_do() -> None:
+    contact = [float(run(pressure)["contact_force"].mean()) for pressure in ("none", "100 kPa", "10 kPa")]
+    lift = [float(run(pressure)["lift"].mean()) for pressure in ("none", "100 kPa", "10 kPa")]
+    assert contact[0] > 1.5 * contact[1] > 1.5 * contact[2]
+    assert 0.0 == lift[0] < lift[1] < lift[2]
+
+
+def test_the_lift_of_a_run_is_that_of_a_line_contact_that_opens_and_turns() -> None:
+    robot = sp.load("biorob2012-wide", **{"fluid.cavitation_pressure": "10 kPa"})
+    timing = {"duration": "0.4 s", "samples_per_turn": 300}
+    found = sp.simulate(robot, model="tube", placement={"gap": "1 um"}, timing=timing)
+    assert robot.channel is not None
+    a, radius, time = 0.5 * robot.body.diameter, 0.5 * robot.channel.diameter, found["time"].values
+    front, rear = (
+        0.5 * robot.body.length - robot.body.rounding(end) for end in (robot.body.front_end, robot.body.rear_end)
+    )
+    x = np.linspace(-rear, front, 61)
+    rate = {
+        name: np.gradient(found[name].values, time)[:, None] for name in ("offset", "azimuth", "wall_pitch", "wall_yaw")
+    }
+    gap = radius - a - found["offset"].values[:, None] + x * found["wall_pitch"].values[:, None]
+    opening = x * rate["wall_pitch"] - rate["offset"]
+    side = found["offset"].values[:, None] * rate["azimuth"] + x * rate["wall_yaw"]
+    entrainment = 0.5 * (side + a * found["body_rotation_rate"].values[:, None]) - side * radius / (radius - a)
+    out, bend = np.empty((gap.size, 6)), np.full(gap.size, a * radius / (radius - a))
+    numbers = (gap.ravel(), bend, opening.ravel(), entrainment.ravel())
+    lift_of_cavitation(*numbers, robot.fluid.viscosity, 1e4, out)
+    expected = np.trapezoid(out[:, 0].reshape(gap.shape), x, axis=1)
+    inner = slice(3, -3)  # derivatives are differences
+    np.testing.assert_allclose(found["lift"].values[inner], expected[inner], rtol=0.1, atol=0.02 * expected.max())
