@@ -76,8 +76,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
         model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`; or `auto`: what the posterior or the
-            calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without. A free
-            robot without a table for its tube then takes `slender`, too, and a warning says so.
+            calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
             `free`, but `held` where the model is that of a posterior or calibration and knows the axial entries only,
             or was fitted to one place in the tube without dry friction.

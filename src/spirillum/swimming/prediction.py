@@ -284,7 +284,6 @@ def predict(
         raise InputError(scenario.why_not(result))
     warnings = [
         *ready.warnings,
-        *([scenario.choice.caution] if scenario.choice.caution else []),
         *_case_warnings(scenario, result),
     ]
     error = scenario.error_estimate(result, checks)
