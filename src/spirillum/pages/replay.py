@@ -110,7 +110,7 @@ def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
     if times.size < 2:
         raise InputError("the trial has fewer than two frames; allowed: one in which the robot was tracked")
     length = min(float(times[-1] - times[0]), _LONGEST)
-    run = simulate(robot, timing={"duration": length})
+    run = simulate(robot, timing={"duration": length}, in_tube={"wait": 0.0} if robot.channel else None)
     return replay_of_run(run) | {
         "film": {"name": film, "start": float(times[0])},
         "compared": compared_series(trial, run),

@@ -23,7 +23,7 @@ class Detail(str):
 Block = str | Table
 """A line, a detail or a table of an answer; the first one is its title, or has it."""
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady")
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "trial", "steady")
 """Columns of numbers."""
 
 
@@ -60,6 +60,37 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
     for row in rows_of(items, only):
         table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
     return table
+
+
+def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
+    """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
+    table = grid(title, "quantity", "held", "low", "high", "trial", "steady", "unit")
+    for name in answer if only is None else only:
+        for row in rows_of(answer, [name]):
+            released = (answer[column].get(name) for column in RELEASED_COLUMNS)
+            cells = [
+                "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
+            ]
+            table.add_row(row.name, row.value, row.low or "-", row.high or "-", *cells, row.unit)
+    return table
+
+
+RELEASED_COLUMNS = ("trial", "steady")
+"""Entries of an answer that stand beside the held one."""
+
+
+def released_columns(answer: Answer) -> Iterator[Block]:
+    """What the columns of released motions are, or why one is missing."""
+    missing = {column: answer[column]["reason"] for column in RELEASED_COLUMNS if "reason" in answer[column]}
+    for reason in dict.fromkeys(missing.values()):
+        yield Detail(f"no {' and no '.join(column for column in missing if missing[column] == reason)}: {reason}")
+    if "trial" not in missing:
+        wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
+        yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
+    if "steady" not in missing:
+        constant = answer["steady"]["time_constant"]
+        after = f", approached with a time constant of {in_words(constant)}" if constant["value"] else ""
+        yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
 
 
 def files_of(answer: Answer, **words: str) -> Iterator[str]:
