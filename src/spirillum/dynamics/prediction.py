@@ -69,8 +69,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         placement: where in the channel the robot lies, or is laid down.
         band: of `tube`, with the band over what the placement leaves open, or the reference place alone; None: with it
             where the robot has a table, without which it takes minutes; not of free motion in the tube.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does), `free`, or None: `held`, in the tube
-            with the columns `trial` and `steady`.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`; None: `held`, in the tube
+            with the columns `trial` and `steady` beside it.
         roughness: of released motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4
             of the body's radius.
         in_tube: of released motion in the tube: `azimuth` of the start, `friction_coefficient`, and the trial's `wait`,
