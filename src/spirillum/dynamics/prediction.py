@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from spirillum.dynamics.trial import steady_of, trial_of, why_not_released
+from spirillum.dynamics.trial_request import TrialRequest
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, read_fit
-from spirillum.robot.load import load, with_resolution
+from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -19,7 +19,6 @@ from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
-from spirillum.swimming.released_motion import ReleasedMotion
 from spirillum.swimming.reynolds import without_reynolds_bound
 
 
@@ -39,6 +38,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     motion: str | None = None,
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
+    interval: bool = False,
     beyond_stokes: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
@@ -75,6 +75,8 @@ def predict(  # noqa: PLR0913 - the options of the command
             of the body's radius.
         in_tube: of released motion in the tube: `azimuth` of the start, `friction_coefficient`, and the trial's `wait`,
             see `InTube`.
+        interval: of the trial, the 90 % interval over what nobody states (waiting time, roughness, dry friction,
+            weight, effective friction), from 64 runs in some two minutes.
         beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong, as
             with the robot's option `model.beyond_stokes`.
         progress: told what is being computed, how much is done, and of how much.
@@ -103,36 +105,22 @@ def predict(  # noqa: PLR0913 - the options of the command
             motion=motion or "held",
             progress=progress,
         )
-        reason = why_not_released(held, fitted=fit.posterior is not None)
-        if motion is not None or reason:
-            _check_not_released(roughness, InTube.of(in_tube))
-        if motion is not None:
-            return held
-        if reason:
-            return replace(held, released=dict.fromkeys(("trial", "steady"), lambda: ReleasedMotion(reason=reason)))
-        from spirillum.dynamics.settling import settle  # their equations are compiled
-        from spirillum.dynamics.simulation import simulate
-
-        shared: dict[str, Any] = {
-            "friction": friction,
-            "calibration": calibration,
-            "placement": placement,
-            "roughness": roughness,
-            "progress": progress,
-        }
-        still = InTube.of(in_tube).model_copy(update={"wait": None})
-
-        asked = with_resolution(own, resolution, WALLED)  # refused by a run, which is the column's reason
-
-        def trial() -> ReleasedMotion:
-            return trial_of(
-                held, lambda: simulate(asked, model=WALLED, calibrated=calibrated, in_tube=in_tube, **shared)
-            )
-
-        def steady() -> ReleasedMotion:
-            return steady_of(lambda: settle(asked, in_tube=still, **shared))
-
-        return replace(held, released={"trial": trial, "steady": steady})
+        request = TrialRequest(
+            own,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            fit=fit,
+            resolution=resolution,
+            placement=placement,
+            roughness=roughness,
+            in_tube=InTube.of(in_tube),
+            interval=interval,
+            progress=progress,
+        )
+        return request.beside(held, wanted=motion is None)
+    if interval:
+        raise InputError("interval = True with motion 'free'; allowed: without a motion, of the trial")
     whose = posterior_for_of(posterior_for, fit.posterior, own)
     check_not_resolved(own, resolution)
     if band:
@@ -168,14 +156,3 @@ def predict(  # noqa: PLR0913 - the options of the command
             *fit.run_warnings(answer.robot, answer.model, answer.friction),
         ),
     )
-
-
-def _check_not_released(roughness: str | float | None, asked: InTube) -> None:
-    """Refuse settings of a released motion for an answer without one."""
-    given = {"roughness": roughness, **{f"in_tube.{name}": asked.model_dump()[name] for name in asked.model_fields_set}}
-    for name, value in given.items():
-        if value is not None:
-            raise InputError(
-                f"{name} = {str(value)[:40]} is of released motion in the tube; allowed: with model 'tube' and its "
-                "table, and without motion 'held'"
-            )

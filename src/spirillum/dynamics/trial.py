@@ -7,7 +7,7 @@ by its defaults (`mean_..._on`). The steady motion is that of `spirillum.settle`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.timing import TRIAL_DURATION
 from spirillum.errors import InputError
-from spirillum.notes import notes_in
+from spirillum.notes import Note, notes_in
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
 from spirillum.swimming.model_choice import WALLED, has_table
@@ -83,11 +83,13 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     values = {name: float(run[of].integrate("time")) / length for name, of in columns.items()}
     exact = {name: f"mean_{name}_on" for name in names}
     values |= {name: float(run[of]) for name, of in exact.items() if of in run}
+    notes = notes_in(run.attrs)
     basis = {
         "assumption": ASSUMPTION,
+        "state": "standing" if _is_held(notes) else "swimming",
         "wait": {"value": float(run.attrs["wait"]), "unit": QUANTITIES["wait"].unit},
         "duration": {"value": length, "unit": "s"},
-        "warnings": [str(note) for note in notes_in(run.attrs)],
+        "warnings": [str(note) for note in notes],
     }
     return ReleasedMotion(values, basis)
 
@@ -117,6 +119,11 @@ def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
     return ReleasedMotion({**moving, **pose}, basis)
 
 
+def _is_held(notes: Iterable[Note]) -> bool:
+    """Whether dry friction holds the robot."""
+    return any(note.code == "held-by-friction" for note in notes)
+
+
 def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
@@ -125,7 +132,7 @@ def _state_of(motion: Prediction) -> str:
     """What became of a released robot, in a word."""
     lying = motion.lying
     assert lying is not None  # noqa: S101 - a released motion has one
-    if any(note.code == "held-by-friction" for note in motion.warnings):
+    if _is_held(motion.warnings):
         return "standing"
     if lying.state == "steady" and np.cos(lying.azimuth) < 0.0:
         return "ceiling"

@@ -204,7 +204,7 @@ def table_for(batch: RobotBatch, *, progress: Callable[[str, int, int], None] | 
 def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
     """Return what decides the tables that robots of a batch lack in their tubes, each once."""
     fits = all_hold(requirements(batch, TabledTube({})))
-    every = [(RobotGeometry.of(batch, index), tube_radius(batch, index)) for index in np.flatnonzero(fits)]
+    every = [(RobotGeometry.of(batch, index), tube_radius(batch, index)) for index in np.flatnonzero(fits).tolist()]
     return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and _has_nodes(*one)]
 
 

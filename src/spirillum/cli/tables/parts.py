@@ -87,10 +87,35 @@ def released_columns(answer: Answer) -> Iterator[Block]:
     if "trial" not in missing:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
+        yield from _over_unknowns(answer["trial"])
     if "steady" not in missing:
         constant = answer["steady"]["time_constant"]
         after = f", approached with a time constant of {in_words(constant)}" if constant["value"] else ""
         yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
+
+
+def _over_unknowns(trial: Answer) -> Iterator[str]:
+    """The interval of a trial's speed, what it comes from, and what to state first."""
+    speed = trial["forward_velocity"]
+    if "unknowns" not in trial:
+        if "runs" in trial:
+            lost = trial["without_answer"]
+            yield f"no interval of the trial: of {trial['runs']} runs {trial['standing']} stand and {lost} leave the table"
+        return
+    unit = display_unit(speed["high"], speed["unit"])
+    low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
+    parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
+    words = [
+        f"{_UNKNOWN.get(one['name'], one['name'].replace('_', ' '))} {percent(one['share']['value'])}" for one in parts
+    ]
+    stand = f", {trial['standing']} of {trial['runs']} stand" if trial["standing"] else ""
+    level = f"{100 * speed['level']:g} % interval of the speed over what nobody states"
+    yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
+    yield f"of its variance: {', '.join(words)}; state the first of them first"
+
+
+_UNKNOWN = {"friction.effective": "effective friction", "wait": "waiting time"}
+"""Unknowns of a trial in words."""
 
 
 def files_of(answer: Answer, **words: str) -> Iterator[str]:
