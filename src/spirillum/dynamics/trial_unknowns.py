@@ -161,7 +161,10 @@ def with_interval(
     edge = 0.5 * (1.0 - LEVEL)
     values = {name: np.array([one.values[name] for one in moving]) for name in nominal.values}
     quantiles = {name: np.quantile(column, [0.5, edge, 1.0 - edge]) for name, column in values.items()}
-    intervals = {name: TrialInterval(*map(float, found), LEVEL) for name, found in quantiles.items()}
+    intervals = {
+        name: TrialInterval(float(middle), float(low), float(high), LEVEL)
+        for name, (middle, low, high) in quantiles.items()
+    }
     return replace(nominal, basis={**nominal.basis, **basis}, intervals=intervals)
 
 

@@ -99,8 +99,8 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
     speed = trial["forward_velocity"]
     if "unknowns" not in trial:
         if "runs" in trial:
-            lost = trial["without_answer"]
-            yield f"no interval of the trial: of {trial['runs']} runs {trial['standing']} stand and {lost} leave the table"
+            standing, lost = trial["standing"], trial["without_answer"]
+            yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
         return
     unit = display_unit(speed["high"], speed["unit"])
     low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
