@@ -13,6 +13,7 @@ import re
 import shutil
 import sys
 import typing
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -286,27 +287,72 @@ def reference_list() -> str:
 
 
 def command_options(words: str) -> str:
-    """Arguments and options of a command."""
+    """Arguments and options of a command, those that it shares with others by name alone."""
+    shared = _shared_options()
+    found = _options_of(words)
+    lines = [_item(option) for option in found if option not in shared]
+    names = ", ".join(f"`{option.names[-1]}`" for option in found if option in shared)
+    return "".join(lines) + (f"\nShared options: {names}.\n" if names else "")
+
+
+def shared_options() -> str:
+    """The options that several commands have in the same words."""
+    return "".join(_item(option) for option in _shared_options())
+
+
+class Option(typing.NamedTuple):
+    """An argument or option of a command as it is listed."""
+
+    names: tuple[str, ...]
+    metavar: str
+    default: str
+    """Empty without one."""
+    meaning: str
+
+
+def _item(option: Option) -> str:
+    names = ", ".join(f"`{name}`" for name in option.names) + (f" `{option.metavar}`" if option.metavar else "")
+    default = f" Default: `{option.default}`." if option.default not in ("", "required") else ""
+    needed = " (required)" if option.default == "required" else ""
+    return f"- {names}{needed}: {_cell(option.meaning)}{default}\n"
+
+
+@lru_cache(maxsize=1)
+def _shared_options() -> tuple[Option, ...]:
+    """Options that at least three commands have in the same words, the commonest first."""
+    from spirillum.cli.app import command_line
+
+    counts = Counter(option for words in _commands_of(command_line()) for option in _options_of(words))
+    return tuple(option for option, count in counts.most_common() if count >= 3)
+
+
+def _commands_of(command: Any, words: str = "") -> Iterator[str]:
+    """Words of every command that has none below it."""
+    below = getattr(command, "commands", None)
+    if below is None:
+        yield words
+        return
+    for name, item in below.items():
+        yield from _commands_of(item, f"{words} {name}".strip())
+
+
+def _options_of(words: str) -> list[Option]:
     from spirillum.cli.app import command_line
 
     command = command_line()
     for name in words.split():
         command = command.commands[name]
-    rows = [row for parameter in command.params if (row := _parameter(parameter)) is not None]
-    return table(("Argument or option", "Default", "Meaning"), rows)
+    return [_option(parameter) for parameter in command.params if "--help" not in parameter.opts]
 
 
-def _parameter(parameter: Any) -> tuple[str, str, str] | None:
-    if "--help" in parameter.opts:
-        return None
+def _option(parameter: Any) -> Option:
     option = parameter.opts[0].startswith("-")
-    names = ", ".join(f"`{name}`" for name in parameter.opts) if option else f"`{parameter.name.upper()}`"
-    if option and not parameter.is_flag and parameter.metavar:
-        names += f" `{parameter.metavar}`"
+    names = tuple(parameter.opts) if option else (parameter.name.upper(),)
+    metavar = parameter.metavar if option and not parameter.is_flag and parameter.metavar else ""
     stated = getattr(parameter, "show_default", None)  # of options whose default stands in a table
     value = stated if isinstance(stated, str) else parameter.default
-    shown = "required" if parameter.required else "–" if value in (None, False) else f"`{value}`"
-    return names, shown, parameter.help or ""
+    default = "required" if parameter.required else "" if value in (None, False) else str(value)
+    return Option(names, metavar, default, parameter.help or "")
 
 
 def file_listing(path: str) -> str:
@@ -363,6 +409,7 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "models": models,
     "reference-list": reference_list,
     "command-options": command_options,
+    "shared-options": shared_options,
     "file": file_listing,
     "function": function_listing,
     "part": part_listing,
