@@ -77,7 +77,7 @@ def _bounds(info: FieldInfo) -> tuple[Any, Any]:
 
 def _allowed(info: FieldInfo, kind: Kind | None) -> str:
     if kind is not None:
-        return f"{kind.allowed}, as in `{kind.example}`".replace("**", "^")
+        return kind.allowed.replace("**", "^")
     for item in _metadata(info):
         schema = getattr(item, "json_schema", None) or {}
         if "anyOf" in schema:
@@ -127,8 +127,8 @@ def _default(info: FieldInfo, kind: Kind | None) -> str:
     return f"{value:g}" if isinstance(value, float) else f"`{value}`" if value != "" else "empty"
 
 
-def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str, str]]:
-    """Field, unit, default, allowed and meaning of every field of a table, its own tables included."""
+def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
+    """Field, default, allowed and meaning of every field of a table, its own tables included."""
     words = meanings(model)
     for name, info in model.model_fields.items():
         path = f"{prefix}{name}"
@@ -137,11 +137,10 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
             yield from field_rows(below, f"{path}.")
             continue
         kind = _kind(info)
-        unit = kind.unit.replace("**", "^") if kind else "–"
-        yield f"`{path}`", unit, _default(info, kind), _allowed(info, kind), words.get(name, "")
+        yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "")
 
 
-_HEADER = ("Field", "SI unit", "Default", "Allowed", "Meaning")
+_HEADER = ("Field", "Default", "Allowed", "Meaning")
 
 
 def robot_fields(wanted: str) -> str:
@@ -151,11 +150,9 @@ def robot_fields(wanted: str) -> str:
     if wanted == "root":
         plain = {name: info for name, info in Robot.model_fields.items() if _section(info) is None}
         words = meanings(Robot)
-        rows = [(f"`{name}`", "–", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
+        rows = [(f"`{name}`", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
         extends = "What the file starts from; its own fields are laid over it."
-        return table(
-            _HEADER, [*rows, ("`extends`", "–", "unset", "a preset, or a robot file beside this one", extends)]
-        )
+        return table(_HEADER, [*rows, ("`extends`", "unset", "a preset, or a robot file beside this one", extends)])
     model = _section(Robot.model_fields[wanted])
     if model is None:
         raise ValueError(f"{wanted} is no table of the robot file")
@@ -204,13 +201,32 @@ def _observed() -> Any:
 
 
 def _variables(dataset: Any, names: Iterable[str]) -> str:
+    """Variables of a dataset; dimensions and source of most of them stand once above the table."""
     rows = []
     for name in names:
         about = dataset[name].attrs
         over = ", ".join(f"`{dimension}`" for dimension in dataset[name].dims) or "single value"
-        source = str(about.get("source", "–"))
-        rows.append((f"`{name}`", str(about.get("units", "–")), over, str(about["long_name"]), source))
-    return table(("Variable", "Unit", "Over", "Meaning", "Source"), rows)
+        unit, source = str(about.get("units", "–")), str(about.get("source", "–"))
+        rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
+    usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
+    predicted = [row[0] for row in rows if _is_predicted(row) and row[3] == usual[0]]
+    shown = [(name, unit, _unusual(text, others, usual)) for name, unit, text, *others in rows if name not in predicted]
+    head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
+    head += f" As in `predict`: {', '.join(predicted)}.\n\n" if predicted else "\n\n"
+    return head + table(("Variable", "Unit", "Meaning"), shown)
+
+
+def _is_predicted(row: Sequence[str]) -> bool:
+    """Whether a variable is a quantity of `predict`, whose table stands on the same page."""
+    from spirillum.swimming.steady_quantities import STEADY
+
+    return any(row[0] == f"`{item.name}`" and row[1] == item.unit for item in STEADY)
+
+
+def _unusual(meaning: str, others: Sequence[str], usual: Sequence[str]) -> str:
+    """A meaning with dimensions and source where they are not the usual ones."""
+    over, source = (value if value not in (common, "–") else "" for value, common in zip(others, usual, strict=True))
+    return meaning + (f"; over {over}" if over else "") + (f"; source: {source}" if source else "")
 
 
 def study_variables(which: str) -> str:
