@@ -268,7 +268,11 @@ def claims() -> str:
     from spirillum.papers.registry import claims_of
 
     rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
-    return table(("Statement", "Paper", "Computed", "Verdict", "Reason"), rows)
+    repeated = [reason for _, _, _, _, text in rows for reason in text.split("; ")]
+    marks = {reason: f"({n})" for n, (reason, count) in enumerate(Counter(repeated).most_common(), 1) if count >= 3}
+    shown = [(*row, "; ".join(marks.get(reason, reason) for reason in text.split("; "))) for *row, text in rows]
+    reasons = "".join(f"{mark} {reason}. " for reason, mark in marks.items())
+    return f"{reasons.strip()}\n\n" + table(("Statement", "Paper", "Computed", "Verdict", "Reason"), shown)
 
 
 def study_figure(name: str) -> str:
