@@ -266,6 +266,17 @@ def citation(
     typer.echo(answer(model))
 
 
+@from_function("spirillum.results.installation:report", robot=None)
+def report(request: Request, *, json: Json = False) -> None:
+    """Print versions, platform and extras of this installation, as text to paste into an issue.
+
+    Example: `spirillum report`
+    """
+    from spirillum.cli import renderer
+
+    renderer.show(request().to_dict(), json=json)
+
+
 _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Predict": (predict, compare_models, study, prepare, resistance),
     "Move": (simulate, settle, control, remote, magnetic_sweep),
@@ -273,7 +284,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),
     "Design": (design,),
-    "Files": (export, schema, citation),
+    "Files": (export, schema, citation, report),
 }
 """The commands by what one wants to do, with their panels of the help."""
 
