@@ -4,8 +4,8 @@
 
 Synthetic throughout: the virtual camera, flat drawings, and a light table (`tests/support`). Films of three seconds,
 25 frames a second, 320 to 480 pixels wide. One row a film is appended to the file of rows; what stands there is not
-drawn again, so that an interrupted run goes on. `--write` puts the summary between its markers in docs/measuring.md.
-All troubles in all styles take three to four minutes of one core for each seed.
+drawn again, so that an interrupted run goes on. `--write` puts the summary between its markers in
+docs/measuring-accuracy.md. All troubles in all styles take three to four minutes of one core for each seed.
 """
 
 import argparse
@@ -39,7 +39,7 @@ from bench_troubles import (  # noqa: E402
     Trouble,
 )
 
-PAGE = HERE.parent / "docs" / "measuring.md"
+PAGE = HERE.parent / "docs" / "measuring-accuracy.md"
 BEGIN = "<!-- ledger of troubles: written by benchmarks/ledger_of_troubles.py -->"
 END = "<!-- end of the ledger -->"
 HARMLESS = ("synthetic", "short-turn", "dropped-frames", "stray-frames")
@@ -182,14 +182,14 @@ def withheld(rows: Sequence[Row]) -> tuple[int, int]:
 
 
 def percents(rows: Sequence[Row], name: str) -> str:
-    """Median error, largest error, and median half width of a quantity, in words, %."""
+    """Median error, largest error, and median half width of a quantity, %."""
     given = [row["numbers"][name] for row in rows if off(row["numbers"][name]) is not None]
     given = [number for number in given if number["true"] != 0.0]
     if not given:
         return "-"
     errors = [100 * abs(number["value"] / number["true"] - 1) for number in given]
     widths = [50 * (number["high"] - number["low"]) / abs(number["true"]) for number in given]
-    return f"{np.median(errors):.2g}, at most {max(errors):.2g} (± {np.median(widths):.2g}) %"
+    return f"{np.median(errors):.2g}, {max(errors):.2g} ({np.median(widths):.2g})"
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -197,10 +197,10 @@ def table(rows: Sequence[Row]) -> str:
     seeds = len({row["seed"] for row in rows})
     styles = [style for style in STYLES if any(row["style"] == style for row in rows)]
     lines = [
-        f"{len(rows)} films, {len(styles)} styles, {seeds} seeds.",
+        f"{len(rows)} films, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} films of each trouble.",
         "",
-        "| Trouble | What is done | Films | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| Trouble | What is done | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
         own = [row for row in rows if row["trouble"] == trouble.name]
@@ -210,7 +210,6 @@ def table(rows: Sequence[Row]) -> str:
         cells = [
             trouble.name,
             trouble.what,
-            str(len(own)),
             becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
             f"{count['inside']} of {count['given']}",
@@ -265,7 +264,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("ledger-of-troubles.jsonl"))
     parser.add_argument("--only", nargs="+", help="names of troubles", choices=[trouble.name for trouble in TROUBLES])
     parser.add_argument("--style", nargs="+", help="styles", choices=STYLES, default=STYLES)
-    parser.add_argument("--write", action="store_true", help="put the summary into docs/measuring.md")
+    parser.add_argument("--write", action="store_true", help="put the summary into docs/measuring-accuracy.md")
     asked = parser.parse_args()
     troubles = [trouble for trouble in TROUBLES if not asked.only or trouble.name in asked.only]
     run(range(asked.first, asked.first + asked.seeds), troubles, asked.rows, asked.style)

@@ -13,6 +13,7 @@ import re
 import shutil
 import sys
 import typing
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -76,7 +77,7 @@ def _bounds(info: FieldInfo) -> tuple[Any, Any]:
 
 def _allowed(info: FieldInfo, kind: Kind | None) -> str:
     if kind is not None:
-        return f"{kind.allowed}, as in `{kind.example}`".replace("**", "^")
+        return kind.allowed.replace("**", "^")
     for item in _metadata(info):
         schema = getattr(item, "json_schema", None) or {}
         if "anyOf" in schema:
@@ -126,8 +127,8 @@ def _default(info: FieldInfo, kind: Kind | None) -> str:
     return f"{value:g}" if isinstance(value, float) else f"`{value}`" if value != "" else "empty"
 
 
-def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str, str]]:
-    """Field, unit, default, allowed and meaning of every field of a table, its own tables included."""
+def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
+    """Field, default, allowed and meaning of every field of a table, its own tables included."""
     words = meanings(model)
     for name, info in model.model_fields.items():
         path = f"{prefix}{name}"
@@ -136,11 +137,10 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
             yield from field_rows(below, f"{path}.")
             continue
         kind = _kind(info)
-        unit = kind.unit.replace("**", "^") if kind else "–"
-        yield f"`{path}`", unit, _default(info, kind), _allowed(info, kind), words.get(name, "")
+        yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "")
 
 
-_HEADER = ("Field", "SI unit", "Default", "Allowed", "Meaning")
+_HEADER = ("Field", "Default", "Allowed", "Meaning")
 
 
 def robot_fields(wanted: str) -> str:
@@ -150,11 +150,9 @@ def robot_fields(wanted: str) -> str:
     if wanted == "root":
         plain = {name: info for name, info in Robot.model_fields.items() if _section(info) is None}
         words = meanings(Robot)
-        rows = [(f"`{name}`", "–", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
+        rows = [(f"`{name}`", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
         extends = "What the file starts from; its own fields are laid over it."
-        return table(
-            _HEADER, [*rows, ("`extends`", "–", "unset", "a preset, or a robot file beside this one", extends)]
-        )
+        return table(_HEADER, [*rows, ("`extends`", "unset", "a preset, or a robot file beside this one", extends)])
     model = _section(Robot.model_fields[wanted])
     if model is None:
         raise ValueError(f"{wanted} is no table of the robot file")
@@ -203,13 +201,32 @@ def _observed() -> Any:
 
 
 def _variables(dataset: Any, names: Iterable[str]) -> str:
+    """Variables of a dataset; dimensions and source of most of them stand once above the table."""
     rows = []
     for name in names:
         about = dataset[name].attrs
         over = ", ".join(f"`{dimension}`" for dimension in dataset[name].dims) or "single value"
-        source = str(about.get("source", "–"))
-        rows.append((f"`{name}`", str(about.get("units", "–")), over, str(about["long_name"]), source))
-    return table(("Variable", "Unit", "Over", "Meaning", "Source"), rows)
+        unit, source = str(about.get("units", "–")), str(about.get("source", "–"))
+        rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
+    usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
+    predicted = [row[0] for row in rows if _is_predicted(row) and row[3] == usual[0]]
+    shown = [(name, unit, _unusual(text, others, usual)) for name, unit, text, *others in rows if name not in predicted]
+    head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
+    head += f" As in `predict`: {', '.join(predicted)}.\n\n" if predicted else "\n\n"
+    return head + table(("Variable", "Unit", "Meaning"), shown)
+
+
+def _is_predicted(row: Sequence[str]) -> bool:
+    """Whether a variable is a quantity of `predict`, whose table stands on the same page."""
+    from spirillum.swimming.steady_quantities import STEADY
+
+    return any(row[0] == f"`{item.name}`" and row[1] == item.unit for item in STEADY)
+
+
+def _unusual(meaning: str, others: Sequence[str], usual: Sequence[str]) -> str:
+    """A meaning with dimensions and source where they are not the usual ones."""
+    over, source = (value if value not in (common, "–") else "" for value, common in zip(others, usual, strict=True))
+    return meaning + (f"; over {over}" if over else "") + (f"; source: {source}" if source else "")
 
 
 def study_variables(which: str) -> str:
@@ -251,7 +268,11 @@ def claims() -> str:
     from spirillum.papers.registry import claims_of
 
     rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
-    return table(("Statement", "Paper", "Computed", "Verdict", "Reason"), rows)
+    repeated = [reason for _, _, _, _, text in rows for reason in text.split("; ")]
+    marks = {reason: f"({n})" for n, (reason, count) in enumerate(Counter(repeated).most_common(), 1) if count >= 3}
+    shown = [(*row, "; ".join(marks.get(reason, reason) for reason in text.split("; "))) for *row, text in rows]
+    reasons = "".join(f"{mark} {reason}. " for reason, mark in marks.items())
+    return f"{reasons.strip()}\n\n" + table(("Statement", "Paper", "Computed", "Verdict", "Reason"), shown)
 
 
 def study_figure(name: str) -> str:
@@ -286,27 +307,72 @@ def reference_list() -> str:
 
 
 def command_options(words: str) -> str:
-    """Arguments and options of a command."""
+    """Arguments and options of a command, those that it shares with others by name alone."""
+    shared = _shared_options()
+    found = _options_of(words)
+    lines = [_item(option) for option in found if option not in shared]
+    names = ", ".join(f"`{option.names[-1]}`" for option in found if option in shared)
+    return "".join(lines) + (f"\nShared options: {names}.\n" if names else "")
+
+
+def shared_options() -> str:
+    """The options that several commands have in the same words."""
+    return "".join(_item(option) for option in _shared_options())
+
+
+class Option(typing.NamedTuple):
+    """An argument or option of a command as it is listed."""
+
+    names: tuple[str, ...]
+    metavar: str
+    default: str
+    """Empty without one."""
+    meaning: str
+
+
+def _item(option: Option) -> str:
+    names = ", ".join(f"`{name}`" for name in option.names) + (f" `{option.metavar}`" if option.metavar else "")
+    default = f" Default: `{option.default}`." if option.default not in ("", "required") else ""
+    needed = " (required)" if option.default == "required" else ""
+    return f"- {names}{needed}: {_cell(option.meaning)}{default}\n"
+
+
+@lru_cache(maxsize=1)
+def _shared_options() -> tuple[Option, ...]:
+    """Options that at least three commands have in the same words, the commonest first."""
+    from spirillum.cli.app import command_line
+
+    counts = Counter(option for words in _commands_of(command_line()) for option in _options_of(words))
+    return tuple(option for option, count in counts.most_common() if count >= 3)
+
+
+def _commands_of(command: Any, words: str = "") -> Iterator[str]:
+    """Words of every command that has none below it."""
+    below = getattr(command, "commands", None)
+    if below is None:
+        yield words
+        return
+    for name, item in below.items():
+        yield from _commands_of(item, f"{words} {name}".strip())
+
+
+def _options_of(words: str) -> list[Option]:
     from spirillum.cli.app import command_line
 
     command = command_line()
     for name in words.split():
         command = command.commands[name]
-    rows = [row for parameter in command.params if (row := _parameter(parameter)) is not None]
-    return table(("Argument or option", "Default", "Meaning"), rows)
+    return [_option(parameter) for parameter in command.params if "--help" not in parameter.opts]
 
 
-def _parameter(parameter: Any) -> tuple[str, str, str] | None:
-    if "--help" in parameter.opts:
-        return None
+def _option(parameter: Any) -> Option:
     option = parameter.opts[0].startswith("-")
-    names = ", ".join(f"`{name}`" for name in parameter.opts) if option else f"`{parameter.name.upper()}`"
-    if option and not parameter.is_flag and parameter.metavar:
-        names += f" `{parameter.metavar}`"
+    names = tuple(parameter.opts) if option else (parameter.name.upper(),)
+    metavar = parameter.metavar if option and not parameter.is_flag and parameter.metavar else ""
     stated = getattr(parameter, "show_default", None)  # of options whose default stands in a table
     value = stated if isinstance(stated, str) else parameter.default
-    shown = "required" if parameter.required else "–" if value in (None, False) else f"`{value}`"
-    return names, shown, parameter.help or ""
+    default = "required" if parameter.required else "" if value in (None, False) else str(value)
+    return Option(names, metavar, default, parameter.help or "")
 
 
 def file_listing(path: str) -> str:
@@ -363,6 +429,7 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "models": models,
     "reference-list": reference_list,
     "command-options": command_options,
+    "shared-options": shared_options,
     "file": file_listing,
     "function": function_listing,
     "part": part_listing,

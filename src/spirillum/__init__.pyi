@@ -46,6 +46,8 @@ from .measurement.proposal import Proposal as Proposal
 from .measurement.proposal import propose_setup as propose_setup
 from .pages.launch import page as page
 from .results.calibration import calibrate as calibrate
+from .results.installation import InstallationReport as InstallationReport
+from .results.installation import report as report
 from .results.measurement import measure as measure
 from .results.study import study as study
 from .robot.batch import RobotBatch as RobotBatch

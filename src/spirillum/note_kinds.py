@@ -13,8 +13,8 @@ CAUTIONS = {
     ),
     "walls-left-out": (
         "The robot is in a tube, and the model that answers has no walls. Walls slow a robot down: without them the "
-        "predicted speed is several times too high, and robots may change their order. `spirillum prepare` makes the "
-        "table with which model `tube` answers at once; `--model tube` also answers without one, in minutes."
+        "predicted speed is several times too high, and robots may change their order. A model without walls answers "
+        "only where it is named; without a name (`--model auto`) a robot in a tube is answered by `tube`."
     ),
     "pose-unknown": (
         "The gap under the body or its pitch is not given, and they decide much of the speed. The answer holds for one"

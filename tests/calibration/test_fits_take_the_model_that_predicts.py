@@ -1,4 +1,4 @@
-"""Without a named model a fit takes the one that predicts, `tube` where there are tables; what no model knows."""
+"""Without a named model a fit takes the one that predicts, `tube` in a channel; what no model knows."""
 
 import csv
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ def test_a_planted_friction_comes_back_inside_its_interval(observed: Path) -> No
     found = sp.calibrate(observed, MINE, **QUICK)
     assert (found.problem.model.name, found.to_dict()["model_reason"]) == (
         "tube",
-        "every robot has the table of its tube",
+        "the robot is in a channel, whose walls this model computes",
     )
     (friction,) = found.friction
     assert friction.low < PLANTED < friction.high
@@ -82,15 +82,11 @@ def test_what_only_a_model_with_factors_knows_is_fitted_by_one(
     assert (found.problem.model.name, found.model_reason) == ("sbt", reason)
 
 
-def test_a_robot_without_a_table_is_fitted_without_walls_and_told_so(observed: Path) -> None:
+def test_a_robot_without_a_table_is_refused_with_both_ways_on(observed: Path) -> None:
     new = {**MINE, "body": {"length": "30 mm"}}
-    found = sp.calibrate(observed, new, **QUICK)
-    assert found.problem.model.name == "sbt"
-    assert found.warnings[0].startswith(
-        "wall effects are not modelled by 'sbt', and fitted numbers compensate for them: 1 of 1"
-    )
-    assert "--prepare" in found.warnings[0]
-    assert np.isnan(found.friction[0].low)
+    with pytest.raises(sp.InputError, match=r"1 of 1 have none.*--prepare.*or model 'sbt', which leaves out the walls"):
+        sp.calibrate(observed, new, **QUICK)
+    assert sp.calibrate(observed, new, model="sbt", **QUICK).problem.model.name == "sbt"
 
 
 def test_predictions_without_walls_have_no_intervals_of_torques() -> None:

@@ -65,6 +65,7 @@ OTHER: dict[str, list[str]] = {
     "--phases": ["5"],
     "--band": [],
     "--roughness": ["3um"],
+    "--interval": [],
     "--friction-coefficient": ["0.3"],
     "--motion": ["free"],
     "--for": ["measured"],

@@ -54,7 +54,7 @@ def test_simulation_laid_down_at_the_steady_place_stays_there() -> None:
         motion="free",
         roughness=ROUGH,
         placement=place,
-        in_tube={"azimuth": lying.azimuth, "friction_coefficient": 0.1},
+        in_tube={"azimuth": lying.azimuth, "friction_coefficient": 0.1, "wait": 0.0},
         timing={"turns": 6.0},
     )
     assert float(run["mean_forward_velocity"]) == pytest.approx(motion.forward_velocity, rel=0.01)
@@ -138,7 +138,7 @@ def test_predict_settle_and_the_engine_say_the_same() -> None:
     assert answer.lying == motion.run.lying
     gap, time = answer.way("gap"), answer.way("time")
     assert np.interp(answer.drainage_time, time, gap) == pytest.approx(2e-4, rel=1e-2)
-    run = sp.simulate(robot(), model="tube", motion="free", timing={"duration": "3 s"}, roughness=ROUGH)
+    run = sp.simulate(robot(), timing={"duration": "3 s"}, roughness=ROUGH, in_tube={"wait": 0.0})
     step = int(np.argmin(np.abs(time - answer.drainage_time)))
     for name, ours in (("wall_gap", "gap"), ("azimuth", "azimuth"), ("wall_pitch", "pitch"), ("wall_yaw", "yaw")):
         theirs = float(np.interp(time[step], run["time"], run[name]))
@@ -224,7 +224,7 @@ def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() ->
     assert table is not None
     assert least_checked_gap(table.packed) == pytest.approx(0.4 * 0.08 * 9e-3, rel=1e-4)
     thin, wide = (
-        sp.simulate("biorob2012-wide", model="tube", timing={"duration": "0.1 s"}, placement={"gap": gap})
+        sp.simulate("biorob2012-wide", timing={"duration": "0.1 s"}, placement={"gap": gap}, in_tube={"wait": 0.0})
         for gap in ("0.2 mm", "0.5 mm")
     )
     assert "mm, and its table was checked from 0.29 mm on" in thin.attrs["warnings"]
@@ -238,7 +238,7 @@ def test_run_states_an_error_up_to_the_yaw_at_which_the_table_was_checked(
 ) -> None:
     monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: np.radians(checked))
     place = {"gap": "1 mm", "yaw": "3 deg"}
-    run = sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.1 s"}, placement=place)
+    run = sp.simulate("biorob2012-narrow", timing={"duration": "0.1 s"}, placement=place, in_tube={"wait": 0.0})
     assert np.isfinite(run.attrs["error_estimate"]) == known
     assert ("there is no error estimate" in run.attrs["warnings"]) != known
     assert "roughness and dry friction are assumed" in run.attrs["known_error"]

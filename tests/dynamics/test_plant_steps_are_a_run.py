@@ -26,7 +26,8 @@ def test_steps_of_any_length_are_the_run_in_one_piece(robot: str, model: str, cl
     plant = sp.Plant(robot, model=model)
     for dt in STEPS:
         moment = plant.step(dt)
-    run = sp.simulate(robot, model=model, timing={"duration": moment.time})
+    start = {"in_tube": {"wait": 0.0}} if model == "tube" else {}
+    run = sp.simulate(robot, model=model, timing={"duration": moment.time}, **start)
     assert moment.pose.position == pytest.approx(run.position.values[-1], rel=closeness, abs=1e-10)
     angle = moment.pose.tail_phase + moment.values["body_angle"]
     assert angle == pytest.approx(float(run.tail_angle[-1]), rel=closeness)
@@ -38,7 +39,7 @@ def test_remote_acts_where_simulate_switches(tube: sp.Plant) -> None:
     for remote in (True, None, False, None, True):
         moment = plant.step(0.05, remote=remote)
     on = [("0 s", "0.1 s"), ("0.2 s", "0.25 s")]
-    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "0.25 s", "on": on})
+    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "0.25 s", "on": on}, in_tube={"wait": 0.0})
     assert moment.time == pytest.approx(0.25)
     assert moment.pose.position == pytest.approx(run.position.values[-1], rel=1e-9, abs=1e-13)
     assert moment.values["motor_current"] == pytest.approx(float(run.motor_current[-1]), rel=1e-8)

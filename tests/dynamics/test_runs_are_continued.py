@@ -19,6 +19,7 @@ def simulated(
     duration: str, robot: Mapping[str, Any] | None = None, on: tuple[str, str] = ("0.1 s", "0.5 s"), **more: Any
 ) -> xr.Dataset:
     loaded = sp.load(WIDE, **(robot or {}))
+    more.setdefault("in_tube", {"wait": 0.0})
     return sp.simulate(loaded, model="tube", timing={"duration": duration, "on": [on]}, **more)
 
 

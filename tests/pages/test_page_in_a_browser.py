@@ -33,7 +33,7 @@ def test_robot_is_drawn_and_moves_as_simulate_says(tab: Any) -> None:
     tab.until("!spirillum.frame.playing")
     frame = tab.value(FRAME)
     assert frame["tail_phase"] > first["tail_phase"]
-    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": frame["time"]})
+    run = sp.simulate("biorob2012-wide", timing={"duration": frame["time"]}, in_tube={"wait": 0.0})
     assert frame["position"] == pytest.approx(run.position.values[-1], rel=1e-6, abs=1e-9)
     assert frame["values"]["motor_current"] == pytest.approx(float(run.motor_current[-1]), rel=1e-6)
     assert np.abs(_picture(tab) - picture).max() > 50.0

@@ -6,12 +6,14 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError
 from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.study import paper_study
-from spirillum.robot.placement import Placement
-from spirillum.studies.study_loader import load_study
+from spirillum.studies import run
+from spirillum.studies.study_loader import LoadedStudy, load_study
 from spirillum.swimming.model_choice import choose_model
+from spirillum.worker_pool import WorkerPool
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 FITTED_TO = (
@@ -63,24 +65,23 @@ def test_a_model_that_is_asked_for_has_no_reason() -> None:
     assert sp.predict(WIDE, model="sbt").answered_by == {"model": "sbt"}
 
 
-def test_a_robot_that_the_tube_does_not_know_is_answered_without_walls_and_says_why() -> None:
+@pytest.mark.parametrize("answer_of", [sp.predict, sp.simulate, Plant], ids=["predict", "simulate", "plant"])
+def test_a_robot_that_does_not_fit_its_tube_is_refused_and_told_how_to_leave_walls_out(answer_of: Any) -> None:
     tight = sp.load(WIDE, **{"channel.diameter": "18.5 mm"})
-    found = sp.predict(tight, tail_rate="1.2 Hz")
-    assert found.model.name == "slender"
-    assert found.warnings[0].startswith("wall effects are not modelled")
-    assert "channel.diameter = 18.5 mm" in found.warnings[0]
+    with pytest.raises(sp.InputError, match=r"channel\.diameter = 18\.5 mm.*or model 'slender', which leaves out"):
+        answer_of(tight)
+
+
+def test_a_place_in_a_tube_that_is_too_tight_needs_walls() -> None:
+    tight = sp.load(WIDE, **{"channel.diameter": "18.5 mm"})
     with pytest.raises(sp.InputError, match=r"model 'tube'.*channel\.diameter"):
-        sp.predict(tight, tail_rate="1.2 Hz", placement={"gap": "0.1 mm"})  # a place needs walls
+        sp.predict(tight, tail_rate="1.2 Hz", placement={"gap": "0.1 mm"})
+    assert sp.predict(tight, tail_rate="1.2 Hz", model="slender").forward_velocity > 0.0
 
 
-def test_what_would_take_minutes_without_a_table_is_answered_without_walls(monkeypatch: Any) -> None:
-    robot = sp.load(WIDE)
-    assert choose_model("auto", robot, table="straight").model == "tube"
+def test_a_missing_table_does_not_change_the_model(monkeypatch: Any) -> None:
     monkeypatch.setattr(library, "find_table", lambda *_: None)
-    found = choose_model("auto", robot, placement=Placement(), table="straight")
-    assert found.model == "slender"
-    assert "run `spirillum prepare`" in found.caution
-    assert choose_model("auto", robot).model == "tube"
+    assert choose_model("auto", sp.load(WIDE)).model == "tube"
 
 
 def test_one_place_without_a_table_says_what_a_table_adds() -> None:
@@ -138,20 +139,39 @@ def test_a_calibration_of_several_models_asks_for_one(tmp_path: Path) -> None:
 
 
 def test_studies_take_one_model_for_all_robots() -> None:
-    def models(**study: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        loaded = load_study({"friction": ["rotor"], **study})
-        return loaded.study.models, loaded.cautions
+    def loaded(**study: Any) -> LoadedStudy:
+        return load_study({"friction": ["rotor"], **study})
 
-    assert models(robots=[WIDE, NARROW]) == (("tube",), ())
-    mixed, (said,) = models(robots=[WIDE, "ecoli"])
-    assert mixed == ("slender",)
-    assert said.endswith("one model answers for all, and ecoli has no channel")
-    assert models(robots=[WIDE], models=["sbt", "auto", "tube"]) == (("sbt", "tube"), ())
-    tails = {"wavelengths": ["25 mm", "24.3 mm"], "amplitudes": ["2.5 mm"], "channels": {"wide": WIDE}}
-    found, cautions = models(grid=tails)
-    assert found == ("slender",)
-    assert "`spirillum prepare`" in cautions[0]
-    assert load_study(paper_study()).study.models == ("sbt", "rft")
+    assert loaded(robots=[WIDE, NARROW]).study.models == ("tube",)
+    with pytest.raises(sp.InputError, match=r"ecoli has no channel, but others have.*models = \[\"slender\"\]"):
+        loaded(robots=[WIDE, "ecoli"])
+    assert loaded(robots=["ecoli"]).study.models == ("slender",)
+    assert loaded(robots=[WIDE], models=["sbt", "auto", "tube"]).study.models == ("sbt", "tube")
+    paper = load_study(paper_study())
+    assert (paper.study.models, paper.makes_tables) == (("sbt", "rft"), False)
+
+
+@pytest.mark.parametrize(
+    ("more", "made"),
+    [({}, ["straight"]), ({"settled": True}, ["yaw"]), ({"models": ["tube"]}, []), ({"models": ["slender"]}, [])],
+)
+def test_studies_make_the_tables_that_their_robots_lack_and_say_what_is_cheaper(
+    monkeypatch: Any, more: dict[str, Any], made: list[str]
+) -> None:
+    """The paper's tail has a table; the other has none, and neither has one that is wider than the tube."""
+    stages: list[str] = []
+    said: list[str] = []
+
+    def prepared(missing: Any, *, stage: str, **_: Any) -> None:
+        assert [round(1e3 * geometry.wavelength, 1) for geometry, _ in missing] == [24.3]
+        stages.append(stage)
+
+    monkeypatch.setattr(run, "prepared_tables", prepared)
+    tails = {"wavelengths": ["25 mm", "24.3 mm"], "amplitudes": ["2.5 mm", "25 mm"], "channels": {"wide": WIDE}}
+    loaded = load_study({"friction": ["rotor"], "grid": tails, **more})
+    run.make_tables(loaded, WorkerPool(), lambda what, *_: said.append(what))
+    assert stages == made
+    assert [("'tube' by name" in words, "'slender'" in words) for words in said] == [(True, True)] * len(made)
 
 
 def test_predictions_and_runs_agree_at_the_same_place() -> None:

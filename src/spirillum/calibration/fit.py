@@ -41,14 +41,13 @@ from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
-from spirillum.fluid.tube.tabled import TabledTube, tables_of
+from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import all_hold
+from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice
+from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, WALLED, ModelChoice
 from spirillum.swimming.steady import requirements
 
 
@@ -66,7 +65,7 @@ def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str)
 
 
 def choose_fitted_model(
-    asked: str, experiment: Experiment, free: str | Sequence[str] | None, method: str, *, prepare: bool
+    asked: str, experiment: Experiment, free: str | Sequence[str] | None, method: str
 ) -> ModelChoice:
     """Return the model that is fitted, and why."""
     if asked != AUTO:
@@ -74,21 +73,13 @@ def choose_fitted_model(
     if not is_fitted_in_tube(asked, free, method):
         why = "method 'paper' inverts" if method == "paper" else "the free numbers are of"
         return ModelChoice(UNWALLED, f"{why} a model with drag factors")
+    if all(robot.channel is None for robot in experiment.robots):
+        return ModelChoice(UNWALLED, "no robot has a channel")
     batch = RobotBatch.of(experiment.robots)
-    if not all_hold(requirements(batch, TabledTube({}))).all():
-        return _without_walls("not every robot fits its tube with a film around it")
-    lacking = 0 if prepare else sum(table is None for table in tables_of(batch))
-    if lacking:
-        remedy = f"--prepare makes them in {TABLE_TAKES} each, and fits model '{WALLED}'"
-        return _without_walls(f"{lacking} of {batch.size} robots have no table of their tubes: {remedy}")
-    return ModelChoice(WALLED, "every robot has the table of its tube")
-
-
-def _without_walls(why: str) -> ModelChoice:
-    reason, _, remedy = why.partition(": ")
-    words = f"wall effects are not modelled by '{UNWALLED}', and fitted numbers compensate for them: {reason}"
-    caution = Note("walls-left-out", f"{words}; {remedy}" if remedy else words, ("model", "channel"))
-    return ModelChoice(UNWALLED, reason, caution)
+    outside = broken(requirements(batch, TabledTube({})))
+    if outside:
+        raise InputError(f"{experiment.source}: {outside[0].sentence()}; or model '{UNWALLED}', without walls")
+    return ModelChoice(WALLED, IN_CHANNEL)
 
 
 _READINGS = ("rotor", "paper")
@@ -134,15 +125,14 @@ def fit_model(
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
     experiment = read_experiment(observations, given_robots(robots))
-    choice = choose_fitted_model(model, experiment, free, method, prepare=prepare)
+    choice = choose_fitted_model(model, experiment, free, method)
     names = free_names(free, choice.model)
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name != "friction")
     problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare)
     inertia_warnings(experiment)
     found = _fitted_by(method, problem, friction, sampling, progress)
-    caution = (choice.caution,) if choice.caution else ()
-    return replace(found, model_reason=choice.reason, warnings=(*caution, *found.warnings))
+    return replace(found, model_reason=choice.reason)
 
 
 def _fitted_by(

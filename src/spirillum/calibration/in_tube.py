@@ -83,7 +83,7 @@ def _tables(
         raise InputError(
             f"{experiment.source}: model 'tube' asks a table of every robot, and {len(lacking)} of {len(found)} have "
             f"none ({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
-            f"{TABLE_TAKES}, or `spirillum prepare` of each with its tail"
+            f"{TABLE_TAKES}, or model 'sbt', which leaves out the walls"
         )
     made = [one.table for one in prepare_all(experiment.robots, stage="straight", progress=tell)] if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})

@@ -91,18 +91,22 @@ def _root(
 
 @from_function(
     "spirillum.dynamics.prediction:predict",
-    without={**NO_FORM, **NO_START, "in_tube.azimuth": "of the start of a run: settle and simulate"},
+    without={
+        **NO_FORM,
+        **{path: why for path, why in NO_START.items() if path != "in_tube.wait"},
+        "in_tube.azimuth": "of the start of a run: settle and simulate",
+    },
 )
 def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> None:
-    """Predict the steady swimming of one robot.
+    """Predict the swimming of one robot: held at its pose, and in its tube what a trial measures and where it leads.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
     from spirillum.cli import renderer
 
     with renderer.progress_bar(quiet=json) as progress:
-        result = request(progress=progress)
-    renderer.show(result.to_dict(), json=json, all_of_it=all_of_it)
+        answer = request(progress=progress).to_dict()
+    renderer.show(answer, json=json, all_of_it=all_of_it)
 
 
 @from_function("spirillum.swimming.comparison:compare_models", without=NO_FORM)
@@ -262,6 +266,17 @@ def citation(
     typer.echo(answer(model))
 
 
+@from_function("spirillum.results.installation:report", robot=None)
+def report(request: Request, *, json: Json = False) -> None:
+    """Print versions, platform and extras of this installation, as text to paste into an issue.
+
+    Example: `spirillum report`
+    """
+    from spirillum.cli import renderer
+
+    renderer.show(request().to_dict(), json=json)
+
+
 _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Predict": (predict, compare_models, study, prepare, resistance),
     "Move": (simulate, settle, control, remote, magnetic_sweep),
@@ -269,7 +284,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),
     "Design": (design,),
-    "Files": (export, schema, citation),
+    "Files": (export, schema, citation, report),
 }
 """The commands by what one wants to do, with their panels of the help."""
 

@@ -46,8 +46,8 @@ def calibrate(
         str,
         typer.Option(
             autocompletion=complete_auto_models,
-            help="Hydrodynamic model: sbt, rft, slender, tube; or auto: tube where every robot has the table of its "
-            "tube (or with --prepare), else sbt.",
+            help="Hydrodynamic model: sbt, rft, slender, tube; or auto: tube in a channel (--prepare makes missing "
+            "tables), else sbt.",
             rich_help_panel=MODEL_PANEL,
         ),
     ] = "auto",

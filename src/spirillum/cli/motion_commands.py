@@ -32,7 +32,7 @@ _FullModel = Annotated[
     typer.Option(
         autocompletion=complete_auto_models,
         help="Hydrodynamic model: rft, slender, tube, held also sbt; or auto: that of the posterior or calibration, "
-        "else tube in a channel (free: where the robot has a table, see `prepare`) and slender without.",
+        "else tube in a channel and slender without.",
     ),
 ]
 

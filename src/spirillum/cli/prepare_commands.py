@@ -23,6 +23,7 @@ def prepare(
         str,
         typer.Option(help="straight (constrained motion), yaw (motion after release too) or fine (for publication)."),
     ] = "yaw",
+    fine: Annotated[bool, typer.Option("--fine", help="Short for --stage fine.")] = False,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
     settings: Settings = None,
     json: Json = False,
@@ -46,5 +47,5 @@ def prepare(
         loaded = load_study(study_of(study), overrides_from(settings))
         asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
-        found = prepare_all(asked, stage=stage, workers=workers, progress=progress)
+        found = prepare_all(asked, stage="fine" if fine else stage, workers=workers, progress=progress)
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)

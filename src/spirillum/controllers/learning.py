@@ -38,7 +38,7 @@ _FEWEST = 4
 _BANK_ERROR = 1e-2
 """Relative standard deviation of the bank's rates of tail and body: interpolation, a pulse of flow, which lifts the
 robot a little, and voltage and viscosity, which change more than a factor once the robot's rear touches the wall.
-Chosen on 120 seeds, checked on others, see `docs/control.md`."""
+Chosen on 120 seeds, checked on others, see `docs/control-background.md`."""
 _BANK_MEMORY = 4.0
 """Correlation time of the bank's errors, s."""
 _ANYWHERE = 1e2

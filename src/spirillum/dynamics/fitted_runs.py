@@ -42,7 +42,7 @@ def chosen_run(
     """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
     Args:
-        model: name of the model, or `auto`; a free robot then moves in its tube where it has a table.
+        model: name of the model, or `auto`.
         motion: `free` or `held`; None: `held` with a fitted model of the axial entries, or of one place without dry
             friction, else `free`.
         robot: the robot.
@@ -53,7 +53,7 @@ def chosen_run(
         Both, and what was chosen instead of the usual, a sentence each.
     """
     choice = choose_model(model, robot, placement=placement, fit=fit)
-    said = [choice.caution] if choice.caution else []
+    said: list[Note] = []
     if not choice.fitted:
         if fit.models and choice.model not in fit.models:
             words = (

@@ -31,6 +31,7 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full
+from spirillum.swimming.model_choice import AUTO, UNBOUNDED
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.reynolds import (
     body_reynolds,
@@ -89,7 +90,7 @@ def magnetic_sweep(
     robot: str | Path | Mapping[str, Any] | Robot,
     rates: Sequence[str | float] | Samples | None = None,
     *,
-    model: str = "slender",
+    model: str = AUTO,
     turns: float = 30.0,
     resolution: Resolution | Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -100,7 +101,8 @@ def magnetic_sweep(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.
         rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
             None: 40 rates up to one and a half times the step-out rate of the held robot.
-        model: `slender`, as `spirillum.predict` takes for a robot without a channel, or `rft`.
+        model: `slender` or `rft`; or `auto`: `slender` for a robot without a channel. A sweep knows no walls, so that
+            a robot in a channel needs the name of a model, which leaves them out.
         turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
             at most 25, and the last is averaged, over whole slips where the robot slips.
         resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.
@@ -115,8 +117,15 @@ def magnetic_sweep(
         InputError: for another drive, wrong rates, a model without all entries, or a rate at which the robot moves far
             outside Stokes flow.
     """
+    loaded = load(robot)
+    if model == AUTO and loaded.channel is not None and loaded.magnetic is not None:
+        raise InputError(
+            f"{loaded.name} has a channel, whose walls a sweep does not know; allowed: model 'slender' or 'rft', which "
+            "leave them out, or `simulate` at each rate"
+        )
+    model = UNBOUNDED if model == AUTO else model
     check_full(find_swimmer_model(model))
-    own = with_resolution(load(robot), resolution, model)
+    own = with_resolution(loaded, resolution, model)
     # The rates of the sweep decide whether there is an answer, not the robot's own.
     held = replace(predict(without_reynolds_bound(own), model=model, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":

@@ -135,8 +135,7 @@ class Plant:
 
         Args:
             robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
-            model: `tube`, `slender` or `rft`; or `auto`: `tube` for a robot in a channel that has a table, else
-                `slender`.
+            model: `tube`, `slender` or `rft`; or `auto`: `tube` for a robot in a channel, else `slender`.
             friction: reading of the friction; None: the robot's own.
             calibrated: apply the robot's calibration factors for this model.
             calibration: calibration file, or a fit read from one, whose factors replace the robot's.
@@ -175,7 +174,7 @@ class Plant:
             band=False,
         )
         """The steady state of the robot held where it starts, by the same model."""
-        self.warnings: tuple[Note, ...] = (*self.steady.warnings, *([chosen.caution] if chosen.caution else []))
+        self.warnings: tuple[Note, ...] = self.steady.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight

@@ -1,4 +1,4 @@
-"""`spirillum.predict`: steady swimming by any model, and free motion in the tube."""
+"""`spirillum.predict`: steady swimming by any model, with trial and steady motion of a released robot beside it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from spirillum.dynamics.trial_request import TrialRequest
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, read_fit
@@ -16,7 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
-from spirillum.swimming.model_choice import AUTO, choose_model
+from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
 
@@ -34,13 +35,18 @@ def predict(  # noqa: PLR0913 - the options of the command
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     band: bool | None = None,
-    motion: str = "held",
+    motion: str | None = None,
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
+    interval: bool = False,
     beyond_stokes: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
+
+    Of a robot in a tube the answer has three columns: held at its pose (the headline), `trial` (released after a
+    waiting time, motor on, mean over 20 s, as `spirillum.measure` would give it) and `steady` (what it approaches);
+    the last two are computed where they are read. With `motion="held"` it has the first alone.
 
     With `motion="free"` and the model `tube` the robot is followed in its tube from the placement to its steady motion,
     with weight, film and contact (`spirillum.settle` has the way there). Where it reaches none, `lying.statement` says
@@ -63,10 +69,14 @@ def predict(  # noqa: PLR0913 - the options of the command
         placement: where in the channel the robot lies, or is laid down.
         band: of `tube`, with the band over what the placement leaves open, or the reference place alone; None: with it
             where the robot has a table, without which it takes minutes; not of free motion in the tube.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`.
-        roughness: of free motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4 of
-            the body's radius.
-        in_tube: of free motion in the tube: `azimuth` of the start and `friction_coefficient`, see `InTube`.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`; None: `held`, in the tube
+            with the columns `trial` and `steady` beside it.
+        roughness: of released motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4
+            of the body's radius.
+        in_tube: of released motion in the tube: `azimuth` of the start, `friction_coefficient`, and the trial's `wait`,
+            see `InTube`.
+        interval: of the trial, the 90 % interval over what nobody states (waiting time, roughness, dry friction,
+            weight, effective friction), from 64 runs in some two minutes.
         beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong, as
             with the robot's option `model.beyond_stokes`.
         progress: told what is being computed, how much is done, and of how much.
@@ -80,19 +90,8 @@ def predict(  # noqa: PLR0913 - the options of the command
     if beyond_stokes:
         own = without_reynolds_bound(own)
     choice = choose_model(model, own, placement=Placement.of(placement), fit=fit)
-    if motion != "free" or choice.model != "tube":
-        asked = InTube.of(in_tube)
-        given = {
-            "roughness": roughness,
-            **{f"in_tube.{name}": asked.model_dump()[name] for name in asked.model_fields_set},
-        }
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(
-                    f"{name} = {str(value)[:40]} is of free motion in the tube; allowed: with model 'tube' and motion "
-                    "'free'"
-                )
-        return prediction.predict(
+    if motion != "free" or choice.model != WALLED:
+        held = prediction.predict(
             own,
             model=choice,
             tail_rate=tail_rate,
@@ -103,9 +102,25 @@ def predict(  # noqa: PLR0913 - the options of the command
             resolution=resolution,
             placement=placement,
             band=band,
-            motion=motion,
+            motion=motion or "held",
             progress=progress,
         )
+        request = TrialRequest(
+            own,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            fit=fit,
+            resolution=resolution,
+            placement=placement,
+            roughness=roughness,
+            in_tube=InTube.of(in_tube),
+            interval=interval,
+            progress=progress,
+        )
+        return request.beside(held, wanted=motion is None)
+    if interval:
+        raise InputError("interval = True with motion 'free'; allowed: without a motion, of the trial")
     whose = posterior_for_of(posterior_for, fit.posterior, own)
     check_not_resolved(own, resolution)
     if band:

@@ -70,14 +70,14 @@ def simulate(  # noqa: PLR0913 - the options of the command
 
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
     model. With `tube` the walls, film, contact and dry friction are those of the robot's table (`spirillum.prepare`),
-    which is made first where there is none. The other models know no walls: films of fluid keep the robot off that of
-    its channel.
+    which is made first where there is none; by its defaults such a run is the trial of `spirillum.predict`, whose
+    values are the averages while the drive is on. The other models know no walls: films of fluid keep the robot off
+    that of its channel.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
         model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`; or `auto`: what the posterior or the
-            calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without. A free
-            robot without a table for its tube then takes `slender`, too, and a warning says so.
+            calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
             `free`, but `held` where the model is that of a posterior or calibration and knows the axial entries only,
             or was fitted to one place in the tube without dry friction.
@@ -88,7 +88,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
         draws: how many draws of the posterior are run for the intervals, 20 to 1000; None: 100.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
-            turns, on throughout.
+            turns, of a free robot in a tube 20 s, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
             starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot). With `tube`, motion `held`: where
@@ -134,6 +134,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     _check_in_tube(asked, model, walled=walled, drawn=known is not None)
     if walled:
         check_not_resolved(own, resolution)
+        asked, times = asked.of_trial(placed), times.of_trial()
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None

@@ -89,6 +89,8 @@ def read_duty(path: str | Path) -> list[Switch]:
     return switches if switches[0].time == 0 else [Switch(0.0, 0.0), *switches]
 
 
+TRIAL_DURATION = 20.0
+"""Length of a run in a tube, and of a trial, where none is given, s."""
 _LARGEST_SAMPLES = 1_000_000
 _MOST_A_TURN = 10_000
 _SHORTEST = 1e-6
@@ -197,7 +199,7 @@ class Timing(Options):
     argument: ClassVar[str] = "timing"
 
     turns: Annotated[float, BeforeValidator(_number_of_turns)] = 3.0
-    """Length of the run in turns of the tail, or of the field (the paper's three periods)."""
+    """Length of the run in turns of the tail, or of the field (the paper's three periods; free in a tube: 20 s)."""
     duration: Annotated[str | float | None, BeforeValidator(_length)] = None
     """Length of the run in time instead, with its unit (``"2 s"``) or a float in s."""
     samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100
@@ -215,6 +217,11 @@ class Timing(Options):
             raise InputError(f"turns = {self.turns:g} together with a duration; allowed: one of them")
         check_samples(self.samples_per_turn)
         schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
+
+    def of_trial(self) -> Timing:
+        """This timing with the length of a trial where none is given."""
+        given = {"turns", "duration"} & self.model_fields_set
+        return self if given else self.model_copy(update={"duration": TRIAL_DURATION})
 
     def timetable(self, turn: float, duty: float) -> Timetable:
         """The times of a run."""

@@ -17,8 +17,11 @@ from spirillum.robot.arguments import Options, in_range, refusal
 from spirillum.robot.fields import Angle, Time
 from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 
+TRIAL_WAIT = 60.0
+"""Time from laying a robot down until its motor is switched on, where none is given, s: nobody states it."""
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
 _WHAT = "a flow file (CSV with the columns time_s and flow_mm_s)"
@@ -46,13 +49,19 @@ class InTube(Options):
     azimuth: Angle = 0.0
     """Azimuth of the body's centre about +x from the lowest place; gap, pitch and yaw are against the wall there."""
     wait: Time | None = None
-    """Time for which the robot lies with its drive off before the run."""
+    """Time for which the robot lies with its drive off before the run; None: 60 s, as in a trial, in a flow none."""
     friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
     flow: Annotated[str | Path | None, _file("a flow file; a constant flow is placement.flow")] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
     continued: Annotated[str | Path | None, _file("the file of a run in a tube, by `spirillum simulate`")] = None
     """File of a run of the robot that ended early, continued after its last sample as if it had not ended."""
+
+    def of_trial(self, placed: Placement) -> InTube:
+        """These settings with the waiting time of a trial where none is given."""
+        given = self.wait is not None or self.continued is not None
+        moved = self.flow is not None or placed.flow is not None
+        return self if given else self.model_copy(update={"wait": 0.0 if moved else TRIAL_WAIT})
 
 
 def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:

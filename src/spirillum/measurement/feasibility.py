@@ -243,7 +243,7 @@ def _expected(
     from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings
 
     try:
-        choice = choose_model(AUTO, robot, table="straight")
+        choice = choose_model(AUTO, robot)
         answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
     except InputError as error:
         raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error
@@ -252,8 +252,7 @@ def _expected(
         found.setdefault(name, (float(getattr(answer, name)), f"predicted by {choice.model}{held}"))
     motion = answer.swimming
     inertia = reynolds_warnings(reynolds_limits(answer.batch, motion.reynolds_number, motion.tail_reynolds_number))
-    caution = (choice.caution,) if choice.caution else ()
-    return {name: found[name] for name in given}, (*caution, *inertia.values())
+    return {name: found[name] for name in given}, tuple(inertia.values())
 
 
 def _pixel(

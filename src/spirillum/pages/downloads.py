@@ -42,7 +42,8 @@ def command_line(lane: PageRobot) -> str:
         words += [f"{_PLACE[name]}={value}"]
     steady = shlex.join(["spirillum", "predict", *words])
     end = f"{max(lane.moment.time if lane.moment else 0.0, 1.0):.3g}s"
-    return f"{steady}\n{shlex.join(['spirillum', 'simulate', *words, '--duration', end, '-o', 'run.nc'])}\n"
+    wait = ["--wait", "0s"] if model == "tube" else []
+    return f"{steady}\n{shlex.join(['spirillum', 'simulate', *words, *wait, '--duration', end, '-o', 'run.nc'])}\n"
 
 
 def python_lines(lane: PageRobot) -> str:
@@ -53,11 +54,12 @@ def python_lines(lane: PageRobot) -> str:
     where = f", placement={placed!r}" if placed else ""
     load = f"sp.load({_source(settings)!r}" + (f", **{{{overrides}}})" if overrides else ")")
     end = max(lane.moment.time if lane.moment else 0.0, 1.0)
+    wait = ", in_tube={'wait': '0 s'}" if model == "tube" else ""
     return (
         f"import spirillum as sp\n\nrobot = {load}\n"
         f"steady = sp.predict(robot, model={model!r}{where})\n"
         "print(steady.forward_velocity)\n"
-        f"run = sp.simulate(robot, model={model!r}{where}, timing={{'duration': '{end:.3g} s'}})\n"
+        f"run = sp.simulate(robot, model={model!r}{where}, timing={{'duration': '{end:.3g} s'}}{wait})\n"
     )
 
 

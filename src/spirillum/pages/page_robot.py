@@ -127,30 +127,30 @@ class Built:
     model: str
     reason: str
     caution: str
-    needs_table: bool
-    """Whether a table would let it swim in its tube."""
+    provisional: bool
+    """Whether it swims without walls only until the table of its tube is made."""
 
 
 def build(settings: Settings, robot: Robot) -> Built:
-    """Lay a robot down; without a table for its tube it swims by a model without walls."""
+    """Lay a robot down; until the table of its tube is made it swims provisionally by a model without walls."""
     from spirillum.dynamics.plant import Plant  # loads compiled loops: the page is there before
-    from spirillum.swimming.model_choice import choose_model, has_table
+    from spirillum.swimming.model_choice import UNBOUNDED, WALLED, choose_model, has_table
 
     placed = settings.placement()
     if robot.drive is None:
         raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
     asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
-    choice = choose_model(asked, robot, placement=placed, table="yaw")
-    preparable = asked == "auto" and choice.model != "tube" and robot.channel is not None
-    needs = preparable and not has_table(RobotBatch.of(robot, placed), "yaw")
-    walled = choice.model == "tube"
-    if not walled:
+    choice = choose_model(asked, robot, placement=placed)
+    in_tube = choice.model == WALLED and robot.channel is not None
+    provisional = in_tube and not has_table(RobotBatch.of(robot, placed), "yaw")
+    model = UNBOUNDED if provisional else choice.model
+    cautions = ["provisional, without walls: the table of its tube is being made"] if provisional else []
+    if model != WALLED:
         placed = placed.model_copy(update={"flow": None})
-    plant = Plant(robot, model=choice.model, placement=placed)
-    caution = str(choice.caution or "")
-    if settings.run.get("flow") and not walled:
-        caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"
-    return Built(plant, choice.model, choice.reason, caution, needs)
+        if settings.run.get("flow"):
+            cautions.append("the imposed flow is left out, which only 'tube' knows")
+    plant = Plant(robot, model=model, placement=placed)
+    return Built(plant, model, choice.reason, "; ".join(cautions), provisional)
 
 
 @dataclass
@@ -174,6 +174,8 @@ class PageRobot:
     recording: SampleRecording = field(default_factory=SampleRecording)
     preparing: dict[str, Any] | None = None
     """Progress of a table that is being made."""
+    since: float = 0.0
+    """When it was released, by the clock of `time.monotonic`, s."""
     flowing: Flowing | None = None
     """Displayed or pending flow."""
     _undo: list[Settings] = field(default_factory=list)
@@ -253,7 +255,7 @@ class PageRobot:
 
     def take(self, built: Built) -> None:
         """Take over the released robot."""
-        self.built, self.trouble = built, ""
+        self.built, self.trouble, self.since = built, "", time.monotonic()
         self.moment = built.plant.observe()
         self.recording = SampleRecording()
         self.recording.add(self.moment, self.duty if self.remote else 0.0)
@@ -332,7 +334,7 @@ class PageRobot:
             "swims_by": built.model if built else "",
             "reason": built.reason if built else "",
             "caution": built.caution if built else "",
-            "needs_table": built.needs_table if built else False,
+            "provisional": built.provisional if built else False,
             "roughness": built.plant.roughness if built else None,
             "preparing": self.preparing,
             "flow": None if self.flowing is None else self.flowing.told(),

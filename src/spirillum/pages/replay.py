@@ -104,15 +104,13 @@ def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
     The simulated robot starts from rest with the first measured frame, with the tail as its file says.
     """
     from spirillum.dynamics.simulation import simulate
-    from spirillum.swimming.model_choice import choose_model
 
     robot = robot_of(trial)
     times = np.asarray(trial["time"].values, dtype=float)
     if times.size < 2:
         raise InputError("the trial has fewer than two frames; allowed: one in which the robot was tracked")
     length = min(float(times[-1] - times[0]), _LONGEST)
-    chosen = choose_model("auto", robot, table="straight")
-    run = simulate(robot, model=chosen.model, timing={"duration": length})
+    run = simulate(robot, timing={"duration": length}, in_tube={"wait": 0.0} if robot.channel else None)
     return replay_of_run(run) | {
         "film": {"name": film, "start": float(times[0])},
         "compared": compared_series(trial, run),

@@ -47,6 +47,8 @@ _LATE = 1.0
 """Time by which the run may fall behind before it no longer tries to catch up, s."""
 SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
 _MOST_WAITING = 2_000
+_UNTOUCHED = 2.0
+"""Time for which a robot is left as it is before its table is made, s."""
 _PAUSE = 0.2
 """Rest of the thread of the simulation after a fault, s."""
 
@@ -72,6 +74,7 @@ class SimulationThread:
         self._built: queue.Queue[tuple[int, int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
         self._lanes = [PageRobot.of(self._own)]
         self._preparing: Preparing | None = None
+        self._left_off: Robot | None = None
         self._study: StudyPicture | None = None
         self._playing, self._pace, self._looked_at = True, 1.0, False
         self._ending = threading.Event()
@@ -291,7 +294,7 @@ class SimulationThread:
     def _prepare(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None and self._preparing.running:
             raise InputError("another table is being computed; allowed: one at a time")
-        self._preparing = Preparing(lane.robot, self._wake_up)
+        self._preparing, self._left_off = Preparing(lane.robot, self._wake_up), None
 
     def _leave_off(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None:
@@ -359,9 +362,20 @@ class SimulationThread:
             changed = True
         if self._preparing is not None:
             changed = self._look_at_table(self._preparing) or changed
+        elif self._looked_at:
+            self._make_table()
         if changed:
             self._tell_scene()
         return changed
+
+    def _make_table(self) -> None:
+        """Start the table of a robot that swims provisionally and is left as it is, unless it was left off."""
+        now = time.monotonic()
+        for lane in self._lanes:
+            untouched = lane.built is not None and lane.built.provisional and now - lane.since > _UNTOUCHED
+            if untouched and lane.robot != self._left_off:
+                self._preparing = Preparing(lane.robot, self._wake_up)
+                return
 
     def _look_at_table(self, preparing: Preparing) -> bool:
         """Publish the progress of a table to the robots that it is for; whether it has changed."""
@@ -375,6 +389,9 @@ class SimulationThread:
                 self._want(index)
         if not running:
             self._preparing = None
+            self._left_off = None if said.get("done") else preparing.robot
+        elif all(lane.robot != preparing.robot for lane in self._lanes):
+            preparing.stop()
         return before != [lane.preparing for lane in self._lanes]
 
     # what is told

@@ -28,7 +28,7 @@ from spirillum.robot.tables import Drive, Motor
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
 from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
-from spirillum.studies.run import Progress, computed_study, study_fingerprint
+from spirillum.studies.run import Progress, computed_study, make_tables, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
 from spirillum.studies.study_loader import LARGEST_STUDY, load_study
 from spirillum.view.figures.comparison import ranking_picture
@@ -204,6 +204,7 @@ def study(  # noqa: PLR0913 - the options of the command
     crew.check()
     fingerprint = study_fingerprint(loaded, observed)
     tell = progress or (lambda _what, _done, _total: None)
+    make_tables(loaded, crew, tell)
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
         with guard_inputs(*inputs):

@@ -113,7 +113,6 @@ def cut(
         robots=loaded.robots[parts[0]],
         placements=loaded.placements[parts[0]],
         question={},
-        cautions=(),
     )
     return own, None if observed is None else observed_at(observed, layout.indices(region))
 

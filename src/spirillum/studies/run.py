@@ -14,6 +14,9 @@ import numpy as np
 from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.library import prepared_tables
+from spirillum.fluid.tube.progress_messages import ANNOUNCED
+from spirillum.fluid.tube.stages import StageName
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -26,12 +29,13 @@ from spirillum.studies.dataset import assembled
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.released_robots import laid_down_tasks, not_settled, settled_basis, settled_tasks, without_answer
 from spirillum.studies.study_loader import LoadedStudy
-from spirillum.studies.work import ModelTask, Part, StudyTask, run_job, tasks
+from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
 from spirillum.swimming.drive_warnings import CONSTANT_TORQUE
 from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import requirements
 from spirillum.version import own_version
 from spirillum.worker_pool import WorkerPool, map_tasks
@@ -158,8 +162,7 @@ def _worth(missing: Sequence[StudyTask], crew: WorkerPool) -> WorkerPool:
 
 def warnings_of(loaded: LoadedStudy) -> list[Note]:
     """What to be careful about in the question."""
-    warnings = list(loaded.cautions)
-    warnings += _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
+    warnings = _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         words = (
             "friction.effective is unset: robots feel no friction beyond B_m, and rates and speeds are upper "
@@ -212,6 +215,18 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
         for name in loaded.study.models
         for sentence in calibration_warnings(robot, name)
     )
+
+
+def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
+    """Make the tables that robots lack in their tubes, where the study left the choice of the model to the program."""
+    if not loaded.makes_tables:
+        return
+    stage: StageName = "yaw" if loaded.study.predicted or loaded.study.settled else "straight"
+    missing = dict.fromkeys(one for _, batch in groups(loaded) for one in missing_tables(batch, stage))
+    if missing:
+        cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
+        tell(f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
+        prepared_tables(list(missing), stage=stage, workers=1 if crew.cluster else crew.size, progress=tell)
 
 
 def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:

@@ -101,8 +101,8 @@ class Study(Section):
     note: Annotated[Text, Field(max_length=5000)] = ""
     """What a reader has to know about the study, such as assumptions."""
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (AUTO,)
-    """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` if every robot that it can answer
-    for has a table for its tube (see `spirillum prepare`), and `slender` if not."""
+    """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` for robots in channels (missing
+    tables are made first), and `slender` for robots without."""
     friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
     """Readings of the friction."""
     claims: Literal["none", "biorob2012"] = "none"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ from spirillum.fitted.calibration_file import (
 from spirillum.fitted.fit import NO_FIT, Fit, read_fit
 from spirillum.fitted.replaced import check_kept, set_fields
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
-from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in, refused_table
@@ -26,7 +25,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model, walls_left_out
+from spirillum.swimming.model_choice import AUTO, UNBOUNDED, WALLED, choose_model
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
@@ -46,10 +45,10 @@ class LoadedStudy:
     """All that decides the answer, for the fingerprint and the dataset's attributes."""
     fit: Fit = NO_FIT
     """Fitted values that act on the robots, or draws over which answers have intervals."""
-    cautions: tuple[Note, ...] = ()
-    """What to be careful about in the choice of the models, a sentence each."""
     placements: tuple[Placement, ...] = ()
     """Where each of `robots` lies by a calibration; none where the study says it."""
+    makes_tables: bool = False
+    """Whether missing tables of tubes are made first: model `tube` was chosen, not named."""
 
     def placement_of(self, number: int) -> Placement:
         """Where one of `robots` lies."""
@@ -143,7 +142,7 @@ def load_study(
     given = (*set_fields(overrides or {}), *study.vary)
     robots = tuple(_fitted_robot(robot, fit, given, str(posterior or calibration)) for robot in robots)
     _check_varied(study, overrides or {}, name)
-    study, cautions = _with_models(study, robots, fit)
+    named, study = study.models, _with_models(study, robots, fit, name)
     try:
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
@@ -157,7 +156,8 @@ def load_study(
         question["placements"] = [place.model_dump() for place in placements]
     if fit.posterior:
         question["posterior"] = {"source": fit.posterior.source, "sha256": fit.posterior.sha256}
-    loaded = LoadedStudy(study, robots, question, fit, cautions, placements)
+    makes_tables = WALLED in study.models and WALLED not in named
+    loaded = LoadedStudy(study, robots, question, fit, placements, makes_tables)
     if fit.posterior and loaded.count > _LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {_LARGEST_WITH_INTERVALS}")
     return loaded
@@ -288,45 +288,20 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
     return placements
 
 
-def _with_models(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Study, tuple[Note, ...]]:
-    """The study with one model for all robots in place of `auto`, and what to be careful about in it."""
+def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> Study:
+    """The study with one model for all robots in place of `auto`."""
     if AUTO not in study.models:
-        return study, ()
-    loaded = LoadedStudy(study, tuple(robots), {})
-    choices = (
-        choose_model(
-            AUTO,
-            loaded.robot_at(index),
-            placement=study.placement,
-            fit=fit,
-            table="straight",
-            among=True,
-        )
-        for index in range(loaded.count)
-    )
-    choice = _for_all(choices)
+        return study
     afloat = [robot.name for robot in robots if robot.channel is None]
-    if choice.model != WALLED and not (choice.fitted or choice.caution) and len(afloat) < len(robots):
-        why = f"one model answers for all, and {afloat[0]} has no channel"
-        choice = replace(choice, caution=walls_left_out(why, among=True))
-    models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
-    cautions = (choice.caution,) if choice.caution else ()
-    return study.model_copy(update={"models": tuple(models)}), cautions
-
-
-def _for_all(choices: Iterable[ModelChoice]) -> ModelChoice:
-    """The model of all robots: with walls if each has a table, but for those that break its requirements."""
-    one = outside = None
-    for choice in choices:
-        if choice.outside:
-            outside = outside or choice
-            continue
-        one = choice
-        if choice.fitted or choice.model != WALLED:
-            break
-    found = one or outside
-    assert found is not None  # noqa: S101 - a study has a robot
-    return found
+    if afloat and len(afloat) < len(robots) and not fit.models:
+        raise InputError(
+            f"{name}: model 'auto' is one for all robots, and {afloat[0]} has no channel, but others have; allowed: "
+            f'robots in channels alone, or models = ["{UNBOUNDED}"], which leaves out the walls'
+        )
+    # One that does not fit its channel has no answer, and its reason stands in the dataset: it decides nothing.
+    chosen = WALLED if not (afloat or fit.models) else choose_model(AUTO, robots[0], fit=fit).model
+    models = dict.fromkeys(chosen if model == AUTO else model for model in study.models)
+    return study.model_copy(update={"models": tuple(models)})
 
 
 def _fitted_robot(robot: Robot, fit: Fit, kept: Sequence[str], source: str) -> Robot:

@@ -134,7 +134,7 @@ class StudyTask(ABC):
     def job(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> StudyJob:
         """Return the task with the inputs that its answer needs, and no more."""
         study = loaded.study.model_copy(update={"grid": None, "robots": None})
-        small = replace(loaded, study=study, robots=(), placements=(), question={}, cautions=())
+        small = replace(loaded, study=study, robots=(), placements=(), question={})
         return StudyJob(self, small, None)
 
     @abstractmethod

@@ -1,8 +1,8 @@
 """Which hydrodynamic model answers where nobody names one.
 
 One robot has one answer. What a calibration or a posterior was fitted with answers for what it has fitted. Else a robot
-with a channel is predicted in its channel, by `tube`, and a robot without one by `slender`, which resolves the same
-robot in unbounded fluid.
+with a channel is predicted in its channel, by `tube`, or refused there, and a robot without one is predicted by
+`slender`, which resolves the same robot in unbounded fluid.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from spirillum.fitted.fit import NO_FIT, Fit
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.fluid.tube.stages import StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
@@ -25,6 +24,8 @@ AUTO = "auto"
 """Name that leaves the choice of the model to `choose_model`."""
 WALLED, UNBOUNDED = "tube", "slender"
 """What answers for a robot in a channel, and for one without."""
+IN_CHANNEL = "the robot is in a channel, whose walls this model computes"
+"""Why the model with walls is taken."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +36,8 @@ class ModelChoice:
     """Name of the model."""
     reason: str = ""
     """Why it was taken, in half a sentence; empty where it was asked for."""
-    caution: Note | None = None
-    """The note where the robot has a channel that the model does not know; else None."""
     fitted: bool = False
     """Whether it is the model of a calibration or a posterior."""
-    outside: bool = False
-    """Whether the robot breaks a requirement of the model with walls, which would answer for it otherwise."""
 
 
 def choose_model(
@@ -49,19 +46,17 @@ def choose_model(
     *,
     placement: Placement | None = None,
     fit: Fit = NO_FIT,
-    table: StageName | None = None,
-    among: bool = False,
 ) -> ModelChoice:
-    """The model that is asked for, or with `auto` the one that knows most about the robot.
+    """The model that is asked for, or with `auto` that of a fit, else the one with the walls of the robot's channel.
 
     Args:
         asked: name of a model, or `auto`.
         robot: the robot.
         placement: where it lies in its channel, which only a model with walls can answer for.
         fit: fitted values that are used.
-        table: stage of a table without which the model with walls would take minutes, and is not taken; None: it needs
-            no table, or makes its own.
-        among: the robot is one of several that are compared.
+
+    Raises:
+        InputError: for an unknown model, a fit of several models, or a robot that does not fit into its channel.
     """
     if asked != AUTO:
         return ModelChoice(find_swimmer_model(asked, AUTO).name)
@@ -72,17 +67,12 @@ def choose_model(
         return ModelChoice(UNBOUNDED, "the robot has no channel")
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
-    if outside and (placement is None or not placement.is_given):
-        reason = f"model '{WALLED}' has no answer for this robot on the floor of its channel"
-        caution = walls_left_out(outside[0].sentence(), among=among)
-    elif not outside and table is not None and not has_table(batch, table):
-        lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
-        reason = f"{lacks if among else 'the robot has no table for its tube'} yet"
-        without = f"{robot.with_tail} has no table" if among else "it has no table for its tube"
-        caution = walls_left_out(f"{without}; run `spirillum prepare`", among=among)
-    else:  # a place that was asked for is refused by the model that knows places
-        return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
-    return ModelChoice(UNBOUNDED, reason, caution, outside=bool(outside))
+    if outside and (placement is None or not placement.is_given):  # a place is refused by the model that knows places
+        raise InputError(
+            f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}; or model "
+            f"'{UNBOUNDED}', which leaves out the walls"
+        )
+    return ModelChoice(WALLED, IN_CHANNEL)
 
 
 def models_without_answer(robot: Robot) -> list[str]:
@@ -96,12 +86,6 @@ def models_without_answer(robot: Robot) -> list[str]:
         if outside:
             found.append(f"model '{name}' has no answer for it: {outside[0].sentence()}")
     return found
-
-
-def walls_left_out(why: str, *, among: bool) -> Note:
-    """The caution where a robot in a channel is answered for without its walls."""
-    effect = "speeds are too high, and their order may change" if among else "the predicted speed is too high"
-    return Note("walls-left-out", f"wall effects are not modelled, {effect}: {why}", ("model", "channel"))
 
 
 def has_table(batch: RobotBatch, stage: StageName = "straight") -> bool:

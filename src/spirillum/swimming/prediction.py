@@ -37,6 +37,7 @@ from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
+from spirillum.swimming.released_motion import ReleasedMotion
 from spirillum.swimming.scenario import Scenario, resolve_scenario
 from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.steady_state import SteadyState
@@ -82,6 +83,8 @@ class Prediction(DisplayMixin):
     """Lab rate of the tail that was asked for, rad/s; None: the robot's drive."""
     fitted_by: str = ""
     """File of a calibration or a posterior whose values act on the answer; empty without one."""
+    released: Mapping[str, Callable[[], ReleasedMotion]] = field(default_factory=dict, repr=False, compare=False)
+    """What gives `trial` and `steady`, in seconds; empty where the held motion alone, or a free one, was asked for."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -132,6 +135,16 @@ class Prediction(DisplayMixin):
             flow=self.batch.placement.flow,
         )
 
+    @cached_property
+    def trial(self) -> ReleasedMotion | None:
+        """What a trial measures of the robot, released in its tube; contact is assumed, not validated."""
+        return self.released["trial"]() if self.released else None
+
+    @cached_property
+    def steady(self) -> ReleasedMotion | None:
+        """The steady motion that the released robot approaches, as `spirillum.settle` finds it."""
+        return self.released["steady"]() if self.released else None
+
     def __dir__(self) -> list[str]:
         """Attributes, the quantities among them."""
         return sorted({*super().__dir__(), *_QUANTITIES})
@@ -145,7 +158,7 @@ class Prediction(DisplayMixin):
         """The answer of `spirillum predict --json`.
 
         Args:
-            others: what other models say stands in it.
+            others: what other models predict, trial and steady motion stand in it.
         """
         band = self.band
         beside = self.other_models if others else None
@@ -166,6 +179,7 @@ class Prediction(DisplayMixin):
             **({"lying": self.lying.to_dict()} if self.lying else {}),
             **({"band": band.to_dict()} if band else {}),
             **({"other_models": beside.to_dict()} if beside else {}),
+            **({name: getattr(self, name).to_dict() for name in self.released} if others else {}),
             "error_estimate": quantity(
                 self.error_estimate,
                 "1",
@@ -284,7 +298,6 @@ def predict(
         raise InputError(scenario.why_not(result))
     warnings = [
         *ready.warnings,
-        *([scenario.choice.caution] if scenario.choice.caution else []),
         *_case_warnings(scenario, result),
     ]
     error = scenario.error_estimate(result, checks)

@@ -17,17 +17,20 @@ from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
 from spirillum.fluid.tube.nodes import Places
-from spirillum.fluid.tube.stages import STAGES, stage_of
+from spirillum.fluid.tube.stages import STAGES, StageName, stage_of
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.table_errors import RESPONSES
+from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import all_hold
 from spirillum.robot.load import load
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.robot import Robot
 from spirillum.swimming.robot_preparation import prepared
+from spirillum.swimming.steady import requirements
 from spirillum.units import show_apart
 
 _NOT_KEPT = Note(
@@ -196,6 +199,21 @@ def check_usual_resolution(options: ModelOptions) -> None:
 def table_for(batch: RobotBatch, *, progress: Callable[[str, int, int], None] | None = None) -> TubeTable:
     """Return the table, with yawed poses, of the first robot of a batch in its tube; made where there is none."""
     return prepared_tables([_asked(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
+
+
+def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeometry, float]]:
+    """Return what decides the tables that robots of a batch lack in their tubes, each once."""
+    fits = all_hold(requirements(batch, TabledTube({})))
+    every = [(RobotGeometry.of(batch, index), tube_radius(batch, index)) for index in np.flatnonzero(fits).tolist()]
+    return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and _has_nodes(*one)]
+
+
+def _has_nodes(geometry: RobotGeometry, radius: float) -> bool:
+    """Whether there can be a table: not of a tail wider than its body."""
+    try:
+        return len(Places(geometry, radius).gaps) > 0
+    except InputError:
+        return False
 
 
 def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:

@@ -165,10 +165,10 @@ def virtual_experiment(
     if plan.duration is not None and plan.duration * camera.fps < 1.0:
         frame = 1.0 / camera.fps
         raise InputError(f"duration = {plan.duration:g} s; allowed: at least the {frame:.4g} s of a frame")
-    robots, default_model, placement, cautions = _robots(study)
+    robots, default_model, placement = _robots(study)
     if len(robots) * plan.trials > _MOST:
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
-    steady, warnings = {}, list(cautions) if motion.model is None else []
+    steady, warnings = {}, []
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model, placement)
         warnings += [note.prefixed(f"{name}: ") for note in said]
@@ -223,14 +223,12 @@ class _Filmed(NamedTuple):
     """The study's first."""
     placement: Placement | None
     """Where the study says that robots lie."""
-    cautions: tuple[Note, ...]
-    """What to be careful about in that model, a sentence each."""
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
     """Robots of a study; None: the paper's robots."""
     if study is None:
-        return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None, ())
+        return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None)
     from spirillum.studies.study_loader import load_study
 
     loaded = load_study(study)
@@ -246,7 +244,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
             robot = robot.model_copy(update={"name": name})
         found[file_name(name, {*found, _MARK, _TABLE})] = robot
     placement = loaded.study.placement if loaded.study.placement.is_given else None
-    return _Filmed(found, loaded.study.models[0], placement, loaded.cautions)
+    return _Filmed(found, loaded.study.models[0], placement)
 
 
 def _gap(robot: Robot, placement: Placement | None) -> float | None:

@@ -47,7 +47,7 @@ def steady_rates(
     Args:
         robot: a checked robot.
         motion: the model and the prescribed rates.
-        default_model: where `motion` names none; `auto` is what `predict` answers with, where it is ready at once.
+        default_model: where `motion` names none; `auto` is what `predict` answers with.
         placement: where the robot lies, for a model with walls; None: at the reference place.
 
     Returns:
@@ -69,7 +69,7 @@ def steady_rates(
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 
-    choice = choose_model(motion.model or default_model, robot, placement=placement, table="straight")
+    choice = choose_model(motion.model or default_model, robot, placement=placement)
     steady = predict(
         robot,
         model=choice.model,
@@ -87,8 +87,6 @@ def steady_rates(
 
 def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[Note, ...]:
     """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
-    if choice.caution:
-        return (choice.caution,)
     if robot.channel is None or find_swimmer_model(choice.model).placed:
         return ()
     words = f"wall effects are not modelled by '{choice.model}': the film shows too fast a robot; use model '{WALLED}'"

@@ -11,7 +11,7 @@ _MODULES = {
     "motion": "prediction model_comparison simulation magnetic_sweep settling flow remote control",
     "fits": "calibration model_ranking suggestion observations",
     "studies": "study study_store design",
-    "robots": "robot check export resistance preparation preparations",
+    "robots": "robot check export resistance preparation preparations report",
     "videos": "measurement feasibility track setup_check setup_proposal",
     "films": "virtual_experiment virtual_trial film show recording",
 }

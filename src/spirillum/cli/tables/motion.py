@@ -9,10 +9,12 @@ from rich.table import Table
 
 from spirillum.cli.tables.parts import (
     RELEASED,
+    RELEASED_COLUMNS,
     Answer,
     Blocks,
     Detail,
     band_grid,
+    columns_grid,
     error_of,
     files_of,
     friendly,
@@ -21,6 +23,7 @@ from spirillum.cli.tables.parts import (
     placement_of,
     quantity_grid,
     reason_of,
+    released_columns,
     resting_pose,
     unsteady,
 )
@@ -40,11 +43,14 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     only = None if all_of_it else headline(answer)
     banded = "band" in answer or "kind" in answer["forward_velocity"]
-    rows = (band_grid if banded else quantity_grid)(title, answer, only)
+    released = any("reason" not in answer.get(column, {"reason": ""}) for column in RELEASED_COLUMNS)
+    rows = (columns_grid if released else band_grid if banded else quantity_grid)(title, answer, only)
     yield rows
     more = len(rows_of(answer)) - rows.row_count
     if more:
         yield f"and {more} more quantities: --all"
+    if "trial" in answer:
+        yield from released_columns(answer)
     yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
     if "lying" in answer:
         yield from resting_pose(answer["lying"])

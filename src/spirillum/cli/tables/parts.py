@@ -23,7 +23,7 @@ class Detail(str):
 Block = str | Table
 """A line, a detail or a table of an answer; the first one is its title, or has it."""
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady")
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "trial", "steady")
 """Columns of numbers."""
 
 
@@ -60,6 +60,62 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
     for row in rows_of(items, only):
         table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
     return table
+
+
+def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
+    """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
+    table = grid(title, "quantity", "held", "low", "high", "trial", "steady", "unit")
+    for name in answer if only is None else only:
+        for row in rows_of(answer, [name]):
+            released = (answer[column].get(name) for column in RELEASED_COLUMNS)
+            cells = [
+                "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
+            ]
+            table.add_row(row.name, row.value, row.low or "-", row.high or "-", *cells, row.unit)
+    return table
+
+
+RELEASED_COLUMNS = ("trial", "steady")
+"""Entries of an answer that stand beside the held one."""
+
+
+def released_columns(answer: Answer) -> Iterator[Block]:
+    """What the columns of released motions are, or why one is missing."""
+    missing = {column: answer[column]["reason"] for column in RELEASED_COLUMNS if "reason" in answer[column]}
+    for reason in dict.fromkeys(missing.values()):
+        yield Detail(f"no {' and no '.join(column for column in missing if missing[column] == reason)}: {reason}")
+    if "trial" not in missing:
+        wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
+        yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
+        yield from _over_unknowns(answer["trial"])
+    if "steady" not in missing:
+        constant = answer["steady"]["time_constant"]
+        after = f", approached with a time constant of {in_words(constant)}" if constant["value"] else ""
+        yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
+
+
+def _over_unknowns(trial: Answer) -> Iterator[str]:
+    """The interval of a trial's speed, what it comes from, and what to state first."""
+    speed = trial["forward_velocity"]
+    if "unknowns" not in trial:
+        if "runs" in trial:
+            standing, lost = trial["standing"], trial["without_answer"]
+            yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
+        return
+    unit = display_unit(speed["high"], speed["unit"])
+    low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
+    parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
+    words = [
+        f"{_UNKNOWN.get(one['name'], one['name'].replace('_', ' '))} {percent(one['share']['value'])}" for one in parts
+    ]
+    stand = f", {trial['standing']} of {trial['runs']} stand" if trial["standing"] else ""
+    level = f"{100 * speed['level']:g} % interval of the speed over what nobody states"
+    yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
+    yield f"of its variance: {', '.join(words)}; state the first of them first"
+
+
+_UNKNOWN = {"friction.effective": "effective friction", "wait": "waiting time"}
+"""Unknowns of a trial in words."""
 
 
 def files_of(answer: Answer, **words: str) -> Iterator[str]:

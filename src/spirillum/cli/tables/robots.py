@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid
+from spirillum.results.installation import report_lines
 from spirillum.units import in_unit
 
 
@@ -37,6 +38,11 @@ def _word(value: Any) -> str:
     if isinstance(value, tuple):
         return escape(", ".join(str(item) for item in value)) or "-"
     return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
+
+
+def report(answer: Answer) -> Blocks:
+    """Versions, platform and extras."""
+    yield from report_lines(answer)
 
 
 def check(answer: Answer) -> Blocks:

@@ -25,7 +25,7 @@ export class Knobs {
     this.remoteWord.textContent = lane.remote ? "on" : "off";
     if (document.activeElement !== this.duty) this.duty.value = lane.duty;
     this.dutyWord.textContent = `${Math.round(100 * lane.duty)} %`;
-    this.table.hidden = !(lane.needs_table || lane.preparing);
+    this.table.hidden = !(lane.provisional || lane.preparing);
     if (!this.table.hidden) this.tell(lane);
   }
 
@@ -33,7 +33,7 @@ export class Knobs {
     const said = lane.preparing;
     const working = said && !said.failed;
     this.table.replaceChildren(
-      element("p", { text: working ? `Table of this robot in its tube: ${said.what}${said.places ? `, ${said.done_places} of ${said.places}` : ""}` : said?.failed ? said.failed : "This robot has no table for its tube yet, so that it swims without walls. A table takes 4 to 12 minutes of one core; the page goes on meanwhile." }),
+      element("p", { text: working ? `Table of this robot in its tube: ${said.what}${said.places ? `, ${said.done_places} of ${said.places}` : ""}` : said?.failed ? said.failed : "This robot swims provisionally without walls, until the table of its tube is made, in minutes." }),
       ...(working && said.places ? [element("progress", { max: said.places, value: said.done_places })] : []),
       element("button", { class: "plain", text: working ? "Leave off" : "Make its table", onclick: () => this.send({ do: working ? "leave-off" : "prepare", lane: this.lane }) }),
     );

@@ -126,7 +126,7 @@ class Lane {
     this.numbers = lane.numbers;
     this.takeFlow(lane.flow);
     this.trouble = lane.trouble;
-    this.quietNote = lane.trouble ? "" : lane.caution ? (lane.needs_table ? "Without walls: no table for this tube yet" : "") : "";
+    this.quietNote = !lane.trouble && lane.provisional ? "Provisional: without walls until the table of this tube is made" : "";
     this.ready = false;
     this.say("");
   }

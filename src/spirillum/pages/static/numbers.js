@@ -11,7 +11,7 @@ export class Numbers {
   }
 
   show(lane, quantities) {
-    const told = JSON.stringify([lane.numbers, lane.caution, lane.trouble, lane.warnings, lane.swims_by, lane.needs_table, lane.preparing, lane.generation]);
+    const told = JSON.stringify([lane.numbers, lane.caution, lane.trouble, lane.warnings, lane.swims_by, lane.provisional, lane.preparing, lane.generation]);
     if (told === this.built) return;
     this.built = told;
     const numbers = lane.numbers;
@@ -43,7 +43,7 @@ export class Numbers {
         element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
       )), body);
     this.table = table;
-    this.tag = element("span", { class: "tag", text: numbers ? `model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" });
+    this.tag = element("span", { class: "tag", text: numbers ? `${lane.provisional ? "provisional: " : ""}model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" });
     this.holder.replaceChildren(
       element("h2", {}, "Numbers", this.tag),
       ...(lane.trouble ? [element("p", { class: "trouble", role: "alert", text: sentence(lane.trouble) })] : []),

@@ -45,7 +45,7 @@ class WidthConstants:
     linked: int = 4
     """Fewest frames on which two edges are seen together from which on they say how these lie to each other."""
     uneven: float = radians(2.0)
-    """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
+    """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring-reference.md`."""
     clear: float = 10.0
     """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
 

@@ -1,0 +1,141 @@
+"""What a trial measures of a robot that is released in its tube, and the steady motion that it approaches.
+
+A trial: the robot is laid down, waits with its motor off while its film drains, and swims with the motor on. Its values
+are means over the time with the motor on, as `spirillum.measure` gives them of a video: those of `spirillum.simulate`
+by its defaults (`mean_..._on`). The steady motion is that of `spirillum.settle`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.dynamics.integration import INTERRUPTED
+from spirillum.dynamics.timing import TRIAL_DURATION
+from spirillum.errors import InputError
+from spirillum.notes import Note, notes_in
+from spirillum.quantities import QUANTITIES
+from spirillum.robot.batch import RobotBatch
+from spirillum.swimming.model_choice import WALLED, has_table
+from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.released_motion import ReleasedMotion
+from spirillum.swimming.steady_quantities import STEADY
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spirillum.dynamics.settling import Settling
+
+ASSUMPTION = "contact assumed, not validated"
+"""What a released motion rests on."""
+_POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth": "azimuth"}
+"""The pose of an answer, and where a run has it."""
+_MOST_TURNS = 2000
+"""Turns of the tail that a trial may take beside an answer."""
+
+
+def why_not_released(held: Prediction, *, fitted: bool) -> str:
+    """Return why no released motion stands beside a held answer, in a sentence; empty where one does.
+
+    Args:
+        held: the answer.
+        fitted: whether draws of a posterior are behind it.
+    """
+    if held.robot.channel is None:
+        return "the robot has no channel in which it could be released"
+    if held.model.name != WALLED:
+        return f"model '{held.model.name}' has no walls on which a robot could rest; use model '{WALLED}'"
+    if held.tail_rate is not None:
+        return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
+    if fitted:
+        return "the draws of a posterior are followed by `simulate --posterior` and by motion 'free'"
+    if not has_table(RobotBatch.of(held.robot, held.batch.placement), "yaw"):
+        return "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
+    return ""
+
+
+def trial_of(held: Prediction, run: Callable[[], xr.Dataset]) -> ReleasedMotion:
+    """Return the means of a trial.
+
+    Args:
+        held: the robot, held where it is laid down.
+        run: follows the robot, as `spirillum.simulate` does by its defaults.
+    """
+    turns = abs(held.tail_rotation_rate) * TRIAL_DURATION / (2.0 * np.pi)
+    if turns > _MOST_TURNS:
+        return ReleasedMotion(reason=f"its tail turns {turns:.4g} times in {TRIAL_DURATION:g} s; use `simulate`")
+    try:
+        dataset = run()
+    except InputError as error:
+        return ReleasedMotion(reason=str(error))
+    if INTERRUPTED in str(dataset.attrs["events"]):
+        raise KeyboardInterrupt
+    return trial_means(dataset)
+
+
+def trial_means(run: xr.Dataset) -> ReleasedMotion:
+    """Return the means of a run in a tube over the time with its drive on, and its mean pose."""
+    names = [item.name for item in STEADY if item.name in run and run[item.name].dims == ("time",)]
+    columns = {name: name for name in names} | _POSE | {"contact_force": "contact_force"}
+    length = float(run["time"][-1] - run["time"][0])
+    values = {name: float(run[of].integrate("time")) / length for name, of in columns.items()}
+    exact = {name: f"mean_{name}_on" for name in names}
+    values |= {name: float(run[of]) for name, of in exact.items() if of in run}
+    notes = notes_in(run.attrs)
+    basis = {
+        "assumption": ASSUMPTION,
+        "state": "standing" if _is_held(notes) else "swimming",
+        "wait": {"value": float(run.attrs["wait"]), "unit": QUANTITIES["wait"].unit},
+        "duration": {"value": length, "unit": "s"},
+        "warnings": [str(note) for note in notes],
+    }
+    return ReleasedMotion(values, basis)
+
+
+def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
+    """Return the steady motion of a released robot.
+
+    Args:
+        follow: follows it there, as `spirillum.settle` does.
+    """
+    try:
+        found = follow()
+    except InputError as error:
+        return ReleasedMotion(reason=str(error))
+    motion, lying = found.prediction, found.lying
+    basis: dict[str, Any] = {
+        "assumption": ASSUMPTION,
+        "state": _state_of(motion),
+        "statement": lying.statement,
+        "time_constant": {"value": _finite(lying.approach_time), "unit": "s"},
+        "warnings": [str(note) for note in motion.warnings],
+    }
+    pose = {name: float(getattr(lying, name)) for name in (*_POSE, "contact_force")}
+    moving: Mapping[str, float] = {}
+    if lying.state != "changing":  # its means depend on when they are taken
+        moving = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
+    return ReleasedMotion({**moving, **pose}, basis)
+
+
+def _is_held(notes: Iterable[Note]) -> bool:
+    """Whether dry friction holds the robot."""
+    return any(note.code == "held-by-friction" for note in notes)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _state_of(motion: Prediction) -> str:
+    """What became of a released robot, in a word."""
+    lying = motion.lying
+    assert lying is not None  # noqa: S101 - a released motion has one
+    if _is_held(motion.warnings):
+        return "standing"
+    if lying.state == "steady" and np.cos(lying.azimuth) < 0.0:
+        return "ceiling"
+    if "the robot's table" in lying.ended:
+        return "left-table"
+    return {"steady": "steady", "orbits": "orbit", "goes around": "orbit", "changing": "changing"}[lying.state]

@@ -1,0 +1,196 @@
+"""What nobody knows of a trial, and the interval of its values over that: docs/unknowns.md.
+
+The same space-filling sample (Sobol' points with a fixed seed) serves all robots, so that differences between robots
+are not those of their samples. What a robot, a calibration or a request states is not varied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.integration import Progress
+from spirillum.envelope import quantity
+from spirillum.robot.robot import Robot
+from spirillum.swimming.released_motion import ReleasedMotion, TrialInterval
+
+RUNS = 64
+"""Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
+LEVEL = 0.9
+"""Level of the interval over the unknowns."""
+_GRAVITY = 9.81
+_FEWEST = 0.5
+"""Share of the runs that have to swim."""
+
+
+class TrialUnknown(NamedTuple):
+    """A number that nobody states, with an assumed distribution between two ends."""
+
+    name: str
+    """`wait`, or the field that it replaces."""
+    kind: Literal["uniform", "log-uniform"]
+    """Shape of the distribution."""
+    low: float
+    high: float
+    of: str
+    """What the ends are multiples of, or their unit."""
+    source: str
+    """Why these ends."""
+
+    def at(self, shares: Samples) -> Samples:
+        """Values at shares of the distribution, between 0 and 1."""
+        if self.kind == "uniform":
+            return self.low + (self.high - self.low) * shares
+        found: Samples = self.low * (self.high / self.low) ** shares
+        return found
+
+    def to_dict(self, share: float) -> dict[str, Any]:
+        """Its entry in `unknowns` of an answer, with its share of the variance."""
+        ends = {"low": self.low, "high": self.high, "of": self.of, "source": self.source}
+        return {"name": self.name, "distribution": self.kind, **ends, "share": quantity(share, "1")}
+
+
+UNKNOWNS = (
+    TrialUnknown("wait", "log-uniform", 10.0, 600.0, "s", "nobody states it: from a quick hand to ten minutes"),
+    TrialUnknown(
+        "roughness", "log-uniform", 1e-4, 1e-2, "body's radius", "from a smooth hull to glued and printed stripes"
+    ),
+    TrialUnknown(
+        "friction_coefficient", "uniform", 0.0, 0.3, "1", "lubricated surfaces 0.05 to 0.15; from none to dry plastics"
+    ),
+    TrialUnknown(
+        "weight",
+        "uniform",
+        0.9,
+        1.1,
+        "weight in the fluid",
+        "the difference of mass and displaced mass, each to 1 or 2 %",
+    ),
+    TrialUnknown(
+        "friction.effective",
+        "log-uniform",
+        1.0,
+        20.0,
+        "the rotor's own B_m",
+        "no seal has less than the bearings alone; B_eff inferred from trials is 10 to 16 times that",
+    ),
+)
+"""What the interval of a trial is over, in the order of the columns of its sample."""
+
+
+class TrialSample(NamedTuple):
+    """One run: what it takes in place of what nobody states; None where that is stated."""
+
+    robot: Robot
+    wait: float | None
+    roughness: float | None
+    friction_coefficient: float | None
+
+
+def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
+    """Return the unknowns that are open.
+
+    Args:
+        robot: the robot.
+        weight: its weight in the fluid, N; 0 where its masses are not known.
+        stated: `wait`, `roughness` and `friction_coefficient` as they are requested or fitted; None where they are not.
+    """
+    free = {name for name, value in stated.items() if value is None}
+    free |= {"weight"} if weight and robot.body.mass is not None else set()
+    free |= {"friction.effective"} if robot.motor is not None and robot.friction.effective is None else set()
+    return tuple(one for one in UNKNOWNS if one.name in free)
+
+
+def samples_of(robot: Robot, weight: float, unknowns: Sequence[TrialUnknown]) -> list[TrialSample]:
+    """Return the runs over the unknowns of a robot with that weight in the fluid, N."""
+    values = {one.name: one.at(column) for one, column in zip(unknowns, _shares(unknowns).T, strict=True)}
+    found = []
+    for number in range(RUNS):
+        own = {name: float(column[number]) for name, column in values.items()}
+        one = robot
+        if "weight" in own and robot.body.mass is not None:
+            mass = robot.body.mass + (own["weight"] - 1.0) * weight / _GRAVITY
+            one = one.model_copy(update={"body": one.body.model_copy(update={"mass": mass})})
+        if "friction.effective" in own and robot.motor is not None:
+            effective = own["friction.effective"] * robot.motor.rotor_friction
+            one = one.model_copy(update={"friction": one.friction.model_copy(update={"effective": effective})})
+        height = 0.5 * robot.body.diameter * own["roughness"] if "roughness" in own else None
+        found.append(TrialSample(one, own.get("wait"), height, own.get("friction_coefficient")))
+    return found
+
+
+def with_interval(
+    nominal: ReleasedMotion,
+    samples: Sequence[TrialSample],
+    unknowns: Sequence[TrialUnknown],
+    run: Callable[[TrialSample], ReleasedMotion],
+    progress: Progress | None = None,
+) -> ReleasedMotion:
+    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
+
+    Args:
+        nominal: the trial at nominal unknowns.
+        samples: the runs, as `samples_of` gives them.
+        unknowns: what they differ in.
+        run: makes one of them.
+        progress: told how many runs are done, and of how many.
+    """
+    if nominal.reason or not unknowns:
+        return nominal
+    runs: list[ReleasedMotion] = []
+    for number, sample in enumerate(samples):
+        if progress is not None:
+            progress("trial over its unknowns", number, len(samples))
+        runs.append(run(sample))
+    swims = np.array([_swims(one) for one in runs])
+    basis: dict[str, Any] = {
+        "runs": len(runs),
+        "standing": sum(not one.reason for one in runs) - int(swims.sum()),
+        "without_answer": sum(bool(one.reason) for one in runs),
+    }
+    if swims.mean() < _FEWEST:
+        return replace(nominal, basis={**nominal.basis, **basis})
+    moving = [one for one, there in zip(runs, swims, strict=True) if there]
+    speeds = np.log([one.values["forward_velocity"] for one in moving])
+    shares = variance_shares(_shares(unknowns)[swims], speeds)
+    basis["unknowns"] = [one.to_dict(share) for one, share in zip(unknowns, shares, strict=True)]
+    edge = 0.5 * (1.0 - LEVEL)
+    values = {name: np.array([one.values[name] for one in moving]) for name in nominal.values}
+    quantiles = {name: np.quantile(column, [0.5, edge, 1.0 - edge]) for name, column in values.items()}
+    intervals = {
+        name: TrialInterval(float(middle), float(low), float(high), LEVEL)
+        for name, (middle, low, high) in quantiles.items()
+    }
+    return replace(nominal, basis={**nominal.basis, **basis}, intervals=intervals)
+
+
+def _swims(run: ReleasedMotion) -> bool:
+    """Whether a robot moves forward, and dry friction does not hold it."""
+    return not run.reason and run.basis["state"] != "standing" and run.values["forward_velocity"] > 0.0
+
+
+def variance_shares(shares: Samples, values: Samples) -> Samples:
+    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share.
+
+    Args:
+        shares: of the distributions, (runs, unknowns), 0 to 1.
+        values: (runs,).
+    """
+    x = 2.0 * shares - 1.0
+    terms = np.stack([x, x**2], axis=-1)
+    design = np.column_stack([np.ones(len(x)), terms.reshape(len(x), -1)])
+    factors = np.linalg.lstsq(design, values, rcond=None)[0][1:].reshape(-1, 2)
+    found: Samples = np.var(np.einsum("rud,ud->ru", terms, factors), axis=0) / np.var(values)
+    return found
+
+
+def _shares(unknowns: Sequence[TrialUnknown]) -> Samples:
+    """Shares of the distributions, (runs, unknowns): those of an unknown are the same whichever others are open."""
+    from scipy.stats import qmc
+
+    points: Samples = qmc.Sobol(len(UNKNOWNS), rng=np.random.default_rng(1)).random(RUNS)
+    return points[:, [UNKNOWNS.index(one) for one in unknowns]]

@@ -1,0 +1,84 @@
+"""The interval of a trial over what nobody states, on laws that are known."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.cli.tables.parts import released_columns
+from spirillum.dynamics.trial_unknowns import RUNS, UNKNOWNS, open_unknowns, samples_of, variance_shares, with_interval
+from spirillum.swimming.released_motion import ReleasedMotion
+
+WIDE = sp.load("biorob2012-wide")
+NOTHING = dict.fromkeys(("wait", "roughness", "friction_coefficient"))
+WEIGHT = 0.028
+
+
+def motion(speed: float, state: str = "swimming") -> ReleasedMotion:
+    basis = {"state": state, "wait": {"value": 60.0, "unit": "s"}, "duration": {"value": 20.0, "unit": "s"}}
+    return ReleasedMotion({"forward_velocity": speed}, {**basis, "assumption": "assumed"})
+
+
+def over(run: Any) -> ReleasedMotion:
+    unknowns = open_unknowns(WIDE, WEIGHT, NOTHING)
+    return with_interval(motion(1e-4), samples_of(WIDE, WEIGHT, unknowns), unknowns, run)
+
+
+def test_a_power_law_of_the_waiting_time_gives_its_quantiles_and_the_whole_variance() -> None:
+    found = over(lambda sample: motion(1e-3 / sample.wait))
+    speed = found.intervals["forward_velocity"]
+    assert found.values["forward_velocity"] == 1e-4  # that of nominal unknowns
+    ends = [1e-3 / (10.0 * 60.0**share) for share in (0.5, 0.95, 0.05)]
+    assert (speed.median, speed.low, speed.high) == pytest.approx(ends, rel=0.05)
+    shares = {one["name"]: one["share"]["value"] for one in found.basis["unknowns"]}
+    assert shares["wait"] == pytest.approx(1.0, abs=1e-9)
+    assert sum(shares.values()) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_shares_of_a_sum_are_those_of_its_terms() -> None:
+    points = np.random.default_rng(3).random((4000, 3))
+    a, b = 2.0 * points[:, 0] - 1.0, 2.0 * points[:, 1] - 1.0
+    found = variance_shares(points, 2.0 * a + b**2)  # variances 4/3 and 4/45
+    assert found == pytest.approx([15.0 / 16.0, 1.0 / 16.0, 0.0], abs=0.01)
+
+
+def test_robots_that_stand_or_are_lost_are_counted_and_told() -> None:
+    def run(sample: Any) -> ReleasedMotion:
+        if sample.friction_coefficient > 0.27:
+            return motion(1e-9, "standing")
+        return ReleasedMotion(reason="lost") if sample.wait > 500.0 else motion(1e-4 * sample.wait)
+
+    found = over(run)
+    assert 0 < found.basis["standing"] < 0.2 * RUNS
+    assert 0 < found.basis["without_answer"] < 0.2 * RUNS
+    assert found.intervals["forward_velocity"].low > 1e-4
+    said = " ".join(str(line) for line in released_columns({"trial": found.to_dict(), "steady": {"reason": "none"}}))
+    assert "trial, 90 % interval of the speed over what nobody states" in said
+    assert "waiting time 1" in said
+    none = over(lambda _: motion(0.0, "standing"))
+    assert not none.intervals
+    assert none.basis["standing"] == RUNS
+
+
+def test_what_is_stated_is_not_varied() -> None:
+    stated = {"wait": 5.0, "roughness": None, "friction_coefficient": 0.2}
+    known = sp.load("biorob2012-wide", **{"friction.effective": "1e-5 N m s/rad"})
+    assert [one.name for one in open_unknowns(known, WEIGHT, stated)] == ["roughness", "weight"]
+    assert [one.name for one in open_unknowns(known, 0.0, stated)] == ["roughness"]
+    sample = samples_of(known, WEIGHT, open_unknowns(known, WEIGHT, stated))
+    assert {one.wait for one in sample} == {None}
+    assert {one.robot.friction.effective for one in sample} == {1e-5}
+    masses = np.array([one.robot.body.mass for one in sample])
+    assert np.ptp(masses) == pytest.approx(0.2 * WEIGHT / 9.81, rel=0.1)
+
+
+def test_the_page_of_unknowns_lists_all_of_them() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "unknowns.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w.]+)` \| ([\w-]+) \| ([\d.e-]+) to ([\d.e-]+) \|", page, re.MULTILINE)
+    listed = [(name, kind, float(low), float(high)) for name, kind, low, high in rows]
+    assert listed == [(one.name, one.kind, one.low, one.high) for one in UNKNOWNS]
+    assert math.log2(RUNS).is_integer()
