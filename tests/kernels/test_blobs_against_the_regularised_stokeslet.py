@@ -96,7 +96,7 @@ def test_threads_share_the_points_and_change_nothing(monkeypatch: pytest.MonkeyP
     points, sources, forces = (rng.normal(size=(count, 3)) for count in (41, 7, 7))
     fields = []
     for threads in (1, 3):
-        monkeypatch.setattr("spirillum.kernels.compiled._THREADS", threads)
+        monkeypatch.setattr("spirillum.kernels.native._THREADS", threads)
         fields.append(np.zeros((41, 4)))
         add_blobs(points, sources, forces, np.full(7, 0.01), fields[-1])
     np.testing.assert_array_equal(*fields)

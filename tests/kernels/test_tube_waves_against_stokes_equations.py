@@ -110,10 +110,10 @@ def test_long_waves() -> None:
 @pytest.mark.parametrize("k", [0.4, 2.5])
 def test_layers_against_rings_of_forces(k: float, p: int) -> None:
     """S is the Fourier transform along the tube of the ring kernels on a cylinder of radius 1, over 4 pi."""
-    work, blocks = np.empty((2, p + 3)), np.empty((p + 2, 3, 3))
+    blocks = np.empty((p + 2, 3, 3))
 
     def entry(i: int, j: int, dx: float) -> float:
-        ring_modes(dx, 0.0, 1.0, 1.0, 0.0, p + 2, *work, blocks)
+        ring_modes(dx, 0.0, 1.0, 1.0, 0.0, blocks)
         return float(blocks[p, i, j])
 
     def transform(i: int, j: int) -> complex:
