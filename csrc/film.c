@@ -151,7 +151,7 @@ static Coordinates coordinates_of(const Film *f, double e, double pitch, double 
 static int64_t spline_weights_at(double at, double first, double last, int64_t intervals, double out[4]) {
     const double step = (last - first) / (double)intervals, place = (at - first) / step;
     const double inside = clamped(place, 0.0, (double)intervals);
-    const int64_t cell = (int64_t)inside < intervals - 1 ? (int64_t)inside : intervals - 1;
+    const int64_t cell = inside >= 1.0 ? (int64_t)smaller(inside, (double)(intervals - 1)) : 0; /* of no number too */
     const double u = inside - (double)cell, v = 1.0 - u, beyond = place - inside;
     out[0] = v * v * v / 6.0;
     out[1] = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0;

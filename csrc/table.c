@@ -188,12 +188,13 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
     return p->within ? INSIDE : TOO_FAR_PITCHED;
 }
 
-/* Fill the matrix with a share of the film's resistance. */
-static void set_film(const Table *table, Pose pose, double share, double out[MOTIONS][MOTIONS]) {
-    double film[6][6];
+/* Fill the matrix with a share of the film's resistance, and the film with it. */
+static void set_film(const Table *table, Pose pose, double share, double film[6][6], double out[MOTIONS][MOTIONS]) {
     film_resistance(&table->film, pose.offset, pose.pitch, pose.yaw, film);
     for (int i = 0; i < MOTIONS; i++)
         for (int j = 0; j <= i; j++) out[i][j] = out[j][i] = i < 6 ? share * film[i][j] : 0.0;
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++) film[i][j] = out[i][j];
 }
 
 /* Add a share of the outer part at a phase, from the Fourier coefficients of its factor. */
@@ -218,20 +219,20 @@ static void add_outer(const double *coefficients, int64_t phases, double phase, 
     }
 }
 
-int table_resistance(const Table *table, Pose pose, double phase, double out[MOTIONS][MOTIONS]) {
+int table_resistance(const Table *table, Pose pose, double phase, double film[6][6], double out[MOTIONS][MOTIONS]) {
     double coefficients[MOST_PHASES * FACTOR];
     const Position p = position_of(table, pose);
     const int left = fill_coefficients(table, &p, pose, coefficients);
-    set_film(table, pose, cut_of_film(p.t), out);
+    set_film(table, pose, cut_of_film(p.t), film, out);
     add_outer(coefficients, table->phases, phase, 1.0, out);
     return left;
 }
 
 int table_mean_resistance(const Table *table, Pose pose, int64_t phases, double out[MOTIONS][MOTIONS]) {
-    double coefficients[MOST_PHASES * FACTOR];
+    double coefficients[MOST_PHASES * FACTOR], film[6][6];
     const Position p = position_of(table, pose);
     const int left = fill_coefficients(table, &p, pose, coefficients);
-    set_film(table, pose, cut_of_film(p.t), out);
+    set_film(table, pose, cut_of_film(p.t), film, out);
     for (int64_t n = 0; n < phases; n++)
         add_outer(coefficients, table->phases, 2.0 * PI * (double)n / (double)phases, 1.0 / (double)phases, out);
     return left;
@@ -280,7 +281,8 @@ EXPORT void outer_coefficients(const double *packed, double e, double pitch, dou
 
 EXPORT int64_t resistance_at(const double *packed, double e, double pitch, double yaw, double phase, double *out) {
     const Table table = table_opened(packed);
-    return table_resistance(&table, (Pose){e, pitch, yaw}, phase, (double(*)[MOTIONS])out);
+    double film[6][6];
+    return table_resistance(&table, (Pose){e, pitch, yaw}, phase, film, (double(*)[MOTIONS])out);
 }
 
 EXPORT int64_t mean_resistance_at(const double *packed, double e, double pitch, double yaw, int64_t phases,

@@ -29,7 +29,8 @@ typedef struct {
 } Pose;
 
 Table table_opened(const double *packed);
-int table_resistance(const Table *table, Pose pose, double phase, double out[MOTIONS][MOTIONS]);
+/* Both return how the table's range was left; `film` is the lubrication film's share of `out`. */
+int table_resistance(const Table *table, Pose pose, double phase, double film[6][6], double out[MOTIONS][MOTIONS]);
 int table_mean_resistance(const Table *table, Pose pose, int64_t phases, double out[MOTIONS][MOTIONS]);
 
 #endif

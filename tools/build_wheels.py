@@ -1,4 +1,4 @@
-"""Builds the wheels of all platforms on this machine, by the compiler of the `ziglang` wheel (pip install build ziglang).
+"""Builds the wheels of all platforms on one machine, by the compiler of the wheel `ziglang` (pip install ziglang).
 
 python tools/build_wheels.py [FOLDER]
 """

@@ -140,6 +140,7 @@ KINDS: dict[str, Kind] = {
     "mass": Kind("mass", "kg", "10.7 g", "1e-21 kg", "1e6 kg"),
     "density": Kind("density", "kg/m**3", "985 kg/m^3", "1e-3 kg/m^3", "1e5 kg/m^3"),
     "viscosity": Kind("viscosity", "Pa s", "3.5 Pa s", "1e-6 Pa s", "1e6 Pa s"),
+    "pressure": Kind("pressure", "Pa", "100 kPa", "1 kPa", "1e9 Pa"),
     "rate": Kind("rotation rate", "rad/s", "1.5 Hz", "-1e6 rad/s", "1e6 rad/s"),
     "torque": Kind("torque", "N m", "0.1 mN m", "-1e6 N m", "1e6 N m"),
     "rotary friction": Kind("rotary friction", "N m s/rad", "7e-7 N m s/rad", "0 N m s/rad", "1e6 N m s/rad", "N m s"),

@@ -11,10 +11,13 @@ turned with the tail's phase.
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import hashlib
-import importlib
+import importlib.util
 import math
-import sys
+import runpy
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,71 +27,23 @@ import numpy as np
 import pytest
 
 from spirillum.arrays import Samples
+from spirillum.kernels.native import Array, Float64, native, sources_digest
 
 _LOBATTO = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
 
-_SOURCE = """
-import math
-import numpy as np
-from spirillum.kernels.compiled import compiled
-
-@compiled
-def resistance_at(table, e, p, psi, phi, out):
-    sin, cos = math.sin(phi), math.cos(phi)
-    for i in range(8):
-        for j in range(8):
-            out[i, j] = table[8 * i + j]
-    for first in (1, 4):
-        for i in range(8):
-            a, b = out[i, first], out[i, first + 1]
-            out[i, first], out[i, first + 1] = cos * a - sin * b, sin * a + cos * b
-    for first in (1, 4):
-        for j in range(8):
-            a, b = out[first, j], out[first + 1, j]
-            out[first, j], out[first + 1, j] = cos * a - sin * b, sin * a + cos * b
-    radius, body = table[64], table[65]
-    k = body**2 / (radius**2 + body**2)
-    d = (math.cos(p) * math.cos(psi), math.cos(p) * math.sin(psi), math.sin(p))
-    f = np.empty((3, 3))  # rows: axes of F in the place's
-    f[0, 0], f[0, 1], f[0, 2] = d
-    f[1, 0], f[1, 1], f[1, 2] = -math.sin(psi), math.cos(psi), 0.0
-    f[2, 0] = d[1] * 0.0 - d[2] * math.cos(psi)
-    f[2, 1] = -d[2] * math.sin(psi)
-    f[2, 2] = d[0] * math.cos(psi) + d[1] * math.sin(psi)
-    rows = np.zeros((4, 8))
-    weights = np.empty(4)
-    for station in range(69, table.size, 2):
-        x, length = table[station], table[station + 1]
-        side, up = x * d[1], x * d[2] - e
-        offset = max(math.hypot(side, up), 1e-9 * radius)
-        side, up = side / offset, up / offset
-        h = max(radius - body - offset, 1e-9)
-        for i in range(3):
-            n = f[i, 1] * side + f[i, 2] * up
-            t = -f[i, 1] * up + f[i, 2] * side
-            rows[0, i], rows[1, i], rows[3, i] = n, t, f[i, 0]
-        for row in (0, 1, 3):
-            rows[row, 4], rows[row, 5] = -x * rows[row, 2], x * rows[row, 1]
-        sliding = table[66] * math.sqrt(body / h)
-        rows[1, 3] = -offset * k
-        rows[2, 3] = 1.0
-        weights[0] = 3.0 * math.sqrt(2.0) * math.pi * (body * radius / ((radius - body) * h)) ** 1.5
-        weights[1] = sliding
-        weights[2] = sliding * k * offset * (radius - body - k * offset)
-        weights[3] = table[67]
-        for row in range(4):
-            for i in range(6):
-                for j in range(6):
-                    out[i, j] += length * weights[row] * rows[row, i] * rows[row, j]
-    return 1 if abs(p) > table[68] else 0
-"""
-
 
 class StandIn:
-    """Makes tables; holds the equations that read them."""
+    """Makes tables; holds the engine that reads them."""
 
-    def __init__(self, motion: ModuleType) -> None:
-        self.motion = motion
+    def __init__(self, steps: ModuleType) -> None:
+        self.steps = steps
+
+    @staticmethod
+    def level_resistance(table: Samples, offset: float) -> Samples:
+        """The 8x8 of a table at an offset, level and at phase 0."""
+        out = np.empty((8, 8))
+        _stand_in_at(table, offset, out)
+        return out
 
     @staticmethod
     def table(matrix: Samples, radius: float, body: float, length: float, middle: float, **more: float) -> Samples:
@@ -107,50 +62,42 @@ class StandIn:
         return np.concatenate([np.ravel(matrix), [radius, body, sliding, axial, largest], np.ravel(stations)])
 
 
-def _modules() -> dict[str, ModuleType]:
-    """The compiled equations with the stand-in's resistance, in files of their own so that they are compiled once."""
-    kernels = Path(sys.modules["spirillum.kernels"].__path__[0])
-    names = (
-        "compiled",
-        "rigid_links",
-        "contacts",
-        "dry_friction",
-        "rosenbrock",
-        "tube_motion",
-        "two_links",
-        "stiff_steps",
-    )
-    texts = {name: (kernels / f"{name}.py").read_text() for name in names}
-    key = hashlib.sha256((_SOURCE + "".join(texts.values())).encode()).hexdigest()[:16]
+@native("out", symbol="stand_in_at")
+def _stand_in_at(table: Float64[Array, "size"], offset: float, out: Float64[Array, "8 8"]) -> None:  # noqa: F821
+    """Fill the 8x8 of the stand-in, level and at phase 0."""
+
+
+def _library() -> Path:
+    """The compiled equations with the stand-in's resistance, compiled once."""
+    sources, stand_in = Path(__file__).parents[2] / "csrc", Path(__file__).with_name("stand_in.c")
+    key = hashlib.sha256((sources_digest() + stand_in.read_text()).encode()).hexdigest()[:16]
     folder = Path(tempfile.gettempdir()) / f"spirillum-stand-in-{key}"
-    folder.mkdir(exist_ok=True)
-    changes = {
-        "spirillum.kernels.tube_table": f"stand_in_{key}_table",
-        "spirillum.kernels.tube_motion": f"stand_in_{key}_motion",
-    }
-    files = {"table": _SOURCE, "motion": texts["tube_motion"], "steps": texts["stiff_steps"]}
-    for name, text in files.items():
-        changed = text
-        for old, new in changes.items():
-            changed = changed.replace(f"from {old} import", f"from {new} import")
-        target = folder / f"stand_in_{key}_{name}.py"
-        if not target.exists():
-            target.write_text(changed)
-    sys.path.insert(0, str(folder))
-    try:
-        return {name: importlib.import_module(f"stand_in_{key}_{name}") for name in ("motion", "steps")}
-    finally:
-        sys.path.remove(str(folder))
+    if not folder.exists():
+        with tempfile.TemporaryDirectory(dir=tempfile.gettempdir()) as name:
+            made = Path(name) / "made"
+            shutil.copytree(sources, made / "csrc")
+            shutil.copy(stand_in, made / "csrc")
+            (made / "csrc/tube_motion.c").rename(made / "csrc/tube_motion.inc")  # which the stand-in includes
+            runpy.run_path(str(made / "csrc/build.py"))["compile_all"](made)
+            with contextlib.suppress(OSError):  # another process was faster
+                made.rename(folder)
+    return next(folder.glob("_core.*"))
 
 
 @pytest.fixture(scope="module")
 def stand_in() -> Iterator[StandIn]:
     """Let the engine run on the stand-in."""
-    from spirillum.dynamics import integration, return_map, tube_robot
+    from spirillum.dynamics import free_robot, integration, return_map
+    from spirillum.kernels import native as calls
 
-    modules = _modules()
+    library = ctypes.CDLL(str(_library()))
+    spec = importlib.util.find_spec("spirillum.kernels.stiff_steps")
+    assert spec is not None
+    assert spec.loader is not None
+    steps = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(steps)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tube_robot, "kernel", modules["motion"])
-        patch.setattr(integration, "stiff_steps", modules["steps"])
-        patch.setattr(return_map, "stiff_steps", modules["steps"])
-        yield StandIn(modules["motion"])
+        patch.setattr(calls, "library", lambda: library)
+        for module in (free_robot, integration, return_map):
+            patch.setattr(module, "stiff_steps", steps)
+        yield StandIn(steps)

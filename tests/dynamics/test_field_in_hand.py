@@ -16,7 +16,9 @@ def test_the_field_is_that_about_x_rotated_to_its_axis(yaw: float, pitch: float)
     drive = np.zeros(DRIVE)
     drive[[FIELD, FIELD_RATE, FIELD_PHASE, AXIS_Y, AXIS_Z]] = 2.0, 3.0, 0.4, axis[1], axis[2]
     times = np.linspace(0.0, 2.0, 9)
-    found = np.array([field_at(time, drive) for time in times])
+    found = np.empty((9, 3))
+    for row, time in zip(found, times, strict=True):
+        field_at(time, drive, row)
     assert np.linalg.norm(found, axis=1) == pytest.approx(np.full(9, 2.0))
     assert found @ axis == pytest.approx(np.zeros(9), abs=1e-12)
     turned = [Rotation.from_rotvec(3.0 * time * axis).apply(found[0]) for time in times]

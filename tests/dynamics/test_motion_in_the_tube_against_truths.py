@@ -22,7 +22,7 @@ from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.dynamics.tube_start import StartPlace, laid_down
 from spirillum.dynamics.turning_field import Field
 from spirillum.errors import InputError
-from spirillum.kernels import contacts, dry_friction, rigid_links
+from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.placement import Placement
 from spirillum.swimming.freedom import LINKS
@@ -104,9 +104,7 @@ def test_long_capsule_orbits_at_its_two_dimensional_law(made: Any, gap: float, r
 def test_driven_around_and_free_of_torque_it_turns_as_if_glued(made: Any, stand_in: Any) -> None:
     """From the matrix itself: Omega/v = 1/(R - a) at contact, where k e is all that its film takes."""
     _, links, _ = made(rest=1e-12, weight=False)
-    out = np.empty((8, 8))
-    offset = 0.011 - 1e-7
-    stand_in.motion.resistance_at(links.table, offset, 0.0, 0.0, 0.0, out)
+    out = stand_in.level_resistance(links.table, 0.011 - 1e-7)
     assert np.abs(out - out.T).max() < 1e-12 * out.max()
     turned = -out[3, 1] / out[3, 3]
     assert turned == pytest.approx(1.0 / 0.011, rel=1e-5)
@@ -298,11 +296,13 @@ def test_rates_solve_the_balance(made: Any) -> None:
         half = rng.normal(size=(7, 7)) * 10.0 ** rng.uniform(-1, 1, 7)
         a, force = half.T @ half + np.diag(1e-6 + np.sum(half**2, axis=0)), rng.normal(size=7)
         loads, rows = 10.0 ** rng.uniform(-2, 0.5, 4), rng.normal(size=(4, 2, 7))
-        q, r, work = np.zeros(7), np.empty(7), np.empty(85)
-        left = dry_friction.balanced(a, force, loads, rows, 1e-5, 6, False, q, r, work)
-        assert left < 1e-10
-        again = dry_friction.residual(a, force, loads, rows, 1e-5, -1, q, r)
-        assert again < 1e-9 * np.sqrt(np.sum((np.abs(force) + loads.sum()) ** 2 / np.diag(a)))
+        q, r = np.zeros(7), np.empty(7)
+        assert contacts.balanced(a, force, loads, rows, 1e-5, q, r) < 1e-10
+        sliding = np.einsum("cdi,i->cd", rows, q)
+        speed = np.sqrt(np.sum(sliding**2, axis=1) + 1e-5**2)
+        left = a @ q + np.einsum("c,cd,cdi->i", loads / speed, sliding, rows) - force
+        size, scale = np.sum(left**2 / np.diag(a)), np.sum((np.abs(force) + loads.sum()) ** 2 / np.diag(a))
+        assert np.sqrt(size) < 1e-9 * np.sqrt(scale)
 
 
 def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
@@ -326,9 +326,9 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
     def gap(step: np.ndarray, j: np.ndarray, site: Any) -> float:
         state, rotation = state_of(step)
         if site is not None:
-            return float(contacts.ring_gap(state, rotation, 0.02, site, normal, point, j))
-        bracket = (0.03, 0.035, 0.045)
-        return float(contacts.crest(state, rotation, 0.02, links.wire, state[7], bracket, normal, point, j))
+            return contacts.ring_gap(state, rotation, 0.02, site, normal, point, j)
+        bracket = np.array([0.03, 0.035, 0.045])
+        return contacts.crest(state, rotation, 0.02, links.wire, bracket, normal, point, j)
 
     for site in (*sites, None):
         j = np.empty(7)
@@ -407,12 +407,12 @@ def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
     steady, links, _ = made()
     state, data = laid_down(steady.robot, links, StartPlace(gap=3e-4)), links.data
     before, after, inside = np.empty((3, rigid_links.STATES))
-    stand_in.motion.rates(before, 0.0, state, data, links.table)
+    stand_in.steps.rates(before, 0.0, state, data, links.table)
     beyond = state.copy()
     beyond[rigid_links.POSITION + 2] = np.nan
-    stand_in.motion.rates(inside, 0.0, beyond, data, links.table)
+    stand_in.steps.rates(inside, 0.0, beyond, data, links.table)
     assert np.isnan(inside).any()
-    stand_in.motion.rates(after, 0.0, state, data, links.table)
+    stand_in.steps.rates(after, 0.0, state, data, links.table)
     np.testing.assert_allclose(after, before, rtol=1e-9, atol=1e-15)
 
 

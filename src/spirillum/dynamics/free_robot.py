@@ -16,7 +16,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.films import films_of
 from spirillum.fluid.model import SwimmerModel
-from spirillum.kernels import rigid_links
+from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
@@ -59,6 +59,8 @@ class FreeRobot(ABC):
 
     tolerance: ClassVar[float]
     """Error of a step over the sizes of the state's components."""
+    observed: ClassVar[int]
+    """Number of what is observed in a state."""
 
     friction: Samples
     """Friction of joint and wall against the seven rates (7, 7)."""
@@ -91,10 +93,6 @@ class FreeRobot(ABC):
         """Height of the asperities, m."""
 
     @abstractmethod
-    def observe(self, time: Samples, states: Samples) -> Samples:
-        """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 26) in a tube."""
-
-    @abstractmethod
     def contact_event(self, place: int, *, touches: bool) -> str:
         """What happens where a gap becomes as thin as the roughness, or opens again."""
 
@@ -107,6 +105,18 @@ class FreeRobot(ABC):
     def bends(self) -> Samples:
         """Times at which an imposed flow has a corner, s."""
         return np.zeros(0)
+
+    def observe(self, time: Samples, states: Samples) -> Samples:
+        """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 26) in a tube."""
+        out = np.empty((time.size, self.observed))
+        stiff_steps.observe(time, states, self.data, self.table, out)
+        return out
+
+    def gaps(self, state: Samples) -> Samples:
+        """Gaps that are watched in a state, (19,), m: at every site, and last the smallest of the wire, in a tube."""
+        found = np.empty(self.gap_count)
+        stiff_steps.gaps_of(state, self.data, self.table, found)
+        return found
 
     def at_duty(self: _Robot, duty: float) -> _Robot:
         """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
@@ -207,6 +217,7 @@ class TwoLinks(FreeRobot):
     """A robot in unbounded fluid, with films between it and a channel's wall: see `spirillum.kernels.two_links`."""
 
     tolerance: ClassVar[float] = 1e-8
+    observed: ClassVar[int] = rigid_links.OBSERVED
 
     drag: Samples
     """Resistance of both links against the seven rates at phase 0 of the tail (7, 7)."""
@@ -234,12 +245,6 @@ class TwoLinks(FreeRobot):
     def is_walled(self) -> bool:
         """Whether there are films at a wall."""
         return bool(np.isfinite(self.wall[kernel.RADIUS]))
-
-    def observe(self, time: Samples, states: Samples) -> Samples:
-        """What `spirillum.kernels.two_links` observes, (n, 13)."""
-        out = np.empty((time.size, rigid_links.OBSERVED))
-        kernel.observe(time, np.ascontiguousarray(states), self.data, out)
-        return out
 
     def contact_event(self, place: int, *, touches: bool) -> str:  # noqa: ARG002 - of a tube
         """The roughness carries, or no longer does."""

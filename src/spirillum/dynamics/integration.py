@@ -207,11 +207,11 @@ def _stretch(
     try:
         while True:
             watched = run.gaps.copy()
-            status, answered = stiff_steps.advance(
+            status = stiff_steps.advance(
                 target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments, run.gaps,
                 inside[done:], states[done:], sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
-            done += answered
+            done += int(run.memory[stiff_steps.ANSWERED])
             tell(run.time)
             if status == stiff_steps.CROSSED:
                 what = _crossed(run, robot, data, limits, watched, min(end, target), events)

@@ -81,7 +81,7 @@ class ReturnMap:
         begun = observed_at(robot, y)[kernel.TURN], y[rigid_links.PHASE]
         noted: list[tuple[float, ...]] = []
         while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
-            status, _ = stiff_steps.advance(
+            status = stiff_steps.advance(
                 np.inf, _ON, 1, self.tolerance, memory, y, before, increments, gaps, nothing, none, sizes,
                 limits, robot.roughness, data, robot.table,
             )  # fmt: skip

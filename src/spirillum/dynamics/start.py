@@ -135,7 +135,7 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
     start = start_state(robot, placement, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     if not links.spots.size:
         return start
-    film, rough = kernel.thinnest_film(start, links.wall, links.spots), float(links.wall[kernel.ROUGHNESS])
+    film, rough = float(links.gaps(start)[0]), links.roughness
     if film > 0:
         return start
     gap = film + rough

@@ -52,9 +52,10 @@ class TubeRobot(FreeRobot):
     tolerance: ClassVar[float] = 1e-7
     """Path and place of a minute in contact are then good to some parts in 1e7, energies to 1e-6; a tenth of it takes
     two and a half times as long."""
+    observed: ClassVar[int] = rigid_links.SEEN
 
     tube: Samples
-    """The tube (8,), see `kernels.tube_motion`."""
+    """The tube (9,), see `kernels.tube_motion`."""
     wire: Samples
     """The wire (6,), see `kernels.contacts`."""
     sites: Samples
@@ -88,22 +89,10 @@ class TubeRobot(FreeRobot):
         """Height of the asperities, m."""
         return float(self.tube[kernel.ROUGHNESS])
 
-    def gaps(self, state: Samples) -> Samples:
-        """Gap at every site, and last the smallest of the wire (infinite far from the wall), m, for a state (19,)."""
-        found = np.empty(len(self.names))
-        kernel.gaps_of(state, self.data, found)
-        return found
-
     def between(self, start: float, stop: float) -> TubeRobot:
         """The robot with what of the imposed flow matters from one time to another: few rows are copied."""
         first = max(int(np.searchsorted(self.bends, start, "right")) - 1, 0)
         return replace(self, flow=self.flow[first : int(np.searchsorted(self.bends, stop, "left")) + 1])
-
-    def observe(self, time: Samples, states: Samples) -> Samples:
-        """What `spirillum.kernels.tube_motion` observes, (n, 26)."""
-        out = np.empty((time.size, kernel.OBSERVED))
-        kernel.observe(time, np.ascontiguousarray(states), self.data, self.table, out)
-        return out
 
     def contact_event(self, place: int, *, touches: bool) -> str:
         """Which part of the robot touches the wall, or leaves it."""
@@ -148,6 +137,8 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     tube[kernel.COEFFICIENT], tube[kernel.SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
     tube[kernel.VISCOSITY] = robot.fluid.viscosity
     tube[kernel.ENDS], tube[kernel.LENGTH] = around.ends, around.length
+    bound = robot.fluid.cavitation_pressure
+    tube[kernel.CAVITATION] = np.inf if bound is None else bound
     names, sites = _sites(robot)
     wire = _wire(robot)
     return TubeRobot(

@@ -45,6 +45,7 @@ __all__ = [
     "Mass",
     "MomentAngle",
     "Pitch",
+    "Pressure",
     "Rate",
     "Resistance",
     "ResistancePerCurrent",
@@ -199,6 +200,7 @@ SignedLength = Annotated[float, *_quantity("length of either sign")]
 Mass = Annotated[float, *_quantity("mass")]
 Density = Annotated[float, *_quantity("density")]
 Viscosity = Annotated[float, *_quantity("viscosity")]
+Pressure = Annotated[float, *_quantity("pressure")]
 Rate = Annotated[float, *_quantity("rate")]
 Torque = Annotated[float, *_quantity("torque")]
 Pitch = Annotated[float, *_quantity("pitch")]

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, WithJsonSchema
 
 from spirillum.arrays import Values, Vectors
-from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Section, Viscosity
+from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
 
 
 def _read_taper(value: Any) -> float | None:
@@ -163,6 +163,13 @@ class Channel(Section):
 ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
 
 
+def _read_pressure(value: Any) -> Any:
+    return None if value == "none" else value
+
+
+PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_pressure), NONE]
+
+
 class Fluid(Section):
     """A Newtonian liquid."""
 
@@ -170,6 +177,9 @@ class Fluid(Section):
     """Dynamic viscosity mu (Table I)."""
     density: Density
     """Density rho (Table I)."""
+    cavitation_pressure: PressureOrNone = 1e5
+    """How far below its surroundings the pressure of a lubrication film may fall before the liquid cavitates, or `none` for
+    films without a bound. Assumed: one atmosphere; liquids with dissolved air cavitate from a tenth of it on."""
 
 
 def arc_fraction(wavelength: Values, amplitude: Values) -> Values:

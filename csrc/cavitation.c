@@ -1,0 +1,130 @@
+/* Lubrication films whose pressure is bounded below: the oil cavitates.
+ *
+ * Across a line contact with the gap h = h0 + x^2/(2 R') Reynolds' equation, both signs of the pressure allowed, is
+ *
+ *     (h^3 p'/(12 eta))' = u h' + V,      solved by p(x) = -(4 eta u x + 6 eta R' V)/h^2.
+ *
+ * The oil bears no pressure below -p_c (above the ambient one). The film then ruptures where p = -p_c and p' = 0, and
+ * forms again likewise (Swift 1932, Stieber 1933): the pressure is the least one that is not below -p_c and takes up no
+ * less than what the gap opens. With x = s xi, s = sqrt(2 R' h0), p = p_c pi(xi), the film before the cavity obeys
+ *
+ *     pi' = [a (xi^2 - xi_1^2) + b (xi - xi_1)]/(1 + xi^2)^3,    a = 12 eta u s/(p_c h0^2),   b = 24 eta R' V/(p_c h0^2),
+ *
+ * where xi_1, the edge of the cavity, follows from pi(xi_1) = -1; the film behind it is its mirror image with -a. With
+ * K_n the integrals of xi^n/(1 + xi^2)^3 up to the edge, pressure and forces are closed. The force on V is the integral
+ * of the pressure, that on u the integral of p h', since the power of pressure and Poiseuille flow is that of
+ * p (u h' + V): forces are the gradient of a convex function of V and u, and the film gives no energy.
+ */
+#include "cavitation.h"
+
+enum { MOMENTS = 5, ROUNDS = 100 };
+static const double FAR = 1e8; /* in s: no cavity is as wide */
+
+/* Integrals K_n of xi^n/(1 + xi^2)^3 from -infinity up to a place, n = 0 to 4. */
+static void set_moments(double xi, double k[MOMENTS]) {
+    if (xi < -6.0) { /* a series in 1/xi^2, where the closed forms cancel */
+        const double inverse = 1.0 / (xi * xi);
+        double power = inverse * inverse * inverse * xi;
+        for (int n = 0; n < MOMENTS; n++) {
+            double term = power, binomial = 1.0;
+            k[n] = 0.0;
+            for (int m = 0; m < 14; m++) {
+                k[n] += binomial * term / (double)(n - 5 - 2 * m);
+                binomial *= -(double)(m + 3) / (double)(m + 1);
+                term *= inverse;
+            }
+            power *= xi;
+        }
+        return;
+    }
+    const double once = 1.0 / (1.0 + xi * xi), twice = once * once, angle = atan(xi) + 0.5 * PI;
+    k[0] = 0.25 * xi * twice + 0.375 * (xi * once + angle);
+    k[1] = -0.25 * twice;
+    k[2] = -0.25 * xi * twice + 0.125 * (xi * once + angle);
+    k[3] = -0.5 * once + 0.25 * twice;
+    k[4] = k[0] - xi * once;
+}
+
+/* What the pressure at an edge exceeds the bound by: it falls as the edge moves on, while 2 a xi + b > 0. */
+static double excess(double a, double b, double xi, double k[MOMENTS]) {
+    set_moments(xi, k);
+    return a * (k[2] - xi * xi * k[0]) + b * (k[1] - xi * k[0]) + 1.0;
+}
+
+/* The edge of the cavity behind a film that comes from -infinity, and the moments up to it: by Newton's method between
+ * bounds that are found first. */
+static double edge_of(double a, double b, double k[MOMENTS]) {
+    const double turn = clamped(-0.5 * b / a, -FAR, FAR); /* where 2 a xi + b is zero; none without a */
+    double low = a > 0.0 ? turn : -1.0, high = a < 0.0 ? turn : 1.0;
+    for (double far = 1.0; !(a > 0.0) && excess(a, b, low, k) < 0.0; far *= 2.0) low = high - 2.0 * far - 1.0;
+    for (double far = 1.0; !(a < 0.0) && (high <= low || excess(a, b, high, k) > 0.0); far *= 2.0) high = low + far;
+    double xi = 0.5 * (low + high);
+    for (int round = 0; round < ROUNDS; round++) {
+        const double over = excess(a, b, xi, k);
+        *(over > 0.0 ? &low : &high) = xi;
+        const double slope = -(2.0 * a * xi + b) * k[0];
+        double next = xi - over / slope;
+        if (!(low < next && next < high)) next = 0.5 * (low + high);
+        const double moved = fabs(next - xi);
+        xi = next;
+        if (moved <= 1e-15 * (1.0 + fabs(xi))) break;
+    }
+    set_moments(xi, k);
+    return xi;
+}
+
+/* Integrals of pi and of xi pi over one side, without what both sides cancel, and their derivatives in a and b. */
+typedef struct {
+    double normal, along;
+    double normal_a, normal_b, along_a, along_b; /* normal_a is twice along_b */
+} Side;
+
+static Side side_of(double a, double b) {
+    double k[MOMENTS];
+    const double edge = edge_of(a, b, k);
+    return (Side){
+        .normal = -(a * (k[3] - edge * edge * k[1]) + b * (k[2] - edge * k[1])),
+        .along = -0.5 * (a * (k[4] - edge * edge * k[2]) + b * (k[3] - edge * k[2])),
+        .normal_a = -(k[3] - k[1] * k[2] / k[0]),
+        .normal_b = -(k[2] - k[1] * k[1] / k[0]),
+        .along_a = -0.5 * (k[4] - k[2] * k[2] / k[0]),
+        .along_b = -0.5 * (k[3] - k[1] * k[2] / k[0]),
+    };
+}
+
+/* Whether the pressure of the linear film falls below the bound: 3 (1 + xi^2)^2 < a xi + 3 b/4 somewhere. */
+static bool cavitates(double a, double b) {
+    const double root3 = sqrt(3.0);
+    const double xi = 2.0 / root3 * sinh(asinh(0.125 * root3 * a) / 3.0); /* of the least difference: xi^3 + xi = a/12 */
+    const double wide = 1.0 + xi * xi;
+    return wide * wide < a * xi / 3.0 + 0.25 * b;
+}
+
+Lift cavitation_lift(const LineContact *c, double viscosity, double bound) {
+    const double s = sqrt(2.0 * c->bend * c->gap), unit = 12.0 * viscosity / (bound * c->gap * c->gap);
+    const double per_u = s * unit, per_v = 2.0 * c->bend * unit;
+    const double a = per_u * c->entrainment, b = per_v * c->opening;
+    if (!cavitates(a, b)) return (Lift){0};
+    /* less the linear film, whose integrals are -pi b/8 and -pi a/6 */
+    const Side before = side_of(a, b), behind = side_of(-a, b);
+    const double normal = bound * s, along = 2.0 * bound * c->gap; /* s^2/R' = 2 h0 */
+    return (Lift){
+        .normal = normal * (before.normal + behind.normal + 0.125 * PI * b),
+        .along = along * (before.along - behind.along + PI * a / 6.0),
+        .of_opening = {normal * per_v * (before.normal_b + behind.normal_b + 0.125 * PI),
+                       along * per_v * (before.along_b - behind.along_b)},
+        .of_entrainment = {normal * per_u * (before.normal_a - behind.normal_a),
+                           along * per_u * (before.along_a + behind.along_a + PI / 6.0)},
+    };
+}
+
+EXPORT void lift_of_cavitation(const double *gap, const double *bend, const double *opening, const double *entrainment,
+                               double viscosity, double bound, double *out, int64_t count) {
+    for (int64_t n = 0; n < count; n++) {
+        const LineContact contact = {gap[n], bend[n], opening[n], entrainment[n]};
+        const Lift lift = cavitation_lift(&contact, viscosity, bound);
+        const double row[6] = {lift.normal, lift.along, lift.of_opening[0], lift.of_opening[1],
+                               lift.of_entrainment[0], lift.of_entrainment[1]};
+        for (int k = 0; k < 6; k++) out[6 * n + k] = row[k];
+    }
+}

@@ -1,0 +1,170 @@
+/* Where a robot touches the wall of its tube, and the load that asperities carry there.
+ *
+ * Smooth surfaces in a viscous fluid never touch in finite time; asperities of height s do, and carry the load from then
+ * on (J. R. Smart, D. T. Leighton, Phys. Fluids A 1:52, 1989; C. J. Cawthorn, N. J. Balmforth, J. Fluid Mech. 646:327,
+ * 2010). With h the gap of the mean surfaces and W a load of the order of the robot's weight,
+ *
+ *     N(h) = W (s/h - 1)^2,   E(h) = W (s^2/h - h - 2 s log(s/h))   for h < s, zero beyond
+ *
+ * which is W at h = s/2 and grows without bound as h -> 0, so that no finite load brings the mean surfaces together.
+ * Just below s it grows as (s - h)^2, between a single elastic asperity (power 3/2) and many of evenly spread heights
+ * (5/2; J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295:300, 1966). The form is assumed; what follows from it
+ * depends on s above all.
+ *
+ * Sites on the solids are rings about the motor axis that carry a ball: hemisphere, edge, fillet and spheroid. The wire
+ * touches where its distance from the tube's axis is a local maximum along it, ends included.
+ */
+#include "contacts.h"
+
+static const double THINNEST = 1e-3; /* smallest gap over s at which the load is evaluated */
+
+/* N(h), N. */
+EXPORT double asperity_load(double gap, double height, double load) {
+    if (gap >= height) return 0.0;
+    const double over = height / larger(gap, THINNEST * height) - 1.0;
+    return load * over * over;
+}
+
+/* E(h), J. */
+EXPORT double asperity_energy(double gap, double height, double load) {
+    if (gap >= height) return 0.0;
+    const double h = larger(gap, THINNEST * height);
+    return load * (height * height / h - h - 2.0 * height * log(height / h));
+}
+
+/* Direction (y, z) across the tube in body axes. */
+static void set_normal(Nearest *at, const double rotation[3][3], double y, double z) {
+    for (int i = 0; i < 3; i++) at->j[i] = at->normal[i] = rotation[1][i] * y + rotation[2][i] * z;
+}
+
+/* Across the tube a site reaches H(n) = c.n + S(n_1) + beta from the tube's axis along a unit vector n, with the ring's
+ * centre c, n_1 = n.e_1 and S^2 = rho^2 (1 - n_1^2) + b^2 n_1^2. The gap is R less the largest H, which Newton's method
+ * finds from n = c/|c|; its gradient is that at constant n. */
+Nearest site_nearest(const Site *site, const State *y, const double rotation[3][3], double radius) {
+    const double x = site->x, ring = site->ring, flat = squared(site->half) - squared(ring);
+    const double side = y->position[1] + rotation[1][0] * x, up = y->position[2] + rotation[2][0] * x;
+    double angle = hypot(side, up) > 1e-9 * radius ? atan2(up, side) : -0.5 * PI;
+    double n_y = 0.0, n_z = 0.0, n_1 = 0.0, reach = 0.0;
+    for (int round = 0; round < 12; round++) {
+        n_y = cos(angle);
+        n_z = sin(angle);
+        n_1 = n_y * rotation[1][0] + n_z * rotation[2][0];
+        const double turned = n_y * rotation[2][0] - n_z * rotation[1][0];
+        reach = sqrt(larger(squared(ring) + flat * n_1 * n_1, 1e-36 * squared(radius)));
+        const double slope = flat * n_1 * turned / reach;
+        const double first = n_y * up - n_z * side + slope;
+        const double second = -n_y * side - n_z * up + (flat * (turned * turned - n_1 * n_1) - slope * slope) / reach;
+        if (second >= 0.0 || fabs(first) < 1e-15 * radius) break;
+        angle -= clamped(first / second, -0.5, 0.5);
+    }
+    const double arm = x + flat * n_1 / reach, ball = ring * ring / reach + site->ball;
+    Nearest at = {.gap = radius - n_y * side - n_z * up - reach - site->ball};
+    set_normal(&at, rotation, n_y, n_z);
+    for (int i = 0; i < 3; i++) at.point[i] = ball * at.normal[i];
+    at.point[0] += arm;
+    at.j[4] = -arm * at.normal[2];
+    at.j[5] = arm * at.normal[1];
+    return at;
+}
+
+/* Whether the cylinder in which the tail turns comes within a height of the wall. */
+bool tail_reaches(const Wire *wire, const State *y, const double rotation[3][3], double radius, double height) {
+    double farthest = 0.0;
+    for (int end = 0; end < 2; end++) {
+        const double x = wire->root - end * wire->length;
+        const double side = y->position[1] + rotation[1][0] * x, up = y->position[2] + rotation[2][0] * x;
+        farthest = larger(farthest, hypot(side, up));
+    }
+    return radius - farthest - wire->amplitude - wire->radius < height;
+}
+
+/* A point of the centreline: in body axes, across the tube, d^2, and d(d^2/2)/dxi once and twice. */
+typedef struct {
+    double point[3], side, up, square, first, second;
+} WirePoint;
+
+static WirePoint wire_point(const Wire *wire, const State *state, const double rotation[3][3], double xi) {
+    const double shrink = wire->taper > 0 ? exp(-wire->taper * xi) : 0.0;
+    const double r = wire->amplitude * (1.0 - shrink), r_1 = wire->amplitude * wire->taper * shrink;
+    const double r_2 = -wire->taper * r_1, x = wire->root - xi, k = wire->hand_k;
+    const double angle = k * x + state->phase, c = cos(angle), s = sin(angle);
+    const double y_1 = r_1 * c + k * r * s, z_1 = r_1 * s - k * r * c;
+    const double y_2 = (r_2 - k * k * r) * c + 2.0 * k * r_1 * s, z_2 = (r_2 - k * k * r) * s - 2.0 * k * r_1 * c;
+    WirePoint at = {.point = {x, r * c, r * s}};
+    double across[2];
+    for (int n = 0; n < 2; n++) {
+        const double *row = rotation[n + 1];
+        const double d = state->position[n + 1] + row[0] * x + row[1] * at.point[1] + row[2] * at.point[2];
+        const double d_1 = -row[0] + row[1] * y_1 + row[2] * z_1, d_2 = row[1] * y_2 + row[2] * z_2;
+        across[n] = d;
+        at.square += d * d;
+        at.first += d * d_1;
+        at.second += d_1 * d_1 + d * d_2;
+    }
+    at.side = across[0];
+    at.up = across[1];
+    return at;
+}
+
+/* Where the wire is farthest from the tube's axis; bracket: where to look, from, first guess, to, m from the root. */
+Nearest wire_nearest(const Wire *wire, const State *y, const double rotation[3][3], double radius,
+                     const double bracket[3]) {
+    double low = bracket[0], xi = bracket[1], high = bracket[2];
+    WirePoint p = wire_point(wire, y, rotation, xi);
+    for (int round = 0; round < 50; round++) {
+        *(p.first > 0 ? &low : &high) = xi;
+        if ((xi == bracket[0] && p.first <= 0) || (xi == bracket[2] && p.first >= 0)) break; /* an end of the wire */
+        double next = p.second < 0 ? xi - p.first / p.second : low;
+        if (!(low < next && next < high)) next = 0.5 * (low + high);
+        const double moved = fabs(next - xi);
+        xi = next;
+        p = wire_point(wire, y, rotation, xi);
+        if (moved < 1e-13 * wire->length) break;
+    }
+    const double distance = larger(sqrt(p.square), 1e-9 * radius);
+    Nearest at = {.gap = radius - distance - wire->radius};
+    set_normal(&at, rotation, p.side / distance, p.up / distance);
+    const double *n = at.normal, *point = p.point;
+    at.j[3] = at.j[6] = point[1] * n[2] - point[2] * n[1];
+    at.j[4] = point[2] * n[0] - point[0] * n[2];
+    at.j[5] = point[0] * n[1] - point[1] * n[0];
+    for (int i = 0; i < 3; i++) at.point[i] = point[i] + wire->radius * n[i];
+    return at;
+}
+
+/* Sliding velocities at a contact as rows against the seven rates: along the tube, and around it. */
+void sliding_rows(const Nearest *at, const double rotation[3][3], double rotor, double rows[2][RATES]) {
+    const double *x = rotation[0], *n = at->normal, *point = at->point;
+    const double around[3] = {x[1] * n[2] - x[2] * n[1], x[2] * n[0] - x[0] * n[2], x[0] * n[1] - x[1] * n[0]};
+    for (int row = 0; row < 2; row++) {
+        const double *d = row == 0 ? x : around;
+        double *out = rows[row];
+        for (int i = 0; i < 3; i++) out[i] = d[i];
+        out[3] = point[1] * d[2] - point[2] * d[1];
+        out[4] = point[2] * d[0] - point[0] * d[2];
+        out[5] = point[0] * d[1] - point[1] * d[0];
+        out[6] = rotor * out[3];
+    }
+}
+
+/* Write what is nearest; its gap. */
+static double told(Nearest at, double *normal, double *point, double *j) {
+    for (int i = 0; i < 3; i++) {
+        normal[i] = at.normal[i];
+        point[i] = at.point[i];
+    }
+    for (int i = 0; i < RATES; i++) j[i] = at.j[i];
+    return at.gap;
+}
+
+EXPORT double ring_gap(const double *y, const double *rotation, double radius, const double *site, double *normal,
+                       double *point, double *j) {
+    const double(*axes)[3] = (const double(*)[3])rotation;
+    return told(site_nearest((const Site *)site, (const State *)y, axes, radius), normal, point, j);
+}
+
+EXPORT double crest(const double *y, const double *rotation, double radius, const double *wire, const double *bracket,
+                    double *normal, double *point, double *j) {
+    const double(*axes)[3] = (const double(*)[3])rotation;
+    return told(wire_nearest((const Wire *)wire, (const State *)y, axes, radius, bracket), normal, point, j);
+}

@@ -1,0 +1,60 @@
+/* A robot whose motion is followed: in its tube, or in unbounded fluid with films at a channel's wall. */
+#ifndef SPIRILLUM_MOTION_H
+#define SPIRILLUM_MOTION_H
+
+#include "contacts.h"
+#include "table.h"
+
+/* The channel's wall of a robot without a tube; the columns of kernels/two_links.py. */
+typedef struct {
+    double radius, roughness, stiffest, load; /* m (infinite: none); m; largest resistance of a film, N s/m; N */
+} Wall;
+
+/* A ring that may near the wall: x on the axis, radius a, half-length b along the axis, m; a film of thickness h resists
+ * with c ((H/h)^p - 1). */
+typedef struct {
+    double x, radius, half;
+    double resistance, power, reach; /* c, N s/m; p; H, m */
+} Ring;
+
+/* A robot without a tube, opened from `packed` of two_links.py. */
+typedef struct {
+    const Links *links;
+    const double *drag; /* A(0), (7, 7), SI */
+    const Wall *wall;
+    const Ring *rings;
+    int64_t ring_count;
+} TwoLinks;
+
+enum { CLOSED, OPEN, IMPOSED }; /* kinds of ends */
+
+/* The columns of kernels/tube_motion.py. */
+typedef struct {
+    double radius, roughness, load;  /* R, m; s, m; load at half of it, N */
+    double coefficient, sliding;     /* mu_c; v_r, m/s */
+    double viscosity, ends, length;  /* Pa s; one of the kinds; L_eff, m */
+    double cavitation;               /* the film's pressure is not below -p_c, Pa; infinite: without a bound */
+    double sites, stations;          /* their numbers */
+} Tube;
+
+/* A robot in its tube, opened from `packed` of tube_motion.py. */
+typedef struct {
+    const Links *links;
+    const Tube *tube;
+    const Wire *wire;
+    const Site *sites;
+    const Station *stations;
+    const double (*flow)[2]; /* times, s, and imposed mean velocities, m/s */
+    int64_t site_count, station_count, flow_count;
+    Table table;
+} TubeRobot;
+
+TwoLinks two_links_opened(const double *packed, int64_t size);
+void two_links_rates(const TwoLinks *robot, const State *y, double time, Seen *seen, State *dy);
+double two_links_film(const TwoLinks *robot, const State *y);
+
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table);
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy);
+void tube_robot_gaps(const TubeRobot *robot, const State *y, double *gaps);
+
+#endif

@@ -1,0 +1,315 @@
+/* The motion of two rigid links in a tube: film, walls, contact and dry friction.
+ *
+ * Unknowns are the seven rates q = (U, Omega_b, omega_m) in body axes about the origin. Forces balance without inertia:
+ *
+ *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n + L(q),
+ *
+ * where L is the lift of a film that cavitates, over the rates; see set_slices and cavitation.c.
+ * M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint;
+ * N_c the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of
+ * dry friction, made smooth below the sliding speed v_r. See contacts.c and dry_friction.c.
+ *
+ * The place: offset e of the origin from the tube's axis, azimuth A about +x from the lowest place, pitch p away from
+ * the wall and yaw psi against the local axes (X along the tube, z_loc towards its axis, y_loc = z_loc x X), and the
+ * phase of the tail in the roll-free axes F of the body.
+ */
+#include "motion.h"
+
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table) {
+    const Tube *tube = (const Tube *)(packed + sizeof(Links) / sizeof(double));
+    const Wire *wire = (const Wire *)(tube + 1);
+    const Site *sites = (const Site *)(wire + 1);
+    const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
+    const double *flow = (const double *)(stations + (int64_t)tube->stations);
+    return (TubeRobot){
+        .links = (const Links *)packed, .tube = tube, .wire = wire, .sites = sites, .stations = stations,
+        .flow = (const double(*)[2])flow,
+        .site_count = (int64_t)tube->sites, .station_count = (int64_t)tube->stations,
+        .flow_count = (packed + size - flow) / 2, .table = table_opened(table),
+    };
+}
+
+/* Note offset, azimuth, pitch, yaw and roll of the body against F; on the axis the azimuth is 0. */
+static void note_place(const State *y, const double rotation[3][3], double radius, Seen *seen) {
+    const double side = y->position[1], up = y->position[2], e = hypot(side, up);
+    double z_y = 0.0, z_z = 1.0;
+    if (e > 1e-9 * radius) {
+        z_y = -side / e;
+        z_z = -up / e;
+    }
+    const double y_y = z_z, y_z = -z_y; /* y_loc = z_loc x X */
+    const double d_y = rotation[1][0], d_z = rotation[2][0];
+    seen->offset = e;
+    seen->azimuth = atan2(-z_y, z_z);
+    seen->pitch = asin(clamped(d_y * z_y + d_z * z_z, -1.0, 1.0));
+    seen->yaw = atan2(d_y * y_y + d_z * y_z, rotation[0][0]);
+    /* y' of F is across the axis and along the plane of X and y_loc; z' = d x y'. */
+    const double f[3] = {-sin(seen->yaw), cos(seen->yaw) * y_y, cos(seen->yaw) * y_z};
+    const double along = rotation[0][1] * f[0] + rotation[1][1] * f[1] + rotation[2][1] * f[2];
+    const double across = rotation[0][2] * f[0] + rotation[1][2] * f[1] + rotation[2][2] * f[2]; /* = -e_2.z' */
+    seen->turn = atan2(-across, along);
+}
+
+/* Imposed mean velocity, m/s: straight between its times, constant beyond. */
+static double imposed_flow(const TubeRobot *robot, double time) {
+    const double(*flow)[2] = robot->flow;
+    int64_t before = 0, after = robot->flow_count - 1;
+    if (time >= flow[after][0]) return flow[after][1];
+    if (time <= flow[0][0]) return flow[0][1];
+    while (after - before > 1) {
+        const int64_t middle = (before + after) / 2;
+        *(flow[middle][0] < time ? &before : &after) = middle;
+    }
+    const double share = (time - flow[before][0]) / (flow[after][0] - flow[before][0]);
+    return flow[before][1] + share * (flow[after][1] - flow[before][1]);
+}
+
+/* The fluid about the robot, in body axes. */
+typedef struct {
+    double matrix[RATES][RATES]; /* against q, SI */
+    double film[6][6];           /* of it, the film's, against U and Omega_b */
+    double stream[RATES];        /* force of an imposed flow */
+    double opened[RATES];        /* mean flow of open ends per q */
+} Fluid;
+
+static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
+    const Tube *tube = robot->tube;
+    const Pose pose = {seen->offset, seen->pitch, seen->yaw};
+    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
+    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
+    turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
+    turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
+    const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
+    seen->mean_flow = tube->ends == IMPOSED ? imposed_flow(robot, time) : 0.0;
+    for (int i = 0; i < RATES; i++) {
+        fluid->opened[i] = opened * m[i][7];
+        fluid->stream[i] = tube->viscosity * m[i][7] * seen->mean_flow;
+        for (int j = 0; j < RATES; j++)
+            fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
+    }
+}
+
+/* Contacts of a state, and the gaps on the way to them. */
+typedef struct {
+    const TubeRobot *robot;
+    const State *y;
+    double rotation[3][3];
+    Balance *balance; /* forces and contacts that are added to */
+    Seen *seen;
+    double *gaps;     /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
+} Touch;
+
+/* Add one contact to the balance, and its push to the force. */
+static void add_contact(Touch *t, const Nearest *at, double rotor) {
+    const Tube *tube = t->robot->tube;
+    if (!(at->gap < tube->roughness) || t->balance->count >= MOST_CONTACTS) return;
+    const double load = asperity_load(at->gap, tube->roughness, tube->load);
+    t->seen->pressed += asperity_energy(at->gap, tube->roughness, tube->load);
+    t->seen->contact_force += load;
+    for (int i = 0; i < RATES; i++) t->balance->force[i] -= load * at->j[i];
+    Contact *contact = t->balance->contacts + t->balance->count++;
+    contact->load = tube->coefficient * load;
+    sliding_rows(at, t->rotation, rotor, contact->rows);
+}
+
+/* Squared distance of a station of the wire from the tube's axis, m^2. */
+static double station_square(const Touch *t, const Station *station) {
+    const double c = cos(t->y->phase), s = sin(t->y->phase);
+    const double at[3] = {station->x, c * station->y - s * station->z, s * station->y + c * station->z};
+    double d[2];
+    for (int n = 0; n < 2; n++) {
+        const double *row = t->rotation[n + 1];
+        d[n] = t->y->position[n + 1] + row[0] * at[0] + row[1] * at[1] + row[2] * at[2];
+    }
+    return d[0] * d[0] + d[1] * d[1];
+}
+
+/* Look for contacts of the wire where its stations are farthest from the axis. */
+static void touch_wire(Touch *t) {
+    const TubeRobot *robot = t->robot;
+    const Tube *tube = robot->tube;
+    const int64_t last = robot->station_count - 1;
+    if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
+    double before = 0.0, here = station_square(t, robot->stations);
+    for (int64_t k = 0; k <= last; k++) {
+        const double after = k < last ? station_square(t, robot->stations + k + 1) : 0.0;
+        if (here >= before && here > after && t->balance->count < MOST_CONTACTS) {
+            const Station *at = robot->stations + k;
+            const double bracket[3] = {at[k > 0 ? -1 : 0].xi, at->xi, at[k < last ? 1 : 0].xi};
+            const Nearest nearest = wire_nearest(robot->wire, t->y, t->rotation, tube->radius, bracket);
+            t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
+            add_contact(t, &nearest, 1.0);
+        }
+        before = here;
+        here = after;
+    }
+}
+
+/* Look for all contacts. */
+static void touch(Touch *t) {
+    const TubeRobot *robot = t->robot;
+    t->seen->film = t->seen->tail_gap = INFINITY;
+    t->seen->pressed = t->seen->contact_force = 0.0;
+    for (int64_t n = 0; n < robot->site_count; n++) {
+        const Site *site = robot->sites + n;
+        const Nearest nearest = site_nearest(site, t->y, t->rotation, robot->tube->radius);
+        if (site->rotor == 0.0) t->seen->film = smaller(t->seen->film, nearest.gap);
+        if (t->gaps) t->gaps[n] = nearest.gap;
+        add_contact(t, &nearest, site->rotor);
+    }
+    touch_wire(t);
+    if (t->gaps) t->gaps[robot->site_count] = t->seen->tail_gap;
+}
+
+static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
+static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
+
+/* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin.
+ *
+ * Their velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference,
+ * with v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. The table's
+ * film loses pressure at the ends of the body, which slices do not know: they are as long in all as they have its
+ * resistance to a motion along the normal, so that what is left of the film stays positive. */
+static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Fluid *fluid,
+                       const Seen *seen, Balance *b) {
+    const Film *film = &robot->table.film;
+    const double a = film->body, radius = robot->tube->radius, half = 0.5 * (film->front - film->rear);
+    b->slice_count = 0;
+    b->viscosity = robot->tube->viscosity;
+    b->bound = robot->tube->cavitation;
+    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * a)) return;
+    double normal[3] = {0.0}, sliced = 0.0;
+    for (int n = 0; n < MOST_SLICES; n++) {
+        const double angle = PI * (n + 0.5) / MOST_SLICES;
+        const Site site = {.x = film->rear + half * (1.0 - cos(angle)), .ring = a};
+        const Nearest at = site_nearest(&site, y, rotation, radius);
+        Slice *s = b->slices + b->slice_count++;
+        double rows[2][RATES];
+        sliding_rows(&at, rotation, 0.0, rows);
+        *s = (Slice){.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a),
+                     .length = half * sin(angle) * PI / MOST_SLICES};
+        const double *t = rows[1];
+        const double axis[RATES] = {t[0], t[1], t[2], 0.0, -site.x * t[2], site.x * t[1], 0.0};
+        for (int i = 0; i < RATES; i++) {
+            s->opening[i] = -at.j[i];
+            s->entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
+        }
+        for (int i = 0; i < 3; i++) normal[i] += at.normal[i] / MOST_SLICES;
+        sliced += s->length * 3.0 * PI * b->viscosity * sqrt(2.0 * s->gap) * pow(s->bend, 1.5) / squared(s->gap);
+    }
+    double whole = 0.0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) whole += b->viscosity * normal[i] * fluid->film[i][j] * normal[j];
+    const double share = smaller(whole / sliced, 1.0);
+    for (int64_t n = 0; n < b->slice_count; n++) b->slices[n].length *= share;
+}
+
+/* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
+ * a trial inside the wall has none, and the next one must not begin with them. */
+static double solve_rates(Balance *b, const Drive *drive, double current, Seen *seen) {
+    double *q = seen->rates, left[RATES];
+    bool finite = true;
+    for (int i = 0; i < RATES; i++) finite = finite && isfinite(q[i]);
+    for (int i = 0; i < RATES && !finite; i++) q[i] = 0.0;
+    b->along = driven_rate(drive);
+    b->prescribed = drive->kind == RATE && drive->duty > 0.0;
+    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, 0.0, 1.0);
+    b->force[b->along] += torque;
+    if (drive->fixed != 0.0) {
+        b->force[JOINT] = q[JOINT] = 0.0;
+        for (int64_t n = 0; n < b->count; n++) b->contacts[n].rows[0][JOINT] = b->contacts[n].rows[1][JOINT] = 0.0;
+    }
+    if (b->prescribed) q[b->along] += drive->given - q[SPIN] - q[JOINT];
+    seen->balance = balance_rates(b, q, left);
+    return b->prescribed ? left[b->along] : torque;
+}
+
+/* Note force and power of dry friction, sums over contacts. */
+static void note_sliding(const Balance *b, Seen *seen) {
+    seen->contact_friction = seen->contact_power = 0.0;
+    for (int64_t n = 0; n < b->count; n++) {
+        const Sliding s = sliding_at(b->contacts + n, seen->rates, b->slow);
+        seen->contact_friction += s.drag * hypot(s.u, s.v);
+        seen->contact_power += s.drag * (s.u * s.u + s.v * s.v);
+    }
+}
+
+/* Component of a force in body axes towards the wall at the body's mid-length. */
+static double towards_wall(const double force[3], const double rotation[3][3], double azimuth) {
+    double found = 0.0;
+    for (int i = 0; i < 3; i++) found += force[i] * (sin(azimuth) * rotation[1][i] - cos(azimuth) * rotation[2][i]);
+    return found;
+}
+
+/* Note the forces towards the wall, which sum to zero, and take from the fluid's power what the film's bound saves. */
+static void note_loads(const Balance *b, const Fluid *fluid, const double weight[RATES], const double asperities[RATES],
+                       const double rotation[3][3], Seen *seen) {
+    const double *q = seen->rates, mu = b->viscosity;
+    double film[3], outer[3], contact[3], lift[3] = {0.0};
+    for (int i = 0; i < 3; i++) {
+        film[i] = 0.0;
+        outer[i] = fluid->stream[i];
+        contact[i] = asperities[i];
+        for (int j = 0; j < 6; j++) film[i] -= mu * fluid->film[i][j] * q[j];
+        for (int j = 0; j < RATES; j++) outer[i] -= fluid->matrix[i][j] * q[j];
+        outer[i] -= film[i];
+    }
+    for (int64_t n = 0; n < b->count; n++) {
+        const Sliding s = sliding_at(b->contacts + n, q, b->slow);
+        for (int i = 0; i < 3; i++)
+            contact[i] -= s.drag * (b->contacts[n].rows[0][i] * s.u + b->contacts[n].rows[1][i] * s.v);
+    }
+    for (int64_t n = 0; n < b->slice_count; n++) {
+        const Slice *s = b->slices + n;
+        const Lift of_slice = lift_at(b, s, q);
+        for (int i = 0; i < RATES; i++) {
+            const double force = s->length * (of_slice.normal * s->opening[i] + of_slice.along * s->entrainment[i]);
+            if (i < 3) lift[i] += force;
+            seen->dissipated_power -= force * q[i];
+        }
+    }
+    seen->weight_load = towards_wall(weight, rotation, seen->azimuth);
+    seen->outer_load = towards_wall(outer, rotation, seen->azimuth);
+    seen->contact_load = towards_wall(contact, rotation, seen->azimuth);
+    seen->lift = -towards_wall(lift, rotation, seen->azimuth);
+    seen->film_load = towards_wall(film, rotation, seen->azimuth) - seen->lift;
+}
+
+/* Write what is observed in a state, and its time derivative. */
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
+    const Links *links = robot->links;
+    Balance balance = {.count = 0, .slow = robot->tube->sliding};
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
+    Fluid fluid;
+    double field[RATES], weight[RATES], asperities[RATES];
+    axes_of(y, t.rotation);
+    note_place(y, t.rotation, robot->tube->radius, seen);
+    set_fluid(robot, y->phase, time, seen, &fluid);
+    weight_loads(&links->weight, y->phase, t.rotation, weight);
+    for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
+    touch(&t);
+    for (int i = 0; i < RATES; i++) asperities[i] = balance.force[i];
+    set_slices(robot, y, t.rotation, &fluid, seen, &balance);
+    field_loads(&links->drive, time, t.rotation, field);
+    assemble(fluid.matrix, links, balance.a);
+    for (int i = 0; i < RATES; i++) balance.force[i] += weight[i] + field[i] + fluid.stream[i];
+    seen->drive_torque = solve_rates(&balance, &links->drive, y->current, seen);
+    note_powers(fluid.matrix, links, field, seen);
+    seen->flow_power = 0.0;
+    for (int i = 0; i < RATES; i++) {
+        seen->mean_flow += fluid.opened[i] * seen->rates[i];
+        seen->flow_power += fluid.stream[i] * seen->rates[i];
+    }
+    note_sliding(&balance, seen);
+    note_loads(&balance, &fluid, weight, asperities, t.rotation, seen);
+    differentiate(y, &links->drive, t.rotation, seen, dy);
+}
+
+/* Gap at every site, and last the smallest of the wire (infinite far from the wall), m. */
+void tube_robot_gaps(const TubeRobot *robot, const State *y, double *gaps) {
+    Balance balance = {.count = 0};
+    Seen seen = {.film = INFINITY};
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = &seen, .gaps = gaps};
+    axes_of(y, t.rotation);
+    touch(&t);
+}
