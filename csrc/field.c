@@ -3,7 +3,6 @@
  * Both come without factors: velocity times 8 pi mu, pressure times 8 pi. They are added to what is there, (n, 4).
  */
 #include "panels.h"
-#include "rings.h"
 
 /* Regularised Stokeslets; p = (x.f)(2 r^2 + 3 e^2)/r^5 (Cortez, SIAM J. Sci. Comput. 23:1204, 2001). */
 EXPORT void add_blobs(const double *points, const double *sources, const double *forces, const double *e2,
@@ -56,19 +55,13 @@ typedef struct {
     double re, im;
 } Amplitude;
 
-/* A point about the axis of the solids, and exp(i m theta) there. */
+/* What a panel does at one point: exp(i m theta) there, densities on the nodes (nodes, modes, 3), and the sum of
+ * cylindrical velocity and pressure, lane by lane. */
 typedef struct {
-    Target at;
-    int64_t modes;
-    const Amplitude *turns;
-} FieldPoint;
-
-/* Sources on a panel: rings, weights, and complex densities (modes, 3) of each. */
-typedef struct {
-    RingPairs pairs;
-    double weights[LANES];
-    double (*real)[LANES], (*imaginary)[LANES];
-} Sources;
+    int64_t modes, nodes;
+    const Amplitude *turns, *density;
+    double (*out)[LANES];
+} PanelFlow;
 
 /* Numbers of modes that reach a point: the others are below exp(-25). Returns the largest. */
 static int64_t count_modes(const RingPairs *r, int64_t most, int64_t counts[LANES]) {
@@ -83,104 +76,47 @@ static int64_t count_modes(const RingPairs *r, int64_t most, int64_t counts[LANE
     return largest;
 }
 
-/* Add cylindrical velocity and pressure, lane by lane. */
-static void add_rings(const FieldPoint *point, Sources *sources, double out[4][LANES]) {
+/* Density of one mode and component at points, turned to the angle of the field's point: as cosine and as sine. */
+static void turn_density(const PanelFlow *flow, const PanelPoints *points, int64_t m, int d, double like[LANES],
+                         double other[LANES]) {
+    const Amplitude turn = flow->turns[m], *density = flow->density + 3 * m + d;
+    EACH_LANE like[l] = other[l] = 0.0;
+    for (int64_t j = 0; j < flow->nodes; j++, density += 3 * flow->modes) {
+        const double as_cos = density->re * turn.re - density->im * turn.im;
+        const double as_sin = -(density->re * turn.im + density->im * turn.re);
+        EACH_LANE {
+            like[l] += points->cardinals[j][l] * as_cos;
+            other[l] += points->cardinals[j][l] * as_sin;
+        }
+    }
+}
+
+/* Add the flow of rings at some points of a panel. */
+static void add_rings(const void *context, PanelPoints *points) {
+    const PanelFlow *flow = context;
+    const RingPairs *r = &points->pairs;
     int64_t counts[LANES];
-    const int64_t modes = count_modes(&sources->pairs, point->modes, counts);
-    double a[modes + 1][LANES], b[modes + 1][LANES], k[9][LANES], b_v[LANES], push[3][LANES];
-    const RingPairs *r = &sources->pairs;
-    open_rings(&sources->pairs, modes + 1, a, b);
+    const int64_t modes = count_modes(r, flow->modes, counts);
+    double a[modes + 1][LANES], b[modes + 1][LANES], k[9][LANES], b_v[LANES], push[3][LANES], like[LANES], other[LANES];
+    open_rings(&points->pairs, modes + 1, a, b);
     for (int64_t m = 0; m < modes; m++) {
-        const double c = point->turns[m].re, s = point->turns[m].im, order = (double)m;
         fill_ring_mode(r, m, a, b, k);
         fill_ring_b_v(r, m, a, b, b_v);
         EACH_LANE {
             push[0][l] = r->dx[l] * b[m][l];
             push[1][l] = r->delta[l] * b[m][l] - r->rho[l] * b_v[l];
-            push[2][l] = order * a[m][l] / r->rho_s[l];
+            push[2][l] = (double)m * a[m][l] / r->rho_s[l];
         }
         for (int d = 0; d < 3; d++) {
-            const double *re = sources->real[3 * m + d], *im = sources->imaginary[3 * m + d];
+            turn_density(flow, points, m, d, like, other);
             EACH_LANE {
-                const double weight = m < counts[l] ? sources->weights[l] : 0.0;
-                const double like = weight * (re[l] * c - im[l] * s), other = -weight * (re[l] * s + im[l] * c);
-                out[0][l] += k[d][l] * like;
-                out[1][l] += k[3 + d][l] * like;
-                out[2][l] += k[6 + d][l] * other;
-                out[3][l] += 2.0 * push[d][l] * like;
+                const double weight = m < counts[l] ? points->weights[l] : 0.0;
+                flow->out[0][l] += weight * k[d][l] * like[l];
+                flow->out[1][l] += weight * k[3 + d][l] * like[l];
+                flow->out[2][l] += weight * k[6 + d][l] * other[l];
+                flow->out[3][l] += 2.0 * weight * push[d][l] * like[l];
             }
         }
-    }
-}
-
-/* By the panel's own nodes; density (nodes, modes, 3). */
-static void add_far_panel(const FieldPoint *point, const PanelRule *rule, const Panel *panel,
-                          const Amplitude *density, double out[4][LANES]) {
-    const int64_t size = 3 * point->modes;
-    double real[size][LANES], imaginary[size][LANES];
-    Sources sources = {.real = real, .imaginary = imaginary};
-    for (int64_t first = 0; first < rule->size; first += LANES) {
-        for (int l = 0; l < LANES; l++) {
-            const int64_t j = first + l < rule->size ? first + l : rule->size - 1;
-            sources.pairs.dx[l] = point->at.x - panel->x[j];
-            sources.pairs.delta[l] = point->at.rho - panel->rho[j];
-            sources.pairs.rho[l] = point->at.rho;
-            sources.pairs.rho_s[l] = panel->rho[j];
-            sources.weights[l] = first + l < rule->size ? rule->weights[j] * panel->rho[j] : 0.0;
-            for (int64_t e = 0; e < size; e++) {
-                real[e][l] = density[j * size + e].re;
-                imaginary[e][l] = density[j * size + e].im;
-            }
-        }
-        add_rings(point, &sources, out);
-    }
-}
-
-/* By a finer rule on a piece of the panel, between whose nodes the density is interpolated. */
-static void add_piece(const FieldPoint *point, const PanelRule *rule, const Panel *panel, const Amplitude *density,
-                      Piece piece, double out[4][LANES]) {
-    const int64_t size = 3 * point->modes;
-    double real[size][LANES], imaginary[size][LANES], cardinals[rule->size][LANES], cardinal[rule->size];
-    for (int64_t first = 0; first < rule->fine_size; first += LANES) {
-        Sources sources = {.real = real, .imaginary = imaginary};
-        for (int l = 0; l < LANES; l++) {
-            const int64_t q = first + l < rule->fine_size ? first + l : rule->fine_size - 1;
-            fill_cardinals(rule, piece.low + 0.5 * (piece.high - piece.low) * (1.0 + rule->fine[q]), cardinal);
-            for (int64_t j = 0; j < rule->size; j++) {
-                cardinals[j][l] = cardinal[j];
-                sources.pairs.dx[l] += cardinal[j] * (point->at.x - panel->x[j]);
-                sources.pairs.delta[l] += cardinal[j] * (point->at.rho - panel->rho[j]);
-            }
-            sources.pairs.rho[l] = point->at.rho;
-            sources.pairs.rho_s[l] = point->at.rho - sources.pairs.delta[l];
-            const double weight = 0.5 * rule->fine_weights[q] * (piece.high - piece.low) * sources.pairs.rho_s[l];
-            sources.weights[l] = first + l < rule->fine_size ? weight : 0.0;
-        }
-        for (int64_t e = 0; e < size; e++) {
-            EACH_LANE real[e][l] = imaginary[e][l] = 0.0;
-            for (int64_t j = 0; j < rule->size; j++) {
-                const double re = density[j * size + e].re, im = density[j * size + e].im;
-                EACH_LANE {
-                    real[e][l] += cardinals[j][l] * re;
-                    imaginary[e][l] += cardinals[j][l] * im;
-                }
-            }
-        }
-        add_rings(point, &sources, out);
-    }
-}
-
-/* Add the flow of one panel, halved until each piece is shorter than its distance from the point. */
-static void add_panel(const FieldPoint *point, const PanelRule *rule, const Panel *panel, const Amplitude *density,
-                      double out[4][LANES]) {
-    Halving halving = {.pieces = {{-1.0, 1.0}}, .depth = 1};
-    Piece piece = halving.pieces[0];
-    if (!is_near(rule, panel, &point->at, piece)) {
-        add_far_panel(point, rule, panel, density, out);
-        return;
-    }
-    while (has_next_piece(&halving, rule, panel, &point->at, 1e-6, &piece)) {
-        add_piece(point, rule, panel, density, piece, out);
     }
 }
 
@@ -194,11 +130,12 @@ EXPORT void add_layer(const double *points, const double *x_p, const double *rho
     for (int64_t i = 0; i < n; i++) {
         const double *at = points + 3 * i, theta = atan2(at[2], at[1]), c = cos(theta), s = sin(theta);
         for (int64_t m = 0; m < modes; m++) turns[m] = (Amplitude){cos((double)m * theta), sin((double)m * theta)};
-        const FieldPoint point = {{at[0], hypot(at[1], at[2]), 0.0}, modes, turns};
+        const Target target = {at[0], hypot(at[1], at[2]), 0.0};
         double lanes[4][LANES] = {{0.0}}, out[4] = {0.0};
         for (int64_t q = 0; q < panels; q++) {
             const Panel panel = {x_p + q * size, rho_p + q * size};
-            add_panel(&point, &rule, &panel, density + q * size * 3 * modes, lanes);
+            const PanelFlow flow = {modes, size, turns, density + q * size * 3 * modes, lanes};
+            integrate(&rule, &panel, &target, 1e-6, &(Integrand){add_rings, &flow});
         }
         for (int d = 0; d < 4; d++) {
             for (int l = 0; l < LANES; l++) out[d] += lanes[d][l];

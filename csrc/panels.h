@@ -1,8 +1,8 @@
-/* Panels of an outline, and how they are halved towards a target; see panels.c. */
+/* Quadrature over panels of an outline; see panels.c. */
 #ifndef SPIRILLUM_PANELS_H
 #define SPIRILLUM_PANELS_H
 
-#include "core.h"
+#include "rings.h"
 
 /* Nodes on [-1, 1], their barycentric and Gauss weights, and a finer Gauss rule. */
 typedef struct {
@@ -22,25 +22,24 @@ typedef struct {
     double x, rho, e2;
 } Target;
 
-/* Part of a panel, on [-1, 1]. */
+/* Points of a quadrature over a panel, with the target: weights are those of rho du, zero in lanes that are free;
+ * `cardinals` are the Lagrange polynomials of the nodes there, (nodes, LANES). */
 typedef struct {
-    double low, high;
-} Piece;
+    RingPairs pairs;
+    double weights[LANES], (*cardinals)[LANES];
+} PanelPoints;
 
-/* Halves of a panel that are still to be done. */
+/* What is done at the points. */
 typedef struct {
-    Piece pieces[64];
-    int depth;
-} Halving;
+    void (*add)(const void *context, PanelPoints *points);
+    const void *context;
+} Integrand;
 
-/* Lagrange polynomials of the nodes at u, in barycentric form. */
-void fill_cardinals(const PanelRule *rule, double u, double *out);
+/* Integrate over a panel that the target lies off. Where it is close, the panel is halved until each piece is shorter
+ * than its distance, or than `smallest`. */
+void integrate(const PanelRule *rule, const Panel *panel, const Target *target, double smallest, const Integrand *of);
 
-/* Whether the target is closer to a piece of a panel than the piece is long. */
-bool is_near(const PanelRule *rule, const Panel *panel, const Target *target, Piece piece);
-
-/* The next piece that is shorter than its distance from the target, or than `smallest`, if any is left. */
-bool has_next_piece(Halving *halving, const PanelRule *rule, const Panel *panel, const Target *target, double smallest,
-                    Piece *piece);
+/* Over the panel that the target lies on, at u_0. */
+void integrate_own(const PanelRule *rule, const Panel *panel, const Target *target, double u_0, const Integrand *of);
 
 #endif

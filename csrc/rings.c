@@ -65,10 +65,12 @@ static void recur_backward(const double p[LANES], const double s[LANES], int64_t
     for (int64_t n = 1; n < count; n++) EACH_LANE a[n][l] *= a[n - 1][l];
 }
 
-void fill_ring_integrals(const RingPairs *r, int64_t count, double (*a)[LANES], double (*b)[LANES]) {
+void open_rings(RingPairs *r, int64_t count, double (*a)[LANES], double (*b)[LANES]) {
     double p[LANES], near2[LANES], far2[LANES], far[LANES], s[LANES], share[LANES], big_k[LANES], big_e[LANES];
     EACH_LANE {
-        const double dx2 = r->dx[l] * r->dx[l];
+        const double dx2 = r->dx[l] * r->dx[l], tiny = 1e-14 * (fabs(r->dx[l]) + r->rho[l] + r->rho_s[l]);
+        r->rho[l] = larger(r->rho[l], tiny);
+        r->rho_s[l] = larger(r->rho_s[l], tiny);
         p[l] = r->rho[l] * r->rho_s[l];
         near2[l] = larger(dx2 + r->delta[l] * r->delta[l] + r->e2, 1e-30 * (p[l] + dx2));
         far2[l] = near2[l] + 4.0 * p[l];
@@ -101,15 +103,6 @@ void fill_ring_integrals(const RingPairs *r, int64_t count, double (*a)[LANES], 
     for (int64_t n = 1; n < count; n++) {
         EACH_LANE b[n][l] = scale[l] * ((double)n - 0.5) * (p[l] * a[n - 1][l] - s[l] * a[n][l]);
     }
-}
-
-void open_rings(RingPairs *r, int64_t count, double (*a)[LANES], double (*b)[LANES]) {
-    EACH_LANE {
-        const double tiny = 1e-14 * (fabs(r->dx[l]) + r->rho[l] + r->rho_s[l]);
-        r->rho[l] = larger(r->rho[l], tiny);
-        r->rho_s[l] = larger(r->rho_s[l], tiny);
-    }
-    fill_ring_integrals(r, count, a, b);
 }
 
 /* From A_m where the rings are close, since B_m cancels. */
@@ -147,7 +140,10 @@ void fill_ring_mode(const RingPairs *r, int64_t m, double (*a)[LANES], double (*
     }
 }
 
-static RingPairs one_pair(double dx, double delta, double rho, double rho_s, double e2) {
+/* A_n and B_n of one pair of rings, at least 2. */
+EXPORT void ring_integrals(double dx, double delta, double rho, double rho_s, double e2, double *a, double *b,
+                           int64_t count) {
+    double a_lanes[count][LANES], b_lanes[count][LANES];
     RingPairs pairs = {.e2 = e2};
     EACH_LANE {
         pairs.dx[l] = dx;
@@ -155,27 +151,10 @@ static RingPairs one_pair(double dx, double delta, double rho, double rho_s, dou
         pairs.rho[l] = rho;
         pairs.rho_s[l] = rho_s;
     }
-    return pairs;
-}
-
-EXPORT void ring_integrals(double dx, double delta, double rho, double rho_s, double e2, double *a, double *b,
-                           int64_t count) {
-    double a_lanes[count][LANES], b_lanes[count][LANES];
-    const RingPairs pair = one_pair(dx, delta, rho, rho_s, e2);
-    fill_ring_integrals(&pair, count, a_lanes, b_lanes);
+    open_rings(&pairs, count, a_lanes, b_lanes);
     for (int64_t n = 0; n < count; n++) {
         a[n] = a_lanes[n][0];
         b[n] = b_lanes[n][0];
-    }
-}
-
-EXPORT void ring_modes(double dx, double delta, double rho, double rho_s, double e2, double *k, int64_t modes) {
-    double a[modes + 1][LANES], b[modes + 1][LANES], block[9][LANES];
-    RingPairs pair = one_pair(dx, delta, rho, rho_s, e2);
-    open_rings(&pair, modes + 1, a, b);
-    for (int64_t m = 0; m < modes; m++) {
-        fill_ring_mode(&pair, m, a, b, block);
-        for (int e = 0; e < 9; e++) k[9 * m + e] = block[e][0];
     }
 }
 

@@ -14,10 +14,7 @@ typedef struct {
     double e2;           /* square of the blob radius; rings that coincide need one */
 } RingPairs;
 
-/* Fill A_n and B_n for n < count, count at least 2; radii have to be above 0. */
-void fill_ring_integrals(const RingPairs *pairs, int64_t count, double (*a)[LANES], double (*b)[LANES]);
-
-/* The same for rings that may have shrunk to the axis: radii are raised to what keeps the digits. */
+/* Fill A_n and B_n for n < count, count at least 2. Radii of rings that have shrunk to the axis are raised above 0. */
 void open_rings(RingPairs *pairs, int64_t count, double (*a)[LANES], double (*b)[LANES]);
 
 /* Integral of v cos(m phi)/r^3 with v = 1 - cos(phi). */

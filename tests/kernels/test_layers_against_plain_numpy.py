@@ -5,7 +5,7 @@ import pytest
 
 from spirillum.fluid.wire.sources import Panels
 from spirillum.kernels.field import add_layer
-from spirillum.kernels.rings import ring_modes
+from spirillum.kernels.rings import ring_blocks
 
 MODES = 4
 RULE = 2e-6
@@ -30,17 +30,14 @@ def graded(towards: float) -> tuple[np.ndarray, np.ndarray]:
 
 def by_quadrature(panels: Panels, panel: int, x: float, rho: float, towards: float, e2: float) -> np.ndarray:
     """Velocities of unit densities on the nodes of one panel, (modes, 3, p, 3)."""
-    total = np.zeros((MODES, 3, panels.order, 3))
+    u, weights = graded(towards)
     nodes = panels.rule[0]
-    for u, weight in zip(*graded(towards), strict=True):
-        cardinal = np.array(
-            [np.prod((u - np.delete(nodes, j)) / (t - np.delete(nodes, j))) for j, t in enumerate(nodes)]
-        )
-        dx, delta = cardinal @ (x - panels.x[panel]), cardinal @ (rho - panels.rho[panel])
-        block = np.empty((MODES, 3, 3))
-        ring_modes(dx, delta, rho, rho - delta, e2, block)
-        total += weight * (rho - delta) * np.einsum("mcd,j->mcjd", block, cardinal)
-    return total
+    others = [np.delete(nodes, j) for j in range(nodes.size)]
+    cardinal = np.stack([np.prod((u[:, None] - o) / (t - o), axis=1) for t, o in zip(nodes, others, strict=True)], 1)
+    x_s, rho_s = cardinal @ panels.x[panel], cardinal @ panels.rho[panel]
+    blocks = np.empty((MODES, 1, 3, u.size, 3))
+    ring_blocks(np.array([x]), np.array([rho]), x_s, rho_s, e2, blocks)
+    return np.einsum("q,mcqd,qj->mcjd", weights * rho_s, blocks[:, 0], cardinal)
 
 
 @pytest.mark.parametrize("e2", [0.0, 1e-4])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from scipy.special import ellipe, ellipk
 
-from spirillum.kernels.rings import ring_blocks, ring_integrals, ring_modes
+from spirillum.kernels.rings import ring_blocks, ring_integrals
 
 MODES = 12
 # dx, rho of the target, rho of the source, blob radius.
@@ -32,9 +32,9 @@ CLOSE = [
 
 
 def modes_of(dx: float, rho: float, rho_s: float, blob: float, modes: int = MODES) -> np.ndarray:
-    blocks = np.empty((modes, 3, 3))
-    ring_modes(dx, rho - rho_s, rho, rho_s, blob**2, blocks)
-    return blocks
+    blocks = np.empty((modes, 1, 3, 1, 3))
+    ring_blocks(*np.array([[dx], [rho], [0.0], [rho_s]]), blob**2, blocks)
+    return blocks.reshape(modes, 3, 3)
 
 
 def by_quadrature(dx: float, rho: float, rho_s: float, blob: float, modes: int = MODES) -> np.ndarray:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ive, k0e, k1e
 
-from spirillum.kernels.rings import ring_modes
+from spirillum.kernels.rings import ring_blocks
 from spirillum.kernels.tube_waves import circle_waves, station_waves, wall_layers, wave_extensions
 
 WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
@@ -114,11 +114,11 @@ def test_long_waves() -> None:
 @pytest.mark.parametrize("k", [0.4, 2.5])
 def test_layers_against_rings_of_forces(k: float, p: int) -> None:
     """S is the Fourier transform along the tube of the ring kernels on a cylinder of radius 1, over 4 pi."""
-    blocks = np.empty((p + 2, 3, 3))
+    blocks = np.empty((p + 1, 1, 3, 1, 3))
 
     def entry(i: int, j: int, dx: float) -> float:
-        ring_modes(dx, 0.0, 1.0, 1.0, 0.0, blocks)
-        return float(blocks[p, i, j])
+        ring_blocks(*np.array([[dx], [1.0], [0.0], [1.0]]), 0.0, blocks)
+        return float(blocks[p, 0, i, 0, j])
 
     def transform(i: int, j: int) -> complex:
         """Over all dx of the kernel times exp(-i k dx); entries between x and the others are odd."""

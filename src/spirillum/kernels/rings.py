@@ -33,20 +33,6 @@ def ring_integrals(
     """
 
 
-@native("k")
-def ring_modes(dx: float, delta: float, rho: float, rho_s: float, e2: float, k: Float64[Array, "modes 3 3"]) -> None:
-    """Fill k[m] with the 3x3 block of mode m, from a force density on the ring rho_s to velocities at rho.
-
-    Args:
-        dx: x of the target less x of the source.
-        delta: rho - rho_s.
-        rho: radius of the target.
-        rho_s: radius of the source.
-        e2: square of the blob radius.
-        k: to be filled.
-    """
-
-
 @native("blocks")
 def ring_blocks(
     x: Float64[Array, " t"],
