@@ -23,6 +23,7 @@ FLAGS = (
     *("-std=c11", "-O3", "-shared", "-fPIC", "-fvisibility=hidden"),
     # The same numbers on every processor: no fused products, no sums in another order; `errno` and traps are not read.
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
+    "-fopenmp-simd",  # heeds `omp simd`, which needs no library
 )
 STRICT = ("-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-Werror")
 """Of the project's own tests: a compiler of tomorrow may warn of more."""

@@ -373,7 +373,10 @@ def test_a_wire_alone_against_a_dense_matrix() -> None:
         found = held_in_tube(Solids(solids, Seat(1.0, 0.0), Fineness(tolerance=1e-8)), [(wire, 1)])
         drag.append(found.matrix[6:9, 6:9])
     waves = waves_between(1.0, float(np.ptp(wire.points[:, 0])), 1.0, 1e-8)
-    mobility = force_matrix(wire.points, np.full(len(wire.points), wire.blob**2)) - point_reflection(wire.points, waves)
+    count = len(wire.points)
+    blobs = np.empty((count, 3, count, 3))
+    force_matrix(wire.points, np.full(count, wire.blob**2), blobs)
+    mobility = blobs.reshape(3 * count, -1) - point_reflection(wire.points, waves)
     rows = np.tile(np.eye(3), (len(wire.points), 1))
     wanted = 8 * np.pi * rows.T @ np.linalg.solve(mobility, rows)
     np.testing.assert_allclose(drag[0], wanted, atol=1e-3 * wanted[0, 0])  # thickness: (b/2R)^2

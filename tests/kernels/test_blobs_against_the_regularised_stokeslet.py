@@ -26,7 +26,9 @@ def cloud() -> np.ndarray:
 
 def test_matrix(cloud: np.ndarray) -> None:
     e2 = np.linspace(0.01, 0.3, len(cloud))
-    matrix = force_matrix(cloud, e2)
+    matrix = np.empty((7, 3, 7, 3))
+    force_matrix(cloud, e2, matrix)
+    matrix = matrix.reshape(21, 21)
     np.testing.assert_array_equal(matrix, matrix.T)
     for i in range(len(cloud)):
         for j in range(len(cloud)):
@@ -71,7 +73,9 @@ def test_moments_against_differences_of_the_kernel(cloud: np.ndarray) -> None:
     points, e2 = cloud[:n], np.linspace(0.2, 0.5, n)
     moments = np.random.default_rng(5).normal(size=(n, q, 3, 3))
     moments -= np.trace(moments, axis1=2, axis2=3)[:, :, None, None] * np.eye(3) / 3
-    velocities, gradients = moment_matrices(points, e2, moments)
+    velocities, gradients = np.empty((n, 3, n, q)), np.empty((n, q, n, q))
+    moment_matrices(points, e2, moments, velocities, gradients)
+    velocities, gradients = velocities.reshape(3 * n, q * n), gradients.reshape(q * n, q * n)
     np.testing.assert_array_equal(gradients, gradients.T)
     steps = h * np.eye(3)
     for i in range(n):
@@ -96,7 +100,7 @@ def test_threads_share_the_points_and_change_nothing(monkeypatch: pytest.MonkeyP
     points, sources, forces = (rng.normal(size=(count, 3)) for count in (41, 7, 7))
     fields = []
     for threads in (1, 3):
-        monkeypatch.setattr("spirillum.kernels.compiled._THREADS", threads)
+        monkeypatch.setattr("spirillum.kernels.native._THREADS", threads)
         fields.append(np.zeros((41, 4)))
         add_blobs(points, sources, forces, np.full(7, 0.01), fields[-1])
     np.testing.assert_array_equal(*fields)

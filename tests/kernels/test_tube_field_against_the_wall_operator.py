@@ -28,9 +28,14 @@ def reflected(
     amplitudes = np.zeros((orders.size, 2, 2, orders.max(), 3))
     z = waves.k * R
     wave_amplitudes(
-        (waves.k, waves.weight, orders, k1e(z) / k0e(z)),
+        waves.k,
+        waves.weight,
+        orders,
+        k1e(z) / k0e(z),
         R,
-        (rho, angle, np.full(len(rho), 1e9)),
+        rho,
+        angle,
+        np.full(len(rho), 1e9),
         np.arange(len(rho) + 1),
         sources[:, 0].copy(),
         np.stack([parts, parts], axis=1),
@@ -38,7 +43,7 @@ def reflected(
         amplitudes,
     )
     field = np.zeros((len(points), 4))
-    add_waves(points, np.full(len(points), steepest), (waves.k, orders), R, steps, amplitudes, field)
+    add_waves(points, np.full(len(points), steepest), waves.k, orders, R, steps, amplitudes, field)
     return field
 
 

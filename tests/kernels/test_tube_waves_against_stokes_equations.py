@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ive, k0e, k1e
 
-from spirillum.kernels.rings import ring_modes
+from spirillum.kernels.rings import ring_blocks
 from spirillum.kernels.tube_waves import circle_waves, station_waves, wall_layers, wave_extensions
 
 WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
@@ -19,11 +19,15 @@ WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
 def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0, first: int = 0) -> np.ndarray:
     rho = np.asarray(rho, dtype=float)
     scale = ive(0, k * rho) / ive(0, k * radius) * np.exp(k * (rho - radius))
-    return wave_extensions(k, radius, rho, scale, orders, first)
+    out = np.empty((rho.size, orders - first, 3, 3))
+    wave_extensions(k, radius, rho, scale, first, out)
+    return out
 
 
 def layers(z: float, orders: int) -> np.ndarray:
-    return wall_layers(z, float(k1e(z) / k0e(z)), orders)
+    out = np.empty((orders, 3, 3))
+    wall_layers(z, float(k1e(z) / k0e(z)), out)
+    return out
 
 
 def wave(k: float, p: int, points: np.ndarray, turn: float = 1.0) -> np.ndarray:
@@ -110,11 +114,11 @@ def test_long_waves() -> None:
 @pytest.mark.parametrize("k", [0.4, 2.5])
 def test_layers_against_rings_of_forces(k: float, p: int) -> None:
     """S is the Fourier transform along the tube of the ring kernels on a cylinder of radius 1, over 4 pi."""
-    work, blocks = np.empty((2, p + 3)), np.empty((p + 2, 3, 3))
+    blocks = np.empty((p + 1, 1, 3, 1, 3))
 
     def entry(i: int, j: int, dx: float) -> float:
-        ring_modes(dx, 0.0, 1.0, 1.0, 0.0, p + 2, *work, blocks)
-        return float(blocks[p, i, j])
+        ring_blocks(*np.array([[dx], [1.0], [0.0], [1.0]]), 0.0, blocks)
+        return float(blocks[p, 0, i, 0, j])
 
     def transform(i: int, j: int) -> complex:
         """Over all dx of the kernel times exp(-i k dx); entries between x and the others are odd."""
@@ -165,12 +169,12 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     distance, angle = np.hypot(y, z), np.arctan2(z, y)
     values = extensions(k, distance, orders)
     found = np.empty((6, 3, 2, 2, orders, 3))
-    station_waves(values, angle, k * x, found)
+    station_waves(values, angle, k * x, 0, found)
     some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
-    station_waves(extensions(k, distance, orders, first=2), angle, k * x, some, 2)
+    station_waves(extensions(k, distance, orders, first=2), angle, k * x, 2, some)
     np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
-    even, odd = np.empty((2, 3, 6, orders, 3))
-    circle_waves(values, angle, angle - theta, even, odd)
+    circle = np.empty((2, 3, 6, orders, 3))
+    circle_waves(values, angle, angle - theta, circle)
     points = np.stack([x, y, z], axis=1)
     for p in range(orders):
         there, back = wave(k, p, points), wave(k, p, points, turn=-1.0)
@@ -180,5 +184,5 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
             turn = both * np.exp(-1j * k * x)[:, None, None]
             c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
             about = np.stack([-1j * turn[:, 0], turn[:, 1] * c + turn[:, 2] * s, turn[:, 2] * c - turn[:, 1] * s])
-            np.testing.assert_allclose((even, odd)[parity][:, :, p], about.real, atol=1e-13)
+            np.testing.assert_allclose(circle[parity][:, :, p], about.real, atol=1e-13)
             np.testing.assert_allclose(about.imag, 0.0, atol=1e-13)

@@ -148,7 +148,7 @@ def add_tractions(
         start += count
     if layer is not None:
         panels, density = layer
-        add_layer(points, panels.x, panels.rho, density, panels.rule, field)
+        add_layer(points, panels.x, panels.rho, density, *panels.rule, field)
 
 
 @dataclass(frozen=True)

@@ -217,9 +217,14 @@ class _Reflection:
         steps = np.zeros((k.size, orders.max()))
         amplitudes = np.zeros((k.size, 2, 2, orders.max(), 3))
         wave_amplitudes(
-            (k, weight, orders, k1e(k * seat.radius) / k0e(k * seat.radius)),
+            k,
+            weight,
+            orders,
+            k1e(k * seat.radius) / k0e(k * seat.radius),
             seat.radius,
-            (rho, angle, cut / (seat.radius - rho)),
+            rho,
+            angle,
+            cut / (seat.radius - rho),
             np.concatenate([[0], np.cumsum(first)]),
             np.concatenate([part.x.ravel() for part in columns]),
             np.concatenate([part.forces.reshape(-1, 2, 3) for part in columns]),
@@ -236,7 +241,7 @@ class _Reflection:
         field = np.zeros((len(placed), 4))
         distance = np.maximum(self.radius - np.hypot(placed[:, 1], placed[:, 2]), 0.0)
         steepest = _FADE * self.cut / self._range(placed, distance)
-        add_waves(placed, steepest, self.waves, self.radius, self.steps, self.amplitudes, field)
+        add_waves(placed, steepest, *self.waves, self.radius, self.steps, self.amplitudes, field)
         return field
 
     def _range(self, placed: Samples, distance: Samples) -> Samples:

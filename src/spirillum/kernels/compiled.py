@@ -6,10 +6,8 @@ Kernels assign and multiply element by element: slices of arrays and `@` take se
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from contextvars import ContextVar
 from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -17,11 +15,11 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
+from spirillum.kernels.native import in_one_thread
+
 _THREADS: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _SHARES = 4
 """Shares of the rows for each thread: some rows take longer than others."""
-
-_alone: ContextVar[bool] = ContextVar("alone", default=False)
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -76,21 +74,6 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
         return cast("_F", call)
 
     return decorate
-
-
-def in_one_thread() -> bool:
-    """Whether the work of this process stays in one thread: the machine has no more, or other processes have them."""
-    return _THREADS == 1 or _alone.get()
-
-
-@contextmanager
-def rows_in_one_thread() -> Iterator[None]:
-    """While the block runs, rows are worked through by this thread alone: other processes have the other cores."""
-    token = _alone.set(True)
-    try:
-        yield
-    finally:
-        _alone.reset(token)
 
 
 def _rows(argument: Any, low: int, high: int) -> Any:

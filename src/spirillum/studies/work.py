@@ -15,7 +15,7 @@ from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
-from spirillum.kernels.compiled import rows_in_one_thread
+from spirillum.kernels.native import rows_in_one_thread
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot

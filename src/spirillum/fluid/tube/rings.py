@@ -227,10 +227,10 @@ class LevelRings(Rings):
         y, z = self.reference * np.cos(theta) - self.offset, self.reference * np.sin(theta)
         angle = np.arctan2(z, y)
         values = extensions(float(waves.k[number]), waves.radius, np.hypot(y, z), orders)
-        even, odd = (np.empty((3, theta.size, orders, 3)) for _ in range(2))
-        circle_waves(values, angle, angle - theta, even, odd)
+        waved = np.empty((2, 3, theta.size, orders, 3))
+        circle_waves(values, angle, angle - theta, waved)
         found = []
-        for parity, field in enumerate((even, odd)):
+        for parity, field in enumerate(waved):
             flat = field.reshape(3, theta.size, -1)
             modes = [matrix @ part for matrix, part in zip(projectors(theta, self.modes, parity), flat, strict=True)]
             found.append(np.stack(modes, axis=1).reshape(self.modes, 3, orders, 3))

@@ -276,13 +276,12 @@ class TiltedRings(Rings):
         Returns:
             component; even, odd; angle; ring; real, imaginary; order; wall component.
         """
-        from spirillum.kernels.tube_waves import tilted_waves
+        from spirillum.kernels.tube_waves import single_tilted_waves, tilted_waves
 
         shape, k = placed.shape[:2], float(waves.k[number])
         x, y, z = np.moveaxis(placed, -1, 0)
         values = extensions(k, waves.radius, np.hypot(y, z).ravel(), high, low)
         out = np.empty((3, 2, *shape, 2, high - low, 3), precision)
-        tilted_waves(
-            values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, out, low
-        )
+        fill = tilted_waves if precision is np.float64 else single_tilted_waves
+        fill(values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, low, out)
         return out

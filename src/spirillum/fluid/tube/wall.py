@@ -122,7 +122,7 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
     """Compiled loops and linear algebra let other threads run."""
-    from spirillum.kernels.compiled import in_one_thread  # loads the compiler
+    from spirillum.kernels.native import in_one_thread
 
     if in_one_thread():
         return [function(item) for item in items]
@@ -150,7 +150,8 @@ def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 
     from spirillum.kernels.tube_waves import wave_extensions
 
     scale = i0e(k * rho) / i0e(k * radius) * np.exp(k * (rho - radius))
-    found: Samples = wave_extensions(k, radius, rho, scale, orders, first)
+    found = np.empty((rho.size, orders - first, 3, 3))
+    wave_extensions(k, radius, rho, scale, first, found)
     return found
 
 
@@ -161,7 +162,8 @@ def weighted_layers(waves: WallWaves, number: int) -> Samples:
     from spirillum.kernels.tube_waves import wall_layers
 
     z = float(waves.k[number] * waves.radius)
-    layers: Samples = wall_layers(z, float(k1e(z) / k0e(z)), waves.orders[number])
+    layers = np.empty((waves.orders[number], 3, 3))
+    wall_layers(z, float(k1e(z) / k0e(z)), layers)
     layers[1:] *= 2.0
     layers *= waves.weight[number]
     return layers
@@ -192,7 +194,7 @@ def point_waves(points: Samples, waves: WallWaves, number: int, first: int = 0, 
     k, last = float(waves.k[number]), waves.orders[number] if last is None else last
     values = extensions(k, waves.radius, np.hypot(points[:, 1], points[:, 2]), last, first)
     out = np.empty((len(points), 3, 2, 2, last - first, 3))
-    station_waves(values, np.arctan2(points[:, 2], points[:, 1]), k * points[:, 0], out, first)
+    station_waves(values, np.arctan2(points[:, 2], points[:, 1]), k * points[:, 0], first, out)
     return out.reshape(3 * len(points), 2, 2, last - first, 3)
 
 

@@ -102,11 +102,10 @@ class Panels:
         """8 pi mu times the velocities at rings (x, rho) of unit densities, (modes, 3 rings, 3 nodes)."""
         from spirillum.kernels.panels import layer_blocks
 
-        nodes, barycentric, fine, fine_weights, weights = self.rule
-        rule = (nodes, barycentric, fine, fine_weights)
         own = np.arange(x.size) if on_nodes else np.full(x.size, -1)
-        blocks: Samples = layer_blocks(x, rho, own, self.x, self.rho, e2, modes, rule, weights)
-        return blocks
+        blocks = np.empty((modes, x.size, 3, *self.x.shape, 3))
+        layer_blocks(x, rho, own, self.x, self.rho, e2, *self.rule, blocks)
+        return blocks.reshape(modes, 3 * x.size, 3 * self.size)
 
     def matrices(self, modes: int) -> Samples:
         """Matrix of each mode, (modes, 3 nodes, 3 nodes), 8 pi mu times velocity over density.
@@ -286,7 +285,9 @@ class Sources:
         for wire in self.wires:
             at = slice(start, start + len(wire.points))
             moved = self.x[at] + dx * wire.blob, self.rho[at] + drho * wire.blob
-            found.append(ring_blocks(x, rho, *moved, wire.blob**2, modes))
+            blocks = np.empty((modes, x.size, 3, len(wire.points), 3))
+            ring_blocks(x, rho, *moved, wire.blob**2, blocks)
+            found.append(blocks.reshape(modes, 3 * x.size, -1))
             start += len(wire.points)
         return np.concatenate(found, axis=2)
 

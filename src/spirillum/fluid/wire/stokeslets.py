@@ -222,10 +222,13 @@ def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSy
     none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))
     if not wires:
         return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), none, nothing)
-    points = np.ascontiguousarray(np.concatenate([wire.points for wire, _ in wires]))
+    points = np.concatenate([wire.points for wire, _ in wires])
     e2 = np.concatenate([np.full(len(wire.points), wire.blob**2) for wire, _ in wires])
     part = np.concatenate([np.full(len(wire.points), part) for wire, part in wires])
-    forces: Samples = force_matrix(points, e2)
+    shape = len(points), 3
+    forces = np.empty(shape + shape)
+    force_matrix(points, e2, forces)
+    forces = forces.reshape(3 * len(points), -1)
     motion = _on_part(np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=-1), part)
     if accuracy == "standard":
         own: Samples = np.sum([_own_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
@@ -286,7 +289,10 @@ def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple
     )
     lengths = np.concatenate([wire.lengths for wire in wires])
     a2 = np.concatenate([np.full(len(wire.points), wire.radius**2) for wire in wires])
-    across, gradients = moment_matrices(points, e2, moments)
+    stations, shape = (len(points), 3), moments.shape[:2]
+    across, gradients = np.empty(stations + shape), np.empty(shape + shape)
+    moment_matrices(points, e2, moments, across, gradients)
+    across, gradients = across.reshape(points.size, -1), gradients.reshape(int(np.prod(shape)), -1)
     missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * np.array([4.0, 4.0, 4.0, 2.0, 2.0])
     gradients[np.diag_indices_from(gradients)] += missing.ravel()
     return moments, across, gradients
