@@ -10,29 +10,49 @@ static void cubic_weights(double t, double weights[4]) {
     weights[3] = (0.5 * t - 0.5) * t * t;
 }
 
-static double interpolated(const double *picture, int64_t width, double u, double v) {
+/* A place between the pixels of a picture: the first of 4 x 4 pixels about it, and their weights. */
+typedef struct {
+    const float *first;
+    double along[4], down[4];
+} Place;
+
+static Place place_at(const float *picture, int64_t width, int64_t channels, double u, double v) {
     const int64_t column = (int64_t)u, row = (int64_t)v;
-    double along[4], down[4], total = 0.0;
-    cubic_weights(u - (double)column, along);
-    cubic_weights(v - (double)row, down);
+    Place place = {.first = picture + ((row - 1) * width + column - 1) * channels};
+    cubic_weights(u - (double)column, place.along);
+    cubic_weights(v - (double)row, place.down);
+    return place;
+}
+
+/* Value of a channel; `next` and `below` are the steps to the next pixel and to that below. */
+static double value_at(const Place *p, int64_t channel, int64_t next, int64_t below) {
+    double total = 0.0;
     for (int j = 0; j < 4; j++) {
-        const double *line = picture + (row - 1 + j) * width + column - 1;
-        total += down[j] * (along[0] * line[0] + along[1] * line[1] + along[2] * line[2] + along[3] * line[3]);
+        const float *line = p->first + channel + j * below;
+        const double left = p->along[0] * (double)line[0] + p->along[1] * (double)line[next];
+        total += p->down[j] * (left + p->along[2] * (double)line[2 * next] + p->along[3] * (double)line[3 * next]);
     }
     return total;
 }
 
 EXPORT void profiles_across(
-    const double *picture, const double origin[2], const double (*pixels)[2], const double (*normals)[2],
-    const double *offsets, double *profiles, int64_t height, int64_t width, int64_t count, int64_t length
+    const float *picture, const double origin[2], const double (*pixels)[2], const double (*normals)[2],
+    const double *offsets, double *profiles, int64_t height, int64_t width, int64_t channels, int64_t count,
+    int64_t length
 ) {
     const double last_u = (double)width - 2.0, last_v = (double)height - 2.0;
     for (int64_t i = 0; i < count; i++) {
         for (int64_t k = 0; k < length; k++) {
+            double *profile = profiles + i * length + k;
             const double u = pixels[i][0] + offsets[k] * normals[i][0] - origin[0];
             const double v = pixels[i][1] + offsets[k] * normals[i][1] - origin[1];
-            const bool inside = 1.0 <= u && u < last_u && 1.0 <= v && v < last_v;
-            profiles[i * length + k] = inside ? interpolated(picture, width, u, v) : NAN;
+            if (!(1.0 <= u && u < last_u && 1.0 <= v && v < last_v)) {
+                for (int64_t c = 0; c < channels; c++) profile[c * count * length] = NAN;
+                continue;
+            }
+            const Place place = place_at(picture, width, channels, u, v);
+            for (int64_t c = 0; c < channels; c++)
+                profile[c * count * length] = value_at(&place, c, channels, width * channels);
         }
     }
 }

@@ -69,9 +69,10 @@ static void stripe_colour(const Pattern *p, double angle, double blur, double ro
     const double scale = 1.0 / (sqrt(2.0) * blur);
     const double before = inside * scale < 3.0 ? 0.5 * (1.0 + erf(inside * scale)) : 1.0;
     const double after = (inside - width) * scale > -3.0 ? 0.5 * (1.0 + erf((inside - width) * scale)) : 0.0;
-    const int64_t k = ((int64_t)whole % p->stripes + p->stripes) % p->stripes;
-    const double *one = p->palette[p->order[(k + p->stripes - 1) % p->stripes]], *two = p->palette[p->order[k]];
-    const double *three = p->palette[p->order[(k + 1) % p->stripes]];
+    const double turns = floor(whole / (double)p->stripes);
+    const int64_t last = p->stripes - 1, k = (int64_t)(whole - (double)p->stripes * turns);
+    const double *one = p->palette[p->order[k > 0 ? k - 1 : last]], *two = p->palette[p->order[k]];
+    const double *three = p->palette[p->order[k < last ? k + 1 : 0]];
     for (int c = 0; c < 3; c++) colour[c] = one[c] * (1.0 - before) + two[c] * (before - after) + three[c] * after;
 }
 

@@ -55,14 +55,16 @@ def test_places_and_slopes_are_those_of_the_camera(rng: np.random.Generator) -> 
 
 
 def test_profiles_follow_a_parabola_exactly_and_end_at_the_border(rng: np.random.Generator) -> None:
-    v, u = np.mgrid[:40, :50].astype(float)
+    v, u = np.mgrid[:40, :50]
+    picture = np.stack([u**2 - u * v + 3 * v, 5 * u + v], axis=-1).astype(np.float32)
     pixels, normals, offsets = rng.uniform([0.0, 0.0], [60.0, 50.0], (80, 2)), unit(rng, 80), np.arange(-3.0, 4.0)
-    found = np.empty((80, 7))
-    profiles_across(u**2 - u * v + 3.0 * v, np.array([5.0, 4.0]), pixels, normals, offsets, found)
+    found = np.empty((2, 80, 7))
+    profiles_across(picture, np.array([5.0, 4.0]), pixels, normals, offsets, found)
     x, y = np.moveaxis(pixels[:, None] + offsets[:, None] * normals[:, None] - [5.0, 4.0], -1, 0)
     inside = (x >= 1.0) & (x < 48.0) & (y >= 1.0) & (y < 38.0)
-    assert np.array_equal(np.isfinite(found), inside)
-    assert np.allclose(found[inside], (x**2 - x * y + 3.0 * y)[inside], rtol=1e-12)
+    assert np.array_equal(np.isfinite(found), [inside, inside])
+    assert np.allclose(found[0][inside], (x**2 - x * y + 3.0 * y)[inside], rtol=1e-12)
+    assert np.allclose(found[1][inside], (5.0 * x + y)[inside], rtol=1e-12)
 
 
 def test_shifts_are_those_of_linear_least_squares(rng: np.random.Generator) -> None:

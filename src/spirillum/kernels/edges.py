@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from spirillum.kernels.native import Array, Float64, Int64, native
+from spirillum.kernels.native import Array, Float32, Float64, Int64, native
 
 
 @native("profiles")
 def profiles_across(
-    picture: Float64[Array, "h w"],
+    picture: Float32[Array, "h w channels"],
     origin: Float64[Array, "2"],
     pixels: Float64[Array, "n 2"],
     normals: Float64[Array, "n 2"],
     offsets: Float64[Array, "m"],
-    profiles: Float64[Array, "n m"],
+    profiles: Float64[Array, "channels n m"],
 ) -> None:
     """Brightness profiles along the normals of edge points, by cubic convolution; NaN outside of the region.
 
     Args:
-        picture: brightness of a region of the picture.
+        picture: brightness, or colours, of a region of the picture.
         origin: pixel (u, v) of the region's upper left corner.
         pixels: the edge points.
         normals: unit directions.

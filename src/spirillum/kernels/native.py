@@ -118,6 +118,18 @@ def rows_in_one_thread() -> Iterator[None]:
         _alone.reset(token)
 
 
+def _pointer(array: np.ndarray[Any, Any]) -> Any:
+    """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
+    try:
+        return ctypes.byref(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):  # of a read-only or an empty one
+        return array.ctypes.data
+
+
+_PASSED: dict[Any, Callable[[Any], Any]] = {float: float, int: int, bool: int}
+"""What ctypes takes for a number."""
+
+
 class _ArrayArgument:
     """Check of an array."""
 
@@ -127,21 +139,23 @@ class _ArrayArgument:
         shape = annotation.dim_str.split()
         self.shape = None if shape == ["..."] else tuple(int(size) if size.isdigit() else size for size in shape)
 
-    def checked(self, value: Any, sizes: _Sizes) -> np.ndarray[Any, Any]:
-        """Return the array as C takes it; add its named lengths to those of the call."""
-        if not isinstance(value, np.ndarray) or value.dtype != self.dtype or not value.flags.c_contiguous:
-            if self.is_written:
-                raise TypeError(f"{self.name} must be a contiguous array of {self.dtype}")
-            value = np.asarray(value).astype(self.dtype, order="C", casting="same_kind")
-        if self.shape is None:
+    def accepted(self, value: Any) -> np.ndarray[Any, Any]:
+        """Return the array as C takes it."""
+        if isinstance(value, np.ndarray) and value.dtype == self.dtype and value.flags.c_contiguous:
             return value
-        shape = value.shape
+        if self.is_written:
+            raise TypeError(f"{self.name} must be a contiguous array of {self.dtype}")
+        return np.asarray(value).astype(self.dtype, order="C", casting="same_kind")
+
+    def add_sizes(self, shape: tuple[int, ...], sizes: _Sizes) -> None:
+        """Check a shape; add its named lengths to those of the call."""
+        if self.shape is None:
+            return
         fits = len(shape) == len(self.shape)
         for length, size in zip(shape, self.shape, strict=False):
             fits &= length == (sizes.setdefault(size, length) if isinstance(size, str) else size)
         if not fits:
             raise ValueError(f"{self.name} has shape {shape}; expected {self.shape} with {sizes}")
-        return value
 
 
 class _Call:
@@ -154,34 +168,44 @@ class _Call:
             None if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)
             for name, hint in hints.items()
         ]
-        names = [size for argument in self._arguments if argument for size in argument.shape or ()]
-        self._sizes = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
+        self._arrays = [argument for argument in self._arguments if argument]
+        names = [size for argument in self._arrays for size in argument.shape or ()]
+        self._names = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
         self._rows = rows
         self._function = library()[symbol]
         self._function.restype = _SCALARS.get(returned)
         self._function.argtypes = [
             *(_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()),
-            *(ctypes.c_int64 for _ in self._sizes),
+            *(ctypes.c_int64 for _ in self._names),
         ]
-        self._is_whole = [hint in {int, bool} for hint in hints.values()]
+        self._passed = [_PASSED.get(hint, _pointer) for hint in hints.values()]
         self._is_truth = returned is bool
+        self._last: tuple[list[tuple[int, ...]], _Sizes] | None = None
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
-        sizes: _Sizes = {}
         values = [
-            value if expected is None else expected.checked(value, sizes)
+            value if expected is None else expected.accepted(value)
             for value, expected in zip(arguments, self._arguments, strict=True)
         ]
+        sizes = self._sizes([value.shape for value, expected in zip(values, self._arguments, strict=True) if expected])
         if self._rows and not in_one_thread():
             return self._run_in_threads(values, sizes)
         return self._run(values, sizes)
 
+    def _sizes(self, shapes: list[tuple[int, ...]]) -> _Sizes:
+        """Return the named lengths of arrays; those of the last call are known."""
+        last = self._last
+        if last is not None and last[0] == shapes:
+            return last[1]
+        sizes: _Sizes = {}
+        for expected, shape in zip(self._arrays, shapes, strict=True):
+            expected.add_sizes(shape, sizes)
+        self._last = shapes, sizes
+        return sizes
+
     def _run(self, values: list[Any], sizes: _Sizes) -> Any:
-        pointers = [
-            int(value) if is_whole else _pointer(value) if isinstance(value, np.ndarray) else value
-            for value, is_whole in zip(values, self._is_whole, strict=True)
-        ]
-        result = self._function(*pointers, *[sizes[name] for name in self._sizes])
+        passed = [as_passed(value) for as_passed, value in zip(self._passed, values, strict=True)]
+        result = self._function(*passed, *[sizes[name] for name in self._names])
         return bool(result) if self._is_truth else result
 
     def _run_in_threads(self, values: list[Any], sizes: _Sizes) -> None:
@@ -196,10 +220,3 @@ class _Call:
         edges = np.linspace(0, count, min(_SHARES * _THREADS, count) + 1).astype(int).tolist()
         with ThreadPoolExecutor(_THREADS) as pool:
             list(pool.map(run, edges[:-1], edges[1:]))
-
-
-def _pointer(array: np.ndarray[Any, Any]) -> Any:
-    """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
-    if array.size and array.flags.writeable:
-        return ctypes.byref(ctypes.c_char.from_buffer(array))
-    return array.ctypes.data

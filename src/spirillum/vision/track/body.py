@@ -44,8 +44,8 @@ class PoseFit(NamedTuple):
 class _Part(NamedTuple):
     """A part of a picture, blurred a little."""
 
-    grey: Samples
-    """Brightness, (h, w)."""
+    grey: np.ndarray
+    """Brightness, (h, w, 1), single precision."""
     origin: Samples
     """Pixel (u, v) of its upper left corner, (2,)."""
     colours: ColourPart | None
@@ -244,16 +244,16 @@ class BodyFinder:
         ends = [int(np.clip(value, a, b)) for value, a, b in ((low[0], left, right), (low[1], top, bottom))]
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
-            return _Part(np.zeros((1, 1)), np.zeros(2), None)
+            return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None)
         bounds = ends[0], ends[1], stops[0], stops[1]
         grey = grey_part(image, bounds, OUTLINE.blur)
         colours = None if self.seal is None else colour_part(image, bounds, OUTLINE.blur)
         return _Part(grey, np.array(ends, dtype=float), colours)
 
     def _profiles(self, part: _Part, pixels: Samples, normals: Samples) -> Samples:
-        out = np.empty((len(pixels), self.offsets.size))
+        out = np.empty((1, len(pixels), self.offsets.size))
         profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
-        return out
+        return np.asarray(out[0])
 
     def _learn_profiles(self, stack: Samples) -> None:
         """Learn each edge's template: the first principal component of its profiles and those of its neighbours."""
@@ -426,12 +426,12 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray
         return np.nan
 
 
-def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:
-    """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255."""
+def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> np.ndarray:
+    """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255, (h, w, 1)."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(image[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
-    return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur), dtype=float)
+    return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))[..., None]
 
 
 def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:

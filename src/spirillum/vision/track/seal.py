@@ -25,8 +25,8 @@ _FLANKS = False, True, True, False
 class ColourPart(NamedTuple):
     """Blurred colours of a part of a picture."""
 
-    channels: tuple[Samples, Samples, Samples]
-    """Red, green and blue, (h, w) each."""
+    picture: np.ndarray
+    """Red, green and blue, (h, w, 3), single precision."""
     origin: Samples
     """Pixel (u, v) of its upper left corner, (2,)."""
 
@@ -159,8 +159,7 @@ class SealEdges:
     def _colours(self, part: ColourPart, pixels: Samples, normals: Samples) -> Samples:
         """Colour profiles along the normals, (3, n, m)."""
         colours = np.empty((3, len(pixels), self._offsets.size))
-        for channel, out in zip(part.channels, colours, strict=True):
-            profiles_across(channel, part.origin, pixels, normals, self._offsets, out)
+        profiles_across(part.picture, part.origin, pixels, normals, self._offsets, colours)
         return colours
 
     def _profiles(self, part: ColourPart, pixels: Samples, normals: Samples) -> _Profiles:
@@ -238,8 +237,7 @@ def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: floa
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     part = cv2.GaussianBlur(image[top:bottom, left:right].astype(np.float32), (0, 0), blur)
-    red, green, blue = (np.ascontiguousarray(part[..., channel], dtype=float) for channel in range(3))
-    return ColourPart((red, green, blue), np.array([left, top], dtype=float))
+    return ColourPart(np.asarray(part), np.array([left, top], dtype=float))
 
 
 def _most_of(steps: Samples, spread: Samples, away: Samples) -> Samples:
