@@ -14,8 +14,6 @@ HEAVY = (
     "h5py",
     "jinja2",
     "pandas",
-    "numba",
-    "llvmlite",
     "emcee",
     "arviz_base",
     "arviz_stats",
@@ -77,10 +75,6 @@ def test_importing_the_package_loads_no_library(loaded: Loaded) -> None:
 def test_help_loads_nothing_heavy(loaded: Loaded) -> None:
     assert "typer" in loaded.helped
     assert not loaded.helped & {*HEAVY, "numpy"}
-
-
-def test_model_in_closed_form_loads_nothing_compiled(loaded: Loaded) -> None:
-    assert "numba" not in loaded.closed
 
 
 def test_one_prediction_draws_no_picture(loaded: Loaded) -> None:

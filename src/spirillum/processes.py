@@ -22,7 +22,7 @@ from spirillum.errors import InputError
 AHEAD = 3
 """Tasks that wait or are answered for each process: what is sent ahead and what is not yet taken stays in memory."""
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
 

@@ -1,6 +1,7 @@
 """Held, trial and steady motion of one robot in its tube: `predict`, `simulate` and `settle` give the same numbers."""
 
 import math
+import pickle
 from typing import Any
 
 import pytest
@@ -123,6 +124,13 @@ def test_without_a_table_the_reason_says_how_to_get_one() -> None:
     trial = sp.predict(robot).trial
     assert trial is not None
     assert "`spirillum prepare` makes it" in trial.reason
+
+
+def test_an_answer_goes_to_another_process_before_its_columns_are_computed(driven: sp.Robot) -> None:
+    for sent in (sp.predict(driven), sp.predict(driven, tail_rate="1.2 Hz")):
+        there = pickle.loads(pickle.dumps(sent))
+        assert set(there.released) == {"trial", "steady"}
+        assert there.forward_velocity == sent.forward_velocity
 
 
 @pytest.mark.parametrize("options", [{"motion": "held"}, {"tail_rate": "1.2 Hz"}, {"model": "sbt"}])

@@ -14,6 +14,7 @@ from spirillum.pages import simulation_thread as module
 from spirillum.pages.job import BackgroundJob, worker
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.simulation_thread import SimulationThread
+from spirillum.swimming import model_choice
 
 
 @pytest.fixture
@@ -87,6 +88,43 @@ def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: Sim
     until(lambda: refused or lane_of(theatre)["trouble"])
     theatre.ask({"do": "preset", "value": "ecoli"}, refused.append)
     until(lambda: lane_of(theatre)["swims_by"] and lane_of(theatre)["numbers"])
+
+
+class Made:
+    """A table in preparation, as the page sees it."""
+
+    asked: list[Any] = []  # noqa: RUF012 - emptied by the test
+
+    def __init__(self, robot: Any, _tell: Callable[[], None]) -> None:
+        self.robot, self.running, self.said = robot, True, {"what": "table"}
+        Made.asked.append(self)
+
+    def progress(self) -> dict[str, Any]:
+        return self.said
+
+    def stop(self) -> None:
+        self.running, self.said = False, {"failed": "it was left off"}
+
+
+def test_a_robot_without_a_table_swims_provisionally_until_its_table_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_choice, "has_table", lambda *_: bool(Made.asked) and not Made.asked[-1].running)
+    monkeypatch.setattr(module, "Preparing", Made)
+    monkeypatch.setattr(module, "_UNTOUCHED", 0.1)
+    Made.asked.clear()
+    theatre = SimulationThread("biorob2012-wide", lambda: None)
+    theatre.look(True)
+    theatre.start()
+    try:
+        until(lambda: lane_of(theatre)["numbers"] and Made.asked)
+        shown = lane_of(theatre)
+        assert (shown["provisional"], shown["swims_by"], shown["numbers"]["model"]) == (True, "slender", "slender")
+        assert shown["caution"].startswith("provisional, without walls")
+        Made.asked[0].said, Made.asked[0].running = {"done": True}, False
+        until(lambda: lane_of(theatre)["swims_by"] == "tube" and lane_of(theatre)["numbers"])
+        assert not lane_of(theatre)["provisional"]
+        assert len(Made.asked) == 1
+    finally:
+        theatre.stop()
 
 
 @pytest.mark.parametrize(

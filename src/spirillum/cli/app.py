@@ -103,10 +103,14 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
     from spirillum.cli import renderer
+    from spirillum.papers.biorob2012.published import published_beside
 
     with renderer.progress_bar(quiet=json) as progress:
-        answer = request(progress=progress).to_dict()
-    renderer.show(answer, json=json, all_of_it=all_of_it)
+        result = request(progress=progress)
+        answer = result.to_dict()
+        published = published_beside(result)
+    more = {"published": published} if published else {}
+    renderer.show({**answer, **more}, json=json, all_of_it=all_of_it)
 
 
 @from_function("spirillum.swimming.comparison:compare_models", without=NO_FORM)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,8 @@ class TrialRequest:
         if not wanted:
             return held
         if reason:
-            return replace(held, released=dict.fromkeys(("trial", "steady"), lambda: ReleasedMotion(reason=reason)))
-        return replace(held, released={"trial": lambda: self.trial(held), "steady": self.steady})
+            return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
+        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""

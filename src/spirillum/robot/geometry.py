@@ -178,8 +178,8 @@ class Fluid(Section):
     density: Density
     """Density rho (Table I)."""
     cavitation_pressure: PressureOrNone = 1e5
-    """How far below its surroundings the pressure of a lubrication film may fall before the liquid cavitates, or `none` for
-    films without a bound. Assumed: one atmosphere; liquids with dissolved air cavitate from a tenth of it on."""
+    """How far the pressure of a lubrication film may fall below its surroundings before the liquid cavitates, or `none`
+    for films without a bound. Assumed: one atmosphere; a liquid with dissolved air may cavitate from a tenth of it on."""
 
 
 def arc_fraction(wavelength: Values, amplitude: Values) -> Values:

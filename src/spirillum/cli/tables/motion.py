@@ -51,6 +51,11 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield f"and {more} more quantities: --all"
     if "trial" in answer:
         yield from released_columns(answer)
+    for item in answer.get("published", ()):
+        ours = ", ".join(
+            f"{name} {in_words(value)}" for name, value in item["ours"].items() if value["value"] is not None
+        )
+        yield f"published ({item['source']}): {item['case']}: {in_words(item['published'])}; here: {ours}"
     yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
     if "lying" in answer:
         yield from resting_pose(answer["lying"])

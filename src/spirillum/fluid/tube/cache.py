@@ -24,9 +24,10 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, clipped
 from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.solids import MOTIONS
+from spirillum.kernels.native import sources_digest
 
 _PACKAGE = Path(__file__).parents[2]
-_LIBRARIES = ("numpy", "scipy", "numba")
+_LIBRARIES = ("numpy", "scipy")
 _IMPORT = re.compile(
     rb"^[ \t]*(?:from (spirillum[\w.]*) import (\([^)]*\)|[^\n]*)|import (spirillum[\w.]*))", re.MULTILINE
 )
@@ -124,11 +125,12 @@ def unsealed(stored: bytes) -> bytes | None:
 
 @lru_cache(maxsize=8)
 def digest_of(module: str) -> str | None:
-    """Digest of the source of a module and its imports, once per process; None if the source is not available."""
+    """Digest of the source of a module, its imports and csrc/, once per process; None if the source is not available."""
     sources = imported_sources(module)
     if module not in sources:
         return None
-    found = hashlib.sha256(" ".join(version(name) for name in _LIBRARIES).encode())
+    used = (*(version(name) for name in _LIBRARIES), sources_digest())
+    found = hashlib.sha256(" ".join(used).encode())
     for name in sorted(sources):
         found.update(f" {name} {len(sources[name])} ".encode() + sources[name])
     return found.hexdigest()

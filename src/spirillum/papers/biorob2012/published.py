@@ -1,0 +1,72 @@
+"""Numbers that the paper states of a robot that is predicted, beside those of the prediction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spirillum.dynamics.prediction import predict
+from spirillum.envelope import quantity
+from spirillum.papers.biorob2012.evidence import VELOCITY_DROPS
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.swimming.prediction import Prediction
+
+_WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
+_SOURCE = "BioRob 2012, text on Figs 5 and 6"
+
+
+def published_beside(found: Prediction) -> list[dict[str, Any]]:
+    """Return what the paper states of this robot, with our held and trial values; empty for any other request.
+
+    The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
+    one, with two of its tails.
+
+    Args:
+        found: the prediction, with its released motions.
+    """
+    if (
+        not found.released
+        or found.tail_rate is not None
+        or found.batch.placement != RobotBatch.of(found.robot).placement
+        or found.fitted_by
+    ):
+        return []
+    for own, other, sign in ((_WIDE, _NARROW, 1.0), (_NARROW, _WIDE, -1.0)):
+        if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
+            beside = predict(_with_tail_of(found.robot, other))
+            return [_entry(drop, found, beside, sign) for drop in _drops(found.robot)]
+    return []
+
+
+def _with_tail_of(robot: Robot, preset: str) -> Robot:
+    """A preset with the tail of a robot."""
+    paper = load(preset)
+    changed = {"wavelength": robot.tail.wavelength, "amplitude": robot.tail.amplitude}
+    return paper.model_copy(update={"tail": paper.tail.model_copy(update=changed)})
+
+
+def _drops(robot: Robot) -> list[float]:
+    """Decreases of the speed that the paper states for a tail, m/s."""
+    own = (round(1e3 * robot.tail.wavelength, 6), round(1e3 * robot.tail.amplitude, 6))
+    return [1e-3 * one.value_mm_s for one in VELOCITY_DROPS.values() if (one.wavelength_mm, one.amplitude_mm) == own]
+
+
+def _entry(published: float, found: Prediction, beside: Prediction, sign: float) -> dict[str, Any]:
+    ours = {
+        "held": sign * (found.forward_velocity - beside.forward_velocity),
+        "trial": _difference(found, beside, sign),
+    }
+    return {
+        "quantity": "forward_velocity",
+        "case": "by how much it is faster in the wide channel than in the narrow one",
+        "published": quantity(published, "m/s"),
+        "ours": {name: quantity(value, "m/s") for name, value in ours.items()},
+        "source": _SOURCE,
+    }
+
+
+def _difference(found: Prediction, beside: Prediction, sign: float) -> float | None:
+    """Difference of the trials' speeds, m/s; None where one has none."""
+    speeds = [None if one.trial is None else one.trial.values.get("forward_velocity") for one in (found, beside)]
+    return None if speeds[0] is None or speeds[1] is None else sign * (speeds[0] - speeds[1])
