@@ -37,14 +37,12 @@ class Loaded(NamedTuple):
 
     imported: set[str]
     helped: set[str]
-    closed: set[str]
     tube: set[str]
 
 
 STEPS = (
     "import spirillum",
     "for said in (['--help'], ['predict', '--help'], ['page', '--help'], ['--version']): command(said)",
-    "command(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])",
     "command(['predict', 'biorob2012-wide', '--json'])",
 )
 

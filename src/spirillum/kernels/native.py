@@ -121,7 +121,7 @@ def rows_in_one_thread() -> Iterator[None]:
 def _pointer(array: np.ndarray[Any, Any]) -> Any:
     """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
     try:
-        return ctypes.byref(ctypes.c_char.from_buffer(array))
+        return ctypes.byref(ctypes.c_char.from_buffer(cast("bytearray", array)))
     except (TypeError, ValueError):  # of a read-only or an empty one
         return array.ctypes.data
 
@@ -172,12 +172,10 @@ class _Call:
         names = [size for argument in self._arrays for size in argument.shape or ()]
         self._names = tuple(dict.fromkeys(name for name in names if isinstance(name, str)))
         self._rows = rows
-        self._function = library()[symbol]
+        self._function: Any = library()[symbol]
         self._function.restype = _SCALARS.get(returned)
-        self._function.argtypes = [
-            *(_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()),
-            *(ctypes.c_int64 for _ in self._names),
-        ]
+        passed: list[Any] = [_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()]
+        self._function.argtypes = passed + [ctypes.c_int64] * len(self._names)
         self._passed = [_PASSED.get(hint, _pointer) for hint in hints.values()]
         self._is_truth = returned is bool
         self._last: tuple[list[tuple[int, ...]], _Sizes] | None = None
@@ -211,7 +209,7 @@ class _Call:
     def _run_in_threads(self, values: list[Any], sizes: _Sizes) -> None:
         """Let threads share the rows of the arrays whose first dimension has this name."""
         count = sizes[self._rows]
-        shared = [bool(argument and argument.shape) and argument.shape[0] == self._rows for argument in self._arguments]
+        shared = [argument is not None and (argument.shape or ("",))[0] == self._rows for argument in self._arguments]
 
         def run(low: int, high: int) -> None:
             part = [value[low:high] if cut else value for value, cut in zip(values, shared, strict=True)]

@@ -179,7 +179,7 @@ class Fluid(Section):
     """Density rho (Table I)."""
     cavitation_pressure: PressureOrNone = 1e5
     """How far the pressure of a lubrication film may fall below its surroundings before the liquid cavitates, or `none`
-    for films without a bound. Assumed: one atmosphere; a liquid with dissolved air may cavitate from a tenth of it on."""
+    for films without a bound. Assumed: one atmosphere; a liquid with dissolved air may cavitate at a tenth of it."""
 
 
 def arc_fraction(wavelength: Values, amplitude: Values) -> Values:

@@ -252,8 +252,8 @@ class Painter:
             self._cover.refract(picture, glass, left, top, float(middle.position[2]))
         for part in parts:
             sample(part, part[0].shading(part[1], self._lamps))
-        _, *still = self.still
-        blend(depth, samples, left, top, *still, self._shadow(middle), self._tint, picture)
+        _, over, shine, floor = self.still
+        blend(depth, samples, left, top, over, shine, floor, self._shadow(middle), self._tint, picture)
         if self._cover is not None and glass is not None:
             self._cover.shine(picture, glass, left, top)
         return picture

@@ -125,7 +125,7 @@ def unsealed(stored: bytes) -> bytes | None:
 
 @lru_cache(maxsize=8)
 def digest_of(module: str) -> str | None:
-    """Digest of the source of a module, its imports and csrc/, once per process; None if the source is not available."""
+    """Digest of the source of a module, its imports and csrc/, once per process; None if it is not available."""
     sources = imported_sources(module)
     if module not in sources:
         return None

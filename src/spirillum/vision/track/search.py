@@ -107,7 +107,7 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
         for heading in (np.deg2rad(SEARCH.headings) + turn).tolist():
             pixels, normals, _, _ = contour.places(BodyPose(float(at[0]), float(at[1]), heading), optics)
             small = (pixels - np.array([left, top])) / factor - 0.5 + 0.5 / factor
-            edge_scores(slope_u, slope_v, small, normals, contour.group, *shift, work, scores)
+            edge_scores(slope_u, slope_v, small, normals, contour.group, float(shift[0]), float(shift[1]), work, scores)
             best = np.argpartition(scores, -SEARCH.peaks, axis=None)[-SEARCH.peaks :]
             peaks.append(scores.ravel()[best])
             places.append(start + factor * (shift + np.column_stack(np.divmod(best, scores.shape[1]))))
@@ -182,7 +182,9 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
             heading = pose.heading + float(turn)
             pixels, normals, _, _ = contour.places(BodyPose(pose.x, pose.y, heading), optics)
-            edge_scores(slope_u, slope_v, pixels - low, normals, contour.group, *shift, work, scores)
+            edge_scores(
+                slope_u, slope_v, pixels - low, normals, contour.group, float(shift[0]), float(shift[1]), work, scores
+            )
             if scores.max() > best.score:
                 place = shift + np.unravel_index(np.argmax(scores), scores.shape)
                 middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + place
