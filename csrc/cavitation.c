@@ -67,7 +67,7 @@ static double edge_of(double a, double b, double k[MOMENTS]) {
         if (!(low < next && next < high)) next = 0.5 * (low + high);
         const double moved = fabs(next - xi);
         xi = next;
-        if (moved <= 1e-15 * (1.0 + fabs(xi))) break;
+        if (moved <= 1e-8 * (1.0 + fabs(xi))) break; /* the next one would be its square */
     }
     set_moments(xi, k);
     return xi;

@@ -67,8 +67,11 @@ def test_robots_that_stand_or_are_lost_are_counted_and_told() -> None:
 def test_what_is_stated_is_not_varied() -> None:
     stated = {"wait": 5.0, "roughness": None, "friction_coefficient": 0.2}
     known = sp.load("biorob2012-wide", **{"friction.effective": "1e-5 N m s/rad"})
-    assert [one.name for one in open_unknowns(known, WEIGHT, stated)] == ["roughness", "weight"]
-    assert [one.name for one in open_unknowns(known, 0.0, stated)] == ["roughness"]
+    fluid = "fluid.cavitation_pressure"
+    assert [one.name for one in open_unknowns(known, WEIGHT, stated)] == ["roughness", "weight", fluid]
+    assert [one.name for one in open_unknowns(known, 0.0, stated)] == ["roughness", fluid]
+    all_stated = sp.load("biorob2012-wide", **{"friction.effective": "1e-5 N m s/rad", fluid: "none"})
+    assert [one.name for one in open_unknowns(all_stated, 0.0, stated)] == ["roughness"]
     sample = samples_of(known, WEIGHT, open_unknowns(known, WEIGHT, stated))
     assert {one.wait for one in sample} == {None}
     assert {one.robot.friction.effective for one in sample} == {1e-5}

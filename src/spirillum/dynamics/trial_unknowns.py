@@ -78,6 +78,14 @@ UNKNOWNS = (
         "the rotor's own B_m",
         "no seal has less than the bearings alone; B_eff inferred from trials is 10 to 16 times that",
     ),
+    TrialUnknown(
+        "fluid.cavitation_pressure",
+        "log-uniform",
+        1e4,
+        1e5,
+        "Pa",
+        "one atmosphere for a liquid without gas; one with dissolved air may cavitate at a tenth of it",
+    ),
 )
 """What the interval of a trial is over, in the order of the columns of its sample."""
 
@@ -102,6 +110,7 @@ def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> 
     free = {name for name, value in stated.items() if value is None}
     free |= {"weight"} if weight and robot.body.mass is not None else set()
     free |= {"friction.effective"} if robot.motor is not None and robot.friction.effective is None else set()
+    free |= {"fluid.cavitation_pressure"} - {f"fluid.{name}" for name in robot.fluid.model_fields_set}
     return tuple(one for one in UNKNOWNS if one.name in free)
 
 
@@ -118,6 +127,9 @@ def samples_of(robot: Robot, weight: float, unknowns: Sequence[TrialUnknown]) ->
         if "friction.effective" in own and robot.motor is not None:
             effective = own["friction.effective"] * robot.motor.rotor_friction
             one = one.model_copy(update={"friction": one.friction.model_copy(update={"effective": effective})})
+        if "fluid.cavitation_pressure" in own:
+            bound = {"cavitation_pressure": own["fluid.cavitation_pressure"]}
+            one = one.model_copy(update={"fluid": one.fluid.model_copy(update=bound)})
         height = 0.5 * robot.body.diameter * own["roughness"] if "roughness" in own else None
         found.append(TrialSample(one, own.get("wait"), height, own.get("friction_coefficient")))
     return found
