@@ -164,44 +164,83 @@ static void touch(Touch *t) {
 static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
 static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
 
+/* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
+ * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. */
+static double largest_share(const double f[6][6], const double s[6][6]) {
+    double l[6][6] = {{0.0}}, m[6][6], next[6][6];
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j <= i; j++) {
+            double left = f[i][j];
+            for (int k = 0; k < j; k++) left -= l[i][k] * l[j][k];
+            l[i][j] = i == j ? sqrt(left) : left / l[j][j];
+        }
+    for (int pass = 0; pass < 2; pass++) { /* L^-1 S, and then of its transpose */
+        for (int j = 0; j < 6; j++)
+            for (int i = 0; i < 6; i++) {
+                double left = pass ? next[j][i] : s[i][j];
+                for (int k = 0; k < i; k++) left -= l[i][k] * m[k][j];
+                m[i][j] = left / l[i][i];
+            }
+        for (int n = 0; n < 36; n++) next[n / 6][n % 6] = m[n / 6][n % 6];
+    }
+    double logarithm = 0.0;
+    for (int power = 1; power <= 64; power *= 2) {
+        double trace = 0.0;
+        for (int i = 0; i < 6; i++) trace += m[i][i];
+        logarithm += log(trace) / power;
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++) {
+                next[i][j] = 0.0;
+                for (int k = 0; k < 6; k++) next[i][j] += m[i][k] * m[k][j] / (trace * trace);
+            }
+        for (int n = 0; n < 36; n++) m[n / 6][n % 6] = next[n / 6][n % 6];
+    }
+    return exp(logarithm);
+}
+
+/* A slice at a place along the straight side.
+ *
+ * Its velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference, with
+ * v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. */
+static Slice slice_at(const TubeRobot *robot, const State *y, const double rotation[3][3], double x, double length) {
+    const double a = robot->table.film.body, radius = robot->tube->radius;
+    const Site site = {.x = x, .ring = a};
+    const Nearest at = site_nearest(&site, y, rotation, radius);
+    Slice s = {.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a), .length = length};
+    double rows[2][RATES];
+    sliding_rows(&at, rotation, 0.0, rows);
+    const double *t = rows[1], axis[RATES] = {t[0], t[1], t[2], 0.0, -x * t[2], x * t[1], 0.0};
+    for (int i = 0; i < RATES; i++) {
+        s.opening[i] = -at.j[i];
+        s.entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
+    }
+    return s;
+}
+
 /* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin.
  *
- * Their velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference,
- * with v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. A film loses
- * pressure at the ends of the body, which slices do not know: their pressure is scaled so that they have the resistance
- * of the table's film to a motion along the normal. What is left of the film then stays positive, too. */
+ * A film loses pressure at the ends of the body and along it where it is tilted, which slices do not know: their
+ * pressure is scaled by what leaves the rest of the table's film positive. The forces are then a convex function's. */
 static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Fluid *fluid,
                        const Seen *seen, Balance *b) {
     const Film *film = &robot->table.film;
-    const double mu = robot->tube->viscosity, a = film->body, radius = robot->tube->radius;
     const double half = 0.5 * (film->front - film->rear);
+    double sliced[6][6] = {{0.0}};
     b->slice_count = 0;
-    b->viscosity = mu;
     b->bound = robot->tube->cavitation;
-    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * a)) return;
-    double normal[3] = {0.0}, sliced = 0.0;
+    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * film->body)) return;
     for (int n = 0; n < MOST_SLICES; n++) {
         const double angle = PI * (n + 0.5) / MOST_SLICES;
-        const Site site = {.x = film->rear + half * (1.0 - cos(angle)), .ring = a};
-        const Nearest at = site_nearest(&site, y, rotation, radius);
-        Slice *s = b->slices + b->slice_count++;
-        double rows[2][RATES];
-        sliding_rows(&at, rotation, 0.0, rows);
-        *s = (Slice){.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a),
-                     .length = half * sin(angle) * PI / MOST_SLICES};
-        const double *t = rows[1];
-        const double axis[RATES] = {t[0], t[1], t[2], 0.0, -site.x * t[2], site.x * t[1], 0.0};
-        for (int i = 0; i < RATES; i++) {
-            s->opening[i] = -at.j[i];
-            s->entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
-        }
-        for (int i = 0; i < 3; i++) normal[i] += at.normal[i] / MOST_SLICES;
-        sliced += s->length * 3.0 * PI * mu * sqrt(2.0 * s->gap) * pow(s->bend, 1.5) / squared(s->gap);
+        const double x = film->rear + half * (1.0 - cos(angle)), length = half * sin(angle) * PI / MOST_SLICES;
+        const Slice *s = b->slices + b->slice_count;
+        b->slices[b->slice_count++] = slice_at(robot, y, rotation, x, length);
+        const double width = sqrt(2.0 * s->bend * s->gap), squeeze = 3.0 * PI * s->bend * width / squared(s->gap);
+        const double roll = 2.0 * PI * width * squared(width) / (s->bend * squared(s->gap));
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++)
+                sliced[i][j] += length * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
     }
-    double whole = 0.0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) whole += mu * normal[i] * fluid->film[i][j] * normal[j];
-    b->viscosity *= smaller(whole / sliced, 1.0);
+    b->viscosity = robot->tube->viscosity / larger(largest_share(fluid->film, sliced), 1.0);
 }
 
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
