@@ -120,7 +120,7 @@ static void add_rings(const void *context, PanelPoints *points) {
     }
 }
 
-/* Single layer on panels (panels, nodes), complex modes (f_x, f_rho, g) ds/du on the nodes, (panels, nodes, modes, 3). */
+/* Single layer on panels: complex modes (f_x, f_rho, g) ds/du on the nodes, (panels, nodes, modes, 3). */
 EXPORT void add_layer(const double *points, const double *x_p, const double *rho_p, const Amplitude *density,
                       const double *nodes, const double *barycentric, const double *fine, const double *fine_weights,
                       const double *weights, double *field, int64_t n, int64_t panels, int64_t size, int64_t modes,

@@ -20,7 +20,8 @@ void open_rings(RingPairs *pairs, int64_t count, double (*a)[LANES], double (*b)
 /* Integral of v cos(m phi)/r^3 with v = 1 - cos(phi). */
 void fill_ring_b_v(const RingPairs *pairs, int64_t m, double (*a)[LANES], double (*b)[LANES], double b_v[LANES]);
 
-/* 3x3 block of mode m, by rows, from a force density on the source to velocities at the target; needs m + 2 integrals. */
+/* 3x3 block of mode m, by rows, from a force density on the source to velocities at the target; m + 2 integrals are
+ * needed. */
 void fill_ring_mode(const RingPairs *pairs, int64_t m, double (*a)[LANES], double (*b)[LANES], double k[9][LANES]);
 
 #endif

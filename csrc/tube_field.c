@@ -123,8 +123,8 @@ static void add_columns(const Places *at, const Sums *sums, Waves w, const WallF
             const double (*re)[LANES] = sums->real + 3 * odd, (*im)[LANES] = sums->imaginary + 3 * odd;
             for (int f = 0; f < 3; f++) {
                 EACH_LANE {
-                    const double scale = p < at->counts[l] ? w.scale[l] : 0.0;
-                    const double along = v[f][l] * (sign * scale * like[l]), out = v[3 + f][l] * (sign * scale * like[l]);
+                    const double scale = p < at->counts[l] ? w.scale[l] : 0.0, as_cos = sign * scale * like[l];
+                    const double along = v[f][l] * as_cos, out = v[3 + f][l] * as_cos;
                     const double around = -v[6 + f][l] * (scale * other[l]);
                     real[l] = out * re[1][l] + around * re[2][l] - along * im[0][l];
                     imaginary[l] = out * im[1][l] + around * im[2][l] + along * re[0][l];
@@ -175,7 +175,8 @@ static void reflect(double weight, const double *layers, const WallFlows *flows,
 EXPORT void wave_amplitudes(const double *wave_k, const double *weights, const int64_t *counts, const double *bessel,
                             double radius, const double *rho, const double *angle, const double *steepest,
                             const int64_t *first, const double *x, const double *forces, double *steps,
-                            double *amplitudes, int64_t waves, int64_t columns, int64_t edges, int64_t n, int64_t most) {
+                            double *amplitudes, int64_t waves, int64_t columns, int64_t edges, int64_t n,
+                            int64_t most) {
     (void)edges, (void)n;
     for (int64_t i = 0; i < waves; i++, amplitudes += 12 * most, steps += most) {
         const double k = wave_k[i], wall = k * radius;

@@ -166,7 +166,8 @@ static void fill_point(const double *restrict extensions, Angle theta, Angle tur
             rows[COS][3 * p + w] = turned.cos;
             rows[SIN][3 * p + w] = turned.sin;
         }
-        turned = (Angle){turned.cos * theta.cos - turned.sin * theta.sin, turned.sin * theta.cos + turned.cos * theta.sin};
+        const double next = turned.cos * theta.cos - turned.sin * theta.sin;
+        turned = (Angle){next, turned.sin * theta.cos + turned.cos * theta.sin};
     }
 }
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.kernels.blobs import force_matrix, moment_matrices
-from spirillum.kernels.field import add_blobs
+from spirillum.kernels.field import add_blobs, add_moments
 
 
 def kernel(x: np.ndarray, e: float) -> np.ndarray:
@@ -65,6 +65,19 @@ def test_pressure_belongs_to_the_velocity(cloud: np.ndarray, e: float) -> None:
     blob = 15 * e**4 / np.sqrt(point @ point + e**2) ** 7
     np.testing.assert_allclose(laplacian - gradient, -blob * force[0], atol=2e-5)  # of order h^2
     assert abs(divergence) < 2e-5
+
+
+def test_flow_of_moments_against_differences_of_blobs(cloud: np.ndarray) -> None:
+    """u = -m[b, k] d_k G[a, b], and the pressure alike, by central differences of displaced forces."""
+    rng, h, e2 = np.random.default_rng(6), 1e-3, np.array([0.04, 0.09])
+    sources, points, moments = cloud[:2], cloud[2:], rng.normal(size=(2, 3, 3))
+    moments -= np.trace(moments, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+    found, wanted = np.ones((5, 4)), np.zeros((5, 4))
+    add_moments(points, sources, moments, e2, found)
+    for k in range(3):
+        for side in (1, -1):
+            add_blobs(points, sources + side * h * np.eye(3)[k], side * moments[:, :, k] / (2 * h), e2, wanted)
+    np.testing.assert_allclose(found - 1, wanted, rtol=0, atol=1e-5 * np.abs(wanted).max())
 
 
 def test_moments_against_differences_of_the_kernel(cloud: np.ndarray) -> None:

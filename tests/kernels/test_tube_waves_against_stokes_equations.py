@@ -10,7 +10,14 @@ from scipy.integrate import quad
 from scipy.special import ive, k0e, k1e
 
 from spirillum.kernels.rings import ring_blocks
-from spirillum.kernels.tube_waves import circle_waves, station_waves, wall_layers, wave_extensions
+from spirillum.kernels.tube_waves import (
+    circle_waves,
+    single_tilted_waves,
+    station_waves,
+    tilted_waves,
+    wall_layers,
+    wave_extensions,
+)
 
 WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
 """k R and order p."""
@@ -186,3 +193,25 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
             about = np.stack([-1j * turn[:, 0], turn[:, 1] * c + turn[:, 2] * s, turn[:, 2] * c - turn[:, 1] * s])
             np.testing.assert_allclose(circle[parity][:, :, p], about.real, atol=1e-13)
             np.testing.assert_allclose(about.imag, 0.0, atol=1e-13)
+
+
+def test_waves_on_rings_about_a_tilted_axis() -> None:
+    """Components of the velocities at the same points along the unit vectors of the tilted cylinder."""
+    k, orders, first, rng = 1.3, 5, 2, np.random.default_rng(3)
+    theta, rings = rng.uniform(-np.pi, np.pi, 4), 3
+    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    points = rng.uniform(-0.5, 0.5, (4, rings, 3))
+    x, y, z = np.moveaxis(points, -1, 0)
+    values, angle = extensions(k, np.hypot(y, z).ravel(), orders, first=first), np.arctan2(z, y)
+    at_points = np.empty((4 * rings, 3, 2, 2, orders - first, 3))
+    station_waves(values, angle.ravel(), k * x.ravel(), first, at_points)
+    out = np.array([np.zeros(4), np.cos(theta), np.sin(theta)]), np.array([np.zeros(4), -np.sin(theta), np.cos(theta)])
+    axes = rotation @ np.stack([np.tile([[1.0], [0.0], [0.0]], 4), *out])  # (component, xyz, angle)
+    wanted = np.einsum("cxt,tnxrpow->cptnrow", axes, at_points.reshape(4, rings, 3, 2, 2, orders - first, 3))
+    found = np.empty(wanted.shape)
+    arguments = values.reshape(4, rings, orders - first, 3, 3), angle, k * x, theta, rotation, first
+    tilted_waves(*arguments, found)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-14 * np.abs(wanted).max())
+    single = np.empty(wanted.shape, np.float32)
+    single_tilted_waves(*arguments, single)
+    np.testing.assert_array_equal(single, found.astype(np.float32))
