@@ -163,7 +163,10 @@ def study_fields() -> str:
     """The fields of a study file."""
     from spirillum.studies.spec import Study
 
-    return table(_HEADER, field_rows(Study, ""))
+    rows = list(field_rows(Study, ""))
+    pose = [row[0] for row in rows if row[0].startswith("`placement.")]
+    words = f"The pose ({', '.join(pose)}) has the meaning of the shared options of these names.\n"
+    return table(_HEADER, [row for row in rows if row[0] not in pose]) + f"\n{words}"
 
 
 def derived_quantities() -> str:
@@ -339,11 +342,15 @@ def _item(option: Option) -> str:
 
 @lru_cache(maxsize=1)
 def _shared_options() -> tuple[Option, ...]:
-    """Options that at least three commands have in the same words, the commonest first."""
+    """Options that several commands have in the same words, the commonest first; of one name one meaning."""
     from spirillum.cli.app import command_line
 
     counts = Counter(option for words in _commands_of(command_line()) for option in _options_of(words))
-    return tuple(option for option, count in counts.most_common() if count >= 3)
+    found: dict[str, Option] = {}
+    for option, count in counts.most_common():
+        if count > 1:
+            found.setdefault(option.names[-1], option)
+    return tuple(found.values())
 
 
 def _commands_of(command: Any, words: str = "") -> Iterator[str]:
