@@ -1,8 +1,8 @@
 """Tuned numbers of the tracker that more than one module uses: one frozen set for each stage; others stand beside it.
 
 Where a field names no source, its value was set by hand while the tracker was developed on rendered videos; nothing
-else stands behind it. What halving and doubling them does to measured rates is in `docs/measuring-accuracy.md`, found by
-`benchmarks/tracker_constants.py`. Numbers that are definitions or numerical resolutions stand where they are used, and
+else stands behind it. What halving and doubling them does to measured rates is in `docs/measuring-accuracy.md`,
+found by `benchmarks/tracker_constants.py`. Numbers that are definitions or numerical resolutions stand where they are used, and
 compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, because arguments would slow them down.
 """
 
