@@ -3,7 +3,8 @@
 Where a field names no source, its value was set by hand while the tracker was developed on rendered videos; nothing
 else stands behind it. What halving and doubling them does to measured rates is in `docs/measuring-accuracy.md`,
 found by `benchmarks/tracker_constants.py`. Numbers that are definitions or numerical resolutions stand where they are
-used, and compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, because arguments would slow them down.
+used, and compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, because arguments would slow them
+down.
 """
 
 from __future__ import annotations
