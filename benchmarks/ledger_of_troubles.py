@@ -232,13 +232,13 @@ def table(rows: Sequence[Row]) -> str:
 
 def becomes(rows: Sequence[Row]) -> str:
     """What is given of a trouble's films, and how many are flagged, in words."""
-    words = []
-    for name, what in ((SPEED, "speed"), (BODY, "body rate"), (TAIL, "tail rate")):
-        given = sum(off(row["numbers"][name]) is not None for row in rows)
-        if given < len(rows):
-            words.append(f"{what} {f'given in {given}' if given else 'withheld'}")
-    if len(words) == 3 and all("withheld" in word for word in words):
-        words = ["withheld"]
+    names = {"speed": SPEED, "body rate": BODY, "tail rate": TAIL}
+    given = {what: sum(off(row["numbers"][name]) is not None for row in rows) for what, name in names.items()}
+    if len(set(given.values())) == 1 and given["speed"] < len(rows):
+        words = [f"all given in {given['speed']}" if given["speed"] else "withheld"]
+    else:
+        counted = ((what, count) for what, count in given.items() if count < len(rows))
+        words = [f"{what} given in {count}" if count else f"{what} withheld" for what, count in counted]
     flags = sum(flagged(row) for row in rows)
     words.append("flagged" if flags == len(rows) else f"flagged in {flags}" if flags else "not flagged")
     return ", ".join(words) if len(words) > 1 else f"given, {words[0]}"

@@ -163,7 +163,10 @@ def study_fields() -> str:
     """The fields of a study file."""
     from spirillum.studies.spec import Study
 
-    return table(_HEADER, field_rows(Study, ""))
+    rows = list(field_rows(Study, ""))
+    pose = [row[0] for row in rows if row[0].startswith("`placement.")]
+    words = f"The pose ({', '.join(pose)}) has the meaning of the shared options of these names.\n"
+    return table(_HEADER, [row for row in rows if row[0] not in pose]) + f"\n{words}"
 
 
 def derived_quantities() -> str:
@@ -209,18 +212,29 @@ def _variables(dataset: Any, names: Iterable[str]) -> str:
         unit, source = str(about.get("units", "–")), str(about.get("source", "–"))
         rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
     usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
-    predicted = [row[0] for row in rows if _is_predicted(row) and row[3] == usual[0]]
-    shown = [(name, unit, _unusual(text, others, usual)) for name, unit, text, *others in rows if name not in predicted]
+    named: dict[tuple[str, str], list[str]] = {}
+    shown = []
+    for row in rows:
+        if pattern := _pattern(row, usual[0]):
+            named.setdefault((pattern, row[3]), []).append(row[0].replace(pattern.removeprefix("<quantity>"), ""))
+        else:
+            name, unit, text, *others = row
+            shown.append((name, unit, _unusual(text, others, usual)))
     head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
-    head += f" As in `predict`: {', '.join(predicted)}.\n\n" if predicted else "\n\n"
-    return head + table(("Variable", "Unit", "Meaning"), shown)
+    for (pattern, over), found in named.items():
+        head += " As in `predict`" + (f", named `{pattern}`" if pattern != "<quantity>" else "")
+        head += (f", over {over}" if over != usual[0] else "") + f": {', '.join(found)}."
+    return f"{head}\n\n" + table(("Variable", "Unit", "Meaning"), shown)
 
 
-def _is_predicted(row: Sequence[str]) -> bool:
-    """Whether a variable is a quantity of `predict`, whose table stands on the same page."""
+def _pattern(row: Sequence[str], over: str) -> str:
+    """How a variable is named after a quantity of `predict`, listed on the same page; empty if it is not."""
     from spirillum.swimming.steady_quantities import STEADY
 
-    return any(row[0] == f"`{item.name}`" and row[1] == item.unit for item in STEADY)
+    suffix = next((end for end in ("_at_observed_rate", "_at_assumed_rate") if row[0].endswith(f"{end}`")), "")
+    name = row[0].strip("`").removesuffix(suffix)
+    known = any(name == item.name and row[1] == item.unit for item in STEADY)
+    return f"<quantity>{suffix}" if known and (suffix or row[3] == over) else ""
 
 
 def _unusual(meaning: str, others: Sequence[str], usual: Sequence[str]) -> str:
@@ -252,7 +266,18 @@ def simulation_variables(motion: str) -> str:
     from spirillum import simulate
 
     dataset = simulate("biorob2012-wide", timing={"duration": "0.1 s"}, motion=motion)
-    return _variables(dataset, [str(name) for name in (*dataset.coords, *dataset.data_vars)])
+    names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+    if motion == "free":
+        return _variables(dataset, names)
+    free = simulate("biorob2012-wide", timing={"duration": "0.1 s"}, motion="free")
+    same = [name for name in names if name in free and _about(free[name]) == _about(dataset[name])]
+    words = f"As in a free run: {', '.join(f'`{name}`' for name in same)}.\n"
+    return _variables(dataset, [name for name in names if name not in same]) + f"\n{words}"
+
+
+def _about(variable: Any) -> tuple[str, ...]:
+    """What a variable is, whatever its source."""
+    return str(variable.attrs.get("units")), str(variable.attrs["long_name"]), *map(str, variable.dims)
 
 
 def sweep_variables() -> str:
@@ -339,11 +364,15 @@ def _item(option: Option) -> str:
 
 @lru_cache(maxsize=1)
 def _shared_options() -> tuple[Option, ...]:
-    """Options that at least three commands have in the same words, the commonest first."""
+    """Options that several commands have in the same words, the commonest first; of one name one meaning."""
     from spirillum.cli.app import command_line
 
     counts = Counter(option for words in _commands_of(command_line()) for option in _options_of(words))
-    return tuple(option for option, count in counts.most_common() if count >= 3)
+    found: dict[str, Option] = {}
+    for option, count in counts.most_common():
+        if count > 1:
+            found.setdefault(option.names[-1], option)
+    return tuple(found.values())
 
 
 def _commands_of(command: Any, words: str = "") -> Iterator[str]:

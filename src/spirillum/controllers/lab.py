@@ -32,7 +32,7 @@ _Share = Annotated[float, BeforeValidator(in_range(0.0, 0.95))]
 class CameraModel(Options):
     """The camera: when it sees, and how it errs: normal errors of each frame, and slow ones with a memory.
 
-    The sizes are those of the tracker on degraded films of the virtual camera, see `docs/control.md`.
+    The sizes are those of the tracker on degraded films of the virtual camera, see `docs/control-background.md`.
     """
 
     argument: ClassVar[str] = "camera"
