@@ -47,7 +47,7 @@ STEPS = (
     "import spirillum",
     "for said in (['--help'], ['predict', '--help'], ['page', '--help'], ['--version']): command(said)",
     "command(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])",
-    "command(['predict', 'biorob2012-wide', '--json'])",
+    "command(['predict', 'biorob2012-wide', '--motion', 'held', '--json'])",
 )
 
 

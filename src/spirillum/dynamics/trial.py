@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.timing import TRIAL_DURATION
 from spirillum.errors import InputError
 from spirillum.notes import Note, notes_in
@@ -70,6 +69,8 @@ def trial_of(held: Prediction, run: Callable[[], xr.Dataset]) -> ReleasedMotion:
         dataset = run()
     except InputError as error:
         return ReleasedMotion(reason=str(error))
+    from spirillum.dynamics.integration import INTERRUPTED  # loads compiled loops
+
     if INTERRUPTED in str(dataset.attrs["events"]):
         raise KeyboardInterrupt
     return trial_means(dataset)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.trial import steady_of, trial_of, why_not_released
 from spirillum.dynamics.trial_unknowns import TrialSample, open_unknowns, samples_of, with_interval
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -37,7 +36,7 @@ class TrialRequest:
     roughness: str | float | None
     in_tube: InTube
     interval: bool
-    progress: Progress | None
+    progress: Callable[[str, int, int], None] | None
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none.
