@@ -44,8 +44,8 @@ def published_beside(found: Prediction) -> list[dict[str, Any]]:
         return []
     for own, other, sign in ((_WIDE, _NARROW, 1.0), (_NARROW, _WIDE, -1.0)):
         if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
-            asked = {"model": found.model.name, "calibrated": found.calibrated}
-            beside = predict(_with_tail_of(found.robot, other), **asked)
+            robot = _with_tail_of(found.robot, other)
+            beside = predict(robot, model=found.model.name, calibrated=found.calibrated)
             return [_entry(drop, found, beside, sign) for drop in _drops(found.robot)]
     return []
 
