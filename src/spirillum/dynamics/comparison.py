@@ -200,6 +200,7 @@ def compare_models(
         placement=place,
         roughness=None,
         in_tube=InTube(),
+        duration=None,
         interval=False,
         progress=progress,
     )
