@@ -43,7 +43,7 @@ def main() -> None:
     in_tube = {}
     for length in TRIALS:
         timing = {"duration": length}
-        in_tube[length] = best(lambda timing=timing: sp.simulate(robot, model="tube", timing=timing), 3)
+        in_tube[length] = best(lambda timing=timing: sp.simulate(robot, timing=timing, in_tube={"wait": 0.0}), 3)
     links = two_links(
         robot,
         sp.RobotBatch.of(robot),

@@ -11,6 +11,8 @@ from .controllers.control import control as control
 from .designs.design import design as design
 from .designs.design_result import Design as Design
 from .dynamics.axial_batch import AxialBatch as AxialBatch
+from .dynamics.comparison import ModelComparison as ModelComparison
+from .dynamics.comparison import compare_models as compare_models
 from .dynamics.flow_of_run import flow_of_run as flow_of_run
 from .dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
 from .dynamics.plant import Plant as Plant
@@ -53,8 +55,6 @@ from .results.study import study as study
 from .robot.batch import RobotBatch as RobotBatch
 from .robot.load import load as load
 from .robot.robot import Robot as Robot
-from .swimming.comparison import ModelComparison as ModelComparison
-from .swimming.comparison import compare_models as compare_models
 from .swimming.prediction import Prediction as Prediction
 from .swimming.preparation import Prepared as Prepared
 from .swimming.preparation import prepare as prepare

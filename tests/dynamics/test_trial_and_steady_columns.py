@@ -36,6 +36,15 @@ def test_a_run_by_its_defaults_is_the_trial() -> None:
     assert trial.values["forward_velocity"] == pytest.approx(moved / 20.0, rel=1e-9)
 
 
+def test_a_trial_of_another_length_is_the_run_of_that_length(driven: sp.Robot) -> None:
+    asked = {"in_tube": {"wait": "2 s"}, "roughness": "20 um"}
+    trial = sp.predict(driven, duration="3 s", **asked).trial
+    run = sp.simulate(driven, timing={"duration": "3 s"}, **asked)
+    assert trial is not None
+    assert trial.values["forward_velocity"] == pytest.approx(float(run["mean_forward_velocity_on"]), rel=1e-9)
+    assert [trial.basis[name]["value"] for name in ("wait", "duration")] == [2.0, 3.0]
+
+
 def test_the_steady_column_is_what_settle_finds(driven: sp.Robot, answer: Any) -> None:
     found = sp.settle(driven)
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "drive_torque"):
@@ -135,6 +144,6 @@ def test_an_answer_goes_to_another_process_before_its_columns_are_computed(drive
 
 @pytest.mark.parametrize("options", [{"motion": "held"}, {"tail_rate": "1.2 Hz"}, {"model": "sbt"}])
 def test_settings_of_a_trial_are_refused_where_there_is_none(options: dict[str, Any]) -> None:
-    for setting in ({"roughness": "20 um"}, {"in_tube": {"wait": "5 s"}}):
+    for setting in ({"roughness": "20 um"}, {"in_tube": {"wait": "5 s"}}, {"duration": "5 s"}, {"interval": True}):
         with pytest.raises(sp.InputError, match="is of released motion in the tube"):
             sp.predict(WIDE, **setting, **options)

@@ -13,6 +13,8 @@ from spirillum.papers.biorob2012.study import paper_study
 from spirillum.studies import run
 from spirillum.studies.study_loader import LoadedStudy, load_study
 from spirillum.swimming.model_choice import choose_model
+from spirillum.virtual.motion import steady_rates
+from spirillum.virtual.trial_options import MotionOptions
 from spirillum.worker_pool import WorkerPool
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
@@ -197,3 +199,17 @@ def test_factors_of_another_geometry_say_nothing_of_this_robot() -> None:
     assert other is not None
     assert {item.model for item in own.answers if item.calibrated} == {"sbt", "rft"}
     assert not any(item.calibrated for item in other.answers)
+
+
+def test_every_answer_gives_the_choice_and_its_reason_in_the_same_words() -> None:
+    run = sp.simulate(WIDE, timing={"duration": "0.02 s"}, in_tube={"wait": 0.0})
+    study = sp.study({"robots": [WIDE], "friction": ["rotor"]})
+    answers = {
+        "predict": sp.predict(WIDE, motion="held").answered_by,
+        "simulate": run.attrs,
+        "study": {**study.attrs, "model": str(study["model"].values[0])},
+        "plant": Plant(WIDE).steady.answered_by,
+        "render": dict(zip(("model", "model_reason"), steady_rates(sp.load(WIDE), MotionOptions())[1::2], strict=True)),
+    }
+    said = {name: (answer["model"], answer["model_reason"]) for name, answer in answers.items()}
+    assert said == dict.fromkeys(said, ("tube", "the robot is in a channel, whose walls this model computes"))

@@ -90,12 +90,12 @@ def test_the_setup_is_one_and_knows_the_heights(trial: Any) -> None:
 def test_a_film_shows_what_predict_says_where_no_model_is_named() -> None:
     """In its tube, also where it has no table: here of a short, thick tail, which is solved for in no time."""
     asked = MotionOptions.of({"tail_rate": "1.2 Hz"})
-    rates, source, _ = steady_rates(load(ROBOT), asked)
+    rates, source, *_ = steady_rates(load(ROBOT), asked)
     said = sp.predict(ROBOT, tail_rate="1.2 Hz", band=False)
     assert source == said.model.name == "tube"
     assert rates["forward_velocity"] == pytest.approx(said.forward_velocity, rel=1e-9)
     small = {"coupling.diameter": "0 mm", "tail.length": "20 mm", "tail.wire_diameter": "1.5 mm"}
-    _, source, _ = steady_rates(load(ROBOT, **small, **{"model.tube.tolerance": 0.04, "model.tube.phases": 1}), asked)
+    _, source, *_ = steady_rates(load(ROBOT, **small, **{"model.tube.tolerance": 0.04, "model.tube.phases": 1}), asked)
     assert source == "tube"
 
 

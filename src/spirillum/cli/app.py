@@ -113,7 +113,7 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
     renderer.show({**answer, **more}, json=json, all_of_it=all_of_it)
 
 
-@from_function("spirillum.swimming.comparison:compare_models", without=NO_FORM)
+@from_function("spirillum.dynamics.comparison:compare_models", without=NO_FORM)
 def compare_models(
     request: Request,
     *,

@@ -128,6 +128,8 @@ class Control(DisplayMixin):
 
     robot: Robot
     model: str
+    model_reason: str
+    """Why the model was taken; empty where it was named."""
     task: Task
     lab: Lab
     controller: str
@@ -157,6 +159,7 @@ class Control(DisplayMixin):
         content: dict[str, Any] = {
             "robot": self.robot.name,
             "model": self.model,
+            **({"model_reason": self.model_reason} if self.model_reason else {}),
             "task": {"kind": self.task.kind, **_fields(self.task)},
             "controller": self.controller,
             "seed": self.seed,
@@ -262,6 +265,7 @@ def control(
     return Control(
         robot=robot,
         model=actual.model,
+        model_reason=actual.steady.answered_by.get("model_reason", ""),
         task=task,
         lab=lab,
         controller=controller,

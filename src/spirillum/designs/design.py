@@ -90,7 +90,7 @@ def design(
         model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from
             some designs that are solved for, the best of them in the end. `slender` is asked itself where more than
             three fields of the tail, or fields of the body, are varied and nothing is unknown. `auto` is that of the
-            posterior, else `tube` for a robot in a channel and `slender` without one, and `sbt` where the flow cannot
+            posterior, else `tube` for a robot in a channel, and `slender` without one, or `sbt` where the flow cannot
             be learned.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the
             robot's own drive.

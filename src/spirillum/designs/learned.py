@@ -30,7 +30,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import joined
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
 
 _COLUMNS = {
     "tail.wavelength": "wavelength",
@@ -236,13 +236,16 @@ def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
 
 
 def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
-    """The model that is asked for, or with `auto` the one that knows most about the robot and can be learned.
+    """The model that is asked for, or with `auto` the one that knows most about the robot.
 
     Args:
         asked: name of a model, or `auto`.
         robot: the robot as it is given.
         space: the designs.
         unknowns: what is not known; a posterior's model answers for it.
+
+    Raises:
+        InputError: for a robot in a channel around whose designs the flow cannot be learned.
     """
     choice = choose_model(asked, robot, fit=unknowns.fit)
     if asked != AUTO or unknowns.posterior is not None:
@@ -251,7 +254,10 @@ def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> 
     if not strange and len(own) <= _MOST_FIELDS:
         return choice
     what = f"{strange[0]} is no field of the tail" if strange else f"{len(own)} fields of the tail are varied"
-    return ModelChoice("sbt", f"{what}, and the flow is learned around tails alone, {_MOST_FIELDS} fields at most")
+    why = f"{what}, and the flow is learned around tails alone, {_MOST_FIELDS} fields at most"
+    if choice.model == WALLED:
+        raise InputError(f"{why}; allowed: such fields, or model 'sbt', which leaves out the walls")
+    return ModelChoice("sbt", why)
 
 
 def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variable, ...]:

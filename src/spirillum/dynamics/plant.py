@@ -166,7 +166,7 @@ class Plant:
             check_in_tube(own, placed, asked, height)
         self.steady: Prediction = predict(
             own,
-            model=chosen.model,
+            model=chosen,
             friction=friction,
             calibrated=calibrated,
             fit=fit,

@@ -20,6 +20,7 @@ from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
+from spirillum.units import KINDS, parse_option
 
 
 def predict(  # noqa: PLR0913 - the options of the command
@@ -38,6 +39,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     motion: str | None = None,
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
+    duration: str | float | None = None,
     interval: bool = False,
     beyond_stokes: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
@@ -75,6 +77,8 @@ def predict(  # noqa: PLR0913 - the options of the command
             of the body's radius.
         in_tube: of released motion in the tube: `azimuth` of the start, `friction_coefficient`, and the trial's `wait`,
             see `InTube`.
+        duration: of the trial: time with the motor on, over which its values are means, with its unit or a float in s;
+            None: 20 s.
         interval: of the trial, the 90 % interval over what nobody states (waiting time, roughness, dry friction,
             weight, effective friction), from 64 runs in some two minutes.
         beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong, as
@@ -115,12 +119,14 @@ def predict(  # noqa: PLR0913 - the options of the command
             placement=placement,
             roughness=roughness,
             in_tube=InTube.of(in_tube),
+            duration=None if duration is None else parse_option("duration", duration, KINDS["time"]),
             interval=interval,
             progress=progress,
         )
         return request.beside(held, wanted=motion is None)
-    if interval:
-        raise InputError("interval = True with motion 'free'; allowed: without a motion, of the trial")
+    for name, value in (("interval", interval or None), ("duration", duration)):
+        if value is not None:
+            raise InputError(f"{name} = {str(value)[:40]} with motion 'free'; allowed: without a motion, of the trial")
     whose = posterior_for_of(posterior_for, fit.posterior, own)
     check_not_resolved(own, resolution)
     if band:

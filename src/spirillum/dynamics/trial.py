@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.dynamics.integration import INTERRUPTED
-from spirillum.dynamics.timing import TRIAL_DURATION
 from spirillum.errors import InputError
 from spirillum.notes import Note, notes_in
 from spirillum.quantities import QUANTITIES
@@ -56,20 +54,23 @@ def why_not_released(held: Prediction, *, fitted: bool) -> str:
     return ""
 
 
-def trial_of(held: Prediction, run: Callable[[], xr.Dataset]) -> ReleasedMotion:
+def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -> ReleasedMotion:
     """Return the means of a trial.
 
     Args:
         held: the robot, held where it is laid down.
         run: follows the robot, as `spirillum.simulate` does by its defaults.
+        duration: for how long, s.
     """
-    turns = abs(held.tail_rotation_rate) * TRIAL_DURATION / (2.0 * np.pi)
+    turns = abs(held.tail_rotation_rate) * duration / (2.0 * np.pi)
     if turns > _MOST_TURNS:
-        return ReleasedMotion(reason=f"its tail turns {turns:.4g} times in {TRIAL_DURATION:g} s; use `simulate`")
+        return ReleasedMotion(reason=f"its tail turns {turns:.4g} times in {duration:g} s; use `simulate`")
     try:
         dataset = run()
     except InputError as error:
         return ReleasedMotion(reason=str(error))
+    from spirillum.dynamics.integration import INTERRUPTED  # loads compiled loops
+
     if INTERRUPTED in str(dataset.attrs["events"]):
         raise KeyboardInterrupt
     return trial_means(dataset)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.timing import TRIAL_DURATION
 from spirillum.dynamics.trial import steady_of, trial_of, why_not_released
 from spirillum.dynamics.trial_unknowns import TrialSample, open_unknowns, samples_of, with_interval
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -36,8 +36,10 @@ class TrialRequest:
     placement: Placement | Mapping[str, Any] | None
     roughness: str | float | None
     in_tube: InTube
+    duration: float | None
+    """Of the trial, s; None: that of a run by its defaults."""
     interval: bool
-    progress: Progress | None
+    progress: Callable[[str, int, int], None] | None
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none.
@@ -72,7 +74,12 @@ class TrialRequest:
         from spirillum.dynamics.simulation import simulate  # its equations are compiled
 
         settings = {"robot": self._resolved(), "in_tube": self.in_tube, **self._shared(), **sampled}
-        return trial_of(held, lambda: simulate(model=WALLED, calibrated=self.calibrated, **settings))
+        timing = {} if self.duration is None else {"duration": self.duration}
+        return trial_of(
+            held,
+            lambda: simulate(model=WALLED, calibrated=self.calibrated, timing=timing, **settings),
+            TRIAL_DURATION if self.duration is None else self.duration,
+        )
 
     def _shared(self) -> dict[str, Any]:
         """What all runs take of the request."""
@@ -108,7 +115,7 @@ class TrialRequest:
 
     def _check_unused(self) -> None:
         """Refuse settings of a released motion for an answer without one."""
-        given = {"roughness": self.roughness, "interval": self.interval or None}
+        given = {"roughness": self.roughness, "duration": self.duration, "interval": self.interval or None}
         given |= {f"in_tube.{name}": self.in_tube.model_dump()[name] for name in self.in_tube.model_fields_set}
         for name, value in given.items():
             if value is not None:

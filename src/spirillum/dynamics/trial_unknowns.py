@@ -13,7 +13,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import Progress
 from spirillum.envelope import quantity
 from spirillum.robot.robot import Robot
 from spirillum.swimming.released_motion import ReleasedMotion, TrialInterval
@@ -140,7 +139,7 @@ def with_interval(
     samples: Sequence[TrialSample],
     unknowns: Sequence[TrialUnknown],
     run: Callable[[TrialSample], ReleasedMotion],
-    progress: Progress | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> ReleasedMotion:
     """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
 

@@ -240,6 +240,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "folder": str(output),
         "files": sorted(str(path.relative_to(output)) for path in output.rglob("*") if path.is_file()),
         "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        **({"model_reason": dataset.attrs["model_reason"]} if "model_reason" in dataset.attrs else {}),
         "ranking": ranking_of(dataset).to_dict(),
         "results": dataset["outside"].size,
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),

@@ -153,6 +153,7 @@ def described(
         "fingerprint": fingerprint,
         "observations": observed.source if observed else "none: nothing in this dataset is measured",
         "claims": study.claims,
+        **({"model_reason": loaded.model_reason} if loaded.model_reason else {}),
         "references": " ".join(dict.fromkeys(references)),
         **note_attributes(warnings),
         "versions": versions(),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from spirillum.dynamics.comparison import uneven_models
 from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
@@ -32,7 +33,6 @@ from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
-from spirillum.swimming.comparison import uneven_models
 from spirillum.swimming.drive_warnings import CONSTANT_TORQUE
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.preparation import missing_tables

@@ -25,7 +25,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO, UNBOUNDED, WALLED, choose_model
+from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
@@ -47,12 +47,17 @@ class LoadedStudy:
     """Fitted values that act on the robots, or draws over which answers have intervals."""
     placements: tuple[Placement, ...] = ()
     """Where each of `robots` lies by a calibration; none where the study says it."""
-    makes_tables: bool = False
-    """Whether missing tables of tubes are made first: model `tube` was chosen, not named."""
+    model_reason: str = ""
+    """Why the model in place of `auto` was taken; empty where all models are named."""
 
     def placement_of(self, number: int) -> Placement:
         """Where one of `robots` lies."""
         return self.placements[number] if self.placements else self.study.placement
+
+    @property
+    def makes_tables(self) -> bool:
+        """Whether missing tables of tubes are made first: model `tube` was chosen, not named."""
+        return self.model_reason == IN_CHANNEL
 
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
@@ -142,7 +147,7 @@ def load_study(
     given = (*set_fields(overrides or {}), *study.vary)
     robots = tuple(_fitted_robot(robot, fit, given, str(posterior or calibration)) for robot in robots)
     _check_varied(study, overrides or {}, name)
-    named, study = study.models, _with_models(study, robots, fit, name)
+    study, reason = _with_models(study, robots, fit, name)
     try:
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
@@ -156,8 +161,7 @@ def load_study(
         question["placements"] = [place.model_dump() for place in placements]
     if fit.posterior:
         question["posterior"] = {"source": fit.posterior.source, "sha256": fit.posterior.sha256}
-    makes_tables = WALLED in study.models and WALLED not in named
-    loaded = LoadedStudy(study, robots, question, fit, placements, makes_tables)
+    loaded = LoadedStudy(study, robots, question, fit, placements, reason)
     if fit.posterior and loaded.count > _LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {_LARGEST_WITH_INTERVALS}")
     return loaded
@@ -288,10 +292,10 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
     return placements
 
 
-def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> Study:
-    """The study with one model for all robots in place of `auto`."""
+def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> tuple[Study, str]:
+    """The study with one model for all robots in place of `auto`, and why that was taken."""
     if AUTO not in study.models:
-        return study
+        return study, ""
     afloat = [robot.name for robot in robots if robot.channel is None]
     if afloat and len(afloat) < len(robots) and not fit.models:
         raise InputError(
@@ -299,9 +303,10 @@ def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> 
             f'robots in channels alone, or models = ["{UNBOUNDED}"], which leaves out the walls'
         )
     # One that does not fit its channel has no answer, and its reason stands in the dataset: it decides nothing.
-    chosen = WALLED if not (afloat or fit.models) else choose_model(AUTO, robots[0], fit=fit).model
-    models = dict.fromkeys(chosen if model == AUTO else model for model in study.models)
-    return study.model_copy(update={"models": tuple(models)})
+    own = afloat or fit.models
+    chosen = choose_model(AUTO, robots[0], fit=fit) if own else ModelChoice(WALLED, IN_CHANNEL)
+    models = dict.fromkeys(chosen.model if model == AUTO else model for model in study.models)
+    return study.model_copy(update={"models": tuple(models)}), chosen.reason
 
 
 def _fitted_robot(robot: Robot, fit: Fit, kept: Sequence[str], source: str) -> Robot:

@@ -170,7 +170,7 @@ def virtual_experiment(
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
     steady, warnings = {}, []
     for name, robot in robots.items():
-        steady[name], _, said = steady_rates(robot, motion, default_model, placement)
+        steady[name], _, said, _ = steady_rates(robot, motion, default_model, placement)
         warnings += [note.prefixed(f"{name}: ") for note in said]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},

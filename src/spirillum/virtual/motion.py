@@ -37,11 +37,13 @@ class TrialMotion:
     model: str
     """Model, `prescribed`, or both; of a run `run` and its model."""
     warnings: tuple[Note, ...] = ()
+    reason: str = ""
+    """Why the model was taken; empty where it was named."""
 
 
 def steady_rates(
     robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
-) -> tuple[dict[str, float], str, tuple[Note, ...]]:
+) -> tuple[dict[str, float], str, tuple[Note, ...], str]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
     Args:
@@ -51,7 +53,7 @@ def steady_rates(
         placement: where the robot lies, for a model with walls; None: at the reference place.
 
     Returns:
-        The rates by name, what they are from, and warnings.
+        The rates by name, what they are from, warnings, and why the model was taken.
     """
     given = {
         "forward_velocity": motion.forward_velocity,
@@ -66,7 +68,7 @@ def steady_rates(
                 f"{idle} = {str(getattr(motion, idle))[:40]!r} with a prescribed forward velocity, body and tail rate, "
                 "which determine the motion; allowed: at most two of them"
             )
-        return fixed, "prescribed", ()
+        return fixed, "prescribed", (), ""
     from spirillum.swimming.prediction import predict
 
     choice = choose_model(motion.model or default_model, robot, placement=placement)
@@ -82,7 +84,7 @@ def steady_rates(
     prescribed = [name for name in fixed if name != "tail_rotation_rate"]
     source = f"{choice.model}, prescribed: {', '.join(prescribed)}" if prescribed else choice.model
     walls = () if "forward_velocity" in fixed else _without_walls(robot, choice)
-    return found, source, (*steady.warnings, *walls)
+    return found, source, (*steady.warnings, *walls), choice.reason
 
 
 def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[Note, ...]:
@@ -101,7 +103,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         raise InputError(f"wobble = {1e3 * trial.wobble:.4g} mm; allowed: {most}")
     position = lab_to_camera(camera.view, leftwards=camera.leftwards) @ _resting_place(robot, trial.gap, trial.lateral)
     placement = None if trial.gap is None else Placement.of({"gap": trial.gap, "pitch": 0.0})
-    rates, source, warnings = steady_rates(robot, motion, placement=placement)
+    rates, source, warnings, reason = steady_rates(robot, motion, placement=placement)
     trajectory = steady_trajectory(
         _USUAL if trial.duration is None else trial.duration,
         **rates,
@@ -111,7 +113,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         body_angle=trial.body_angle,
         tail_phase=trial.tail_phase,
     )
-    return TrialMotion(trajectory, source, warnings)
+    return TrialMotion(trajectory, source, warnings, reason)
 
 
 def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:

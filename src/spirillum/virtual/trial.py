@@ -161,6 +161,8 @@ class VirtualTrial(DisplayMixin):
     seed: int
     """Of all random numbers."""
     warnings: tuple[Note, ...] = ()
+    model_reason: str = ""
+    """Why the model was taken; empty where it was named."""
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
@@ -168,6 +170,7 @@ class VirtualTrial(DisplayMixin):
             "robot": self.robot.name,
             "synthetic": True,
             "model": self.model,
+            **({"model_reason": self.model_reason} if self.model_reason else {}),
             "video": str(self.path),
             "setup": str(self.setup),
             "truth": str(self.truth),
@@ -278,6 +281,7 @@ def render(
         size=camera.size,
         fps=camera.fps,
         seed=seed,
+        model_reason=shown.reason,
         warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens), *_idle_seed(seed, degradation, troubles)),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.text import Text
 
 import spirillum as sp
-from spirillum.swimming.comparison import ModelComparison
+from spirillum.dynamics.comparison import ModelComparison
 from spirillum.view.figures import comparison as module
 from spirillum.view.figures.comparison import comparison_figure
 from spirillum.view.figures.style import save_as

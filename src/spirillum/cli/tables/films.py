@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, Blocks, grid, quantity_grid
+from spirillum.cli.tables.parts import Answer, Blocks, grid, quantity_grid, reason_of
 from spirillum.units import in_unit
 
 
@@ -31,6 +31,7 @@ def virtual_trial(answer: Answer) -> Blocks:
     names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate")
     true = {name: answer[name] for name in names}
     yield quantity_grid(f"{answer['robot']}: true motion, {answer['model']}", true)
+    yield from reason_of(answer)
 
 
 def film(answer: Answer) -> Blocks:

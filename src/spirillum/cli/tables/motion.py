@@ -96,6 +96,8 @@ def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     yield from (_all_quantities if all_of_it else _side_by_side)(answer, models)
     for item in answer["models"]:
         if item["answered"]:
+            if "trial" in item:
+                yield from released_columns({"trial": item["trial"]})
             yield Detail(_own_error(item))
         else:
             yield f"no answer by {item['model']}: {item['reason']}"
@@ -116,10 +118,23 @@ def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
         against = "" if item["model"] == reference else _difference(item["relative_difference"][names[0]]["value"])
         name = f"{item['model']}*" if item["calibrated"] else str(item["model"])
         rows.add_row(name, cells[0], against, *cells[1:])
+        if "forward_velocity" in item.get("trial", ()):
+            rows.add_row(*_trial_row(item["trial"], models, names, reference))
     yield rows
     if any(item["calibrated"] for item in models):
         yield "*: with calibration factors"
     yield "all quantities: --all"
+
+
+def _trial_row(trial: Answer, models: Sequence[Answer], names: Sequence[str], reference: str) -> Iterator[str]:
+    """The row of a trial, against the reference model's held speed."""
+    (base,) = (item["forward_velocity"]["value"] for item in models if item["model"] == reference)
+    yield "trial"
+    for name in names:
+        item = trial.get(name)
+        yield "-" if item is None else in_unit(item["value"], item["unit"], _shown_unit(models, name))
+        if name == names[0]:
+            yield _difference(trial["forward_velocity"]["value"] / base - 1.0 if base else None)
 
 
 def _all_quantities(answer: Answer, models: Sequence[Answer]) -> Blocks:
@@ -344,6 +359,7 @@ def control(answer: Answer) -> Blocks:
         yield f"learnt: {_learnt(answer['learnt'], answer['drawn'])}"
     if answer["scores"] is not None:
         yield from _scores(answer["scores"], answer["error"]["unit"])
+    yield from reason_of(answer)
     yield from files_of(answer, plot="plot", movie="movie", file="run")
 
 

@@ -81,14 +81,15 @@ RELEASED_COLUMNS = ("trial", "steady")
 
 def released_columns(answer: Answer) -> Iterator[Block]:
     """What the columns of released motions are, or why one is missing."""
-    missing = {column: answer[column]["reason"] for column in RELEASED_COLUMNS if "reason" in answer[column]}
+    there = [column for column in RELEASED_COLUMNS if column in answer]
+    missing = {column: answer[column]["reason"] for column in there if "reason" in answer[column]}
     for reason in dict.fromkeys(missing.values()):
         yield Detail(f"no {' and no '.join(column for column in missing if missing[column] == reason)}: {reason}")
-    if "trial" not in missing:
+    if "trial" in there and "trial" not in missing:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
         yield from _over_unknowns(answer["trial"])
-    if "steady" not in missing:
+    if "steady" in there and "steady" not in missing:
         constant = answer["steady"]["time_constant"]
         after = f", approached with a time constant of {in_words(constant)}" if constant["value"] else ""
         yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"

@@ -32,6 +32,7 @@ def study(answer: Answer, *, rows: int = 10) -> Blocks:
     extent = ", ".join(counted(number, word) for number, word in sizes_in_words)
     yield f"{answer['title']}: {extent} of the friction"
     yield from _ranking(answer["ranking"], rows)
+    yield from reason_of({"model": answer["ranking"]["model"], **answer})
     yield from _empty_results(answer)
     yield f"observations: {answer['observations']}"
     if answer.get("predictions"):

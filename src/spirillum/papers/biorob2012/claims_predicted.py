@@ -18,9 +18,9 @@ from spirillum.papers.biorob2012.evidence import (
     NARROWER,
     NO_RATES,
     ROBOT_LENGTH,
-    VELOCITY_DROPS,
     Evidence,
 )
+from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.biorob2012.readings import FrictionModelRuns, Judgement
 from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
 from spirillum.robot.load import load

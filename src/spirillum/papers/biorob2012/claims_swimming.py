@@ -13,11 +13,11 @@ from spirillum.papers.biorob2012.evidence import (
     LARGEST_REYNOLDS,
     LOW_REYNOLDS,
     NO_RATES,
-    VELOCITY_DROPS,
     Evidence,
     fraction_between,
     in_hertz,
 )
+from spirillum.papers.biorob2012.published import VELOCITY_DROPS
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label

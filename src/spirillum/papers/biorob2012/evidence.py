@@ -35,22 +35,11 @@ class LargestReynolds(NamedTuple):
     """The figure whose caption states it."""
 
 
-class VelocityDrop(NamedTuple):
-    """An extreme of the velocity decrease from the wide to the narrow channel, and the tail that has it."""
-
-    value_mm_s: float
-    wavelength_mm: float
-    amplitude_mm: float
-
-
 LARGEST_REYNOLDS = {
     "wide": LargestReynolds(0.0058, 25.0, 2.5, "Fig. 5"),
     "narrow": LargestReynolds(0.0038, 20.0, 1.5, "Fig. 6"),
 }
 """By channel; captions of Figs 5 and 6."""
-
-VELOCITY_DROPS = {"lowest": VelocityDrop(0.0653, 10.0, 3.5), "largest": VelocityDrop(0.648, 25.0, 2.5)}
-"""Stated in the text on Figs 5 and 6."""
 
 GLOBAL_DROP = 0.389
 """Relative loss of the mean velocity of all tails from the wide to the narrow channel; text on Figs 5 and 6."""

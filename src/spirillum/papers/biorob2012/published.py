@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from spirillum.dynamics.prediction import predict
 from spirillum.envelope import quantity
-from spirillum.papers.biorob2012.evidence import VELOCITY_DROPS
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
 
+
+class VelocityDrop(NamedTuple):
+    """An extreme of the velocity decrease from the wide to the narrow channel, and the tail that has it."""
+
+    value_mm_s: float
+    wavelength_mm: float
+    amplitude_mm: float
+
+
+VELOCITY_DROPS = {"lowest": VelocityDrop(0.0653, 10.0, 3.5), "largest": VelocityDrop(0.648, 25.0, 2.5)}
+"""Stated in the text on Figs 5 and 6."""
 _WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
 _SOURCE = "BioRob 2012, text on Figs 5 and 6"
 
@@ -34,7 +44,8 @@ def published_beside(found: Prediction) -> list[dict[str, Any]]:
         return []
     for own, other, sign in ((_WIDE, _NARROW, 1.0), (_NARROW, _WIDE, -1.0)):
         if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
-            beside = predict(_with_tail_of(found.robot, other))
+            robot = _with_tail_of(found.robot, other)
+            beside = predict(robot, model=found.model.name, calibrated=found.calibrated)
             return [_entry(drop, found, beside, sign) for drop in _drops(found.robot)]
     return []
 

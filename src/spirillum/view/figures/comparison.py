@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
 from spirillum.arrays import Values
 from spirillum.display import percent
+from spirillum.dynamics.comparison import ModelComparison, estimated_error
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
-from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.controllers.control import Control
 from spirillum.designs.design_result import Design
+from spirillum.dynamics.comparison import ModelComparison
 from spirillum.dynamics.settling import Settling
 from spirillum.errors import InputError
 from spirillum.fields.flow import Flow
@@ -23,7 +24,6 @@ from spirillum.files import PICTURES, output_target
 from spirillum.measurement.measure import Measurement
 from spirillum.robot.robot import Robot
 from spirillum.studies.ranking import can_be_ranked, ranking_of
-from spirillum.swimming.comparison import ModelComparison
 from spirillum.swimming.prediction import Prediction
 from spirillum.view.figures.calibration import calibration_figures
 from spirillum.view.figures.comparison import comparison_figure, ranking_picture

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.display import DisplayMixin
+from spirillum.dynamics.trial_request import TrialRequest
+from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
@@ -110,6 +112,7 @@ class ModelComparison(DisplayMixin):
             "title": answer.model.title,
             "answered": True,
             **{key: value for key, value in answer.to_dict(others=False).items() if key not in left_out},
+            **({"trial": answer.trial.to_dict()} if answer.trial is not None else {}),
             "relative_difference": {key: quantity(self.relative_difference(name, key), "1") for key in _UNITS},
         }
 
@@ -160,7 +163,8 @@ def compare_models(
 ) -> ModelComparison:
     """Predict the steady swimming of one robot with several models; floats are in SI units, rates in rad/s.
 
-    A model whose domain the robot leaves is listed with its reason; the others answer.
+    A model whose domain the robot leaves is listed with its reason; the others answer. All are held; beside `tube`
+    stands what a trial measures (`trial`), or why there is none.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -186,22 +190,38 @@ def compare_models(
     reading = friction_reading(ready.friction.reading if friction is None else friction)
     place = Placement.of(placement)
     check_placement(place, *(find_swimmer_model(name) for name in names))
+    trial = TrialRequest(
+        own,
+        friction=reading,
+        calibrated=factors,
+        calibration=calibration,
+        fit=fit,
+        resolution=None,
+        placement=place,
+        roughness=None,
+        in_tube=InTube(),
+        duration=None,
+        interval=False,
+        progress=progress,
+    )
     predictions: dict[str, Prediction] = {}
     refusals: dict[str, str] = {}
     for done, name in enumerate(names):
         if progress is not None:
             progress(f"model {name}", done, len(names))
+        placed = place if find_swimmer_model(name).placed and place != Placement() else None
         try:
-            predictions[name] = predict(
+            held = predict(
                 own,
                 model=name,
                 tail_rate=tail_rate,
                 friction=reading,
                 calibrated=factors,
                 fit=fit,
-                placement=place if find_swimmer_model(name).placed and place != Placement() else None,
+                placement=placed,
                 band=False,
             )
+            predictions[name] = trial.beside(held, wanted=True) if find_swimmer_model(name).placed else held
         except InputError as error:
             refusals[name] = str(error)
     if not predictions:

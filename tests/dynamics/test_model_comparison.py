@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.cli.tables import blocks_of
+from spirillum.cli.tables.parts import Detail
+from spirillum.dynamics import comparison as module
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.swimming import comparison as module
 
 WIDE = "biorob2012-wide"
 THICK = {"tail.wire_diameter": "6 mm"}
@@ -143,3 +145,16 @@ def test_progress_is_told_before_each_model() -> None:
     told: list[tuple[str, int, int]] = []
     sp.compare_models(WIDE, models=["rft", "sbt"], progress=lambda *step: told.append(step))
     assert told == [("model rft", 0, 2), ("model sbt", 1, 2)]
+
+
+def test_the_trial_stands_beside_the_held_answer_in_the_tube() -> None:
+    found = sp.compare_models(WIDE, models=["slender", "tube"]).to_dict()
+    slender, tube = found["models"]
+    alone = sp.predict(WIDE, band=False)
+    assert alone.trial is not None
+    assert tube["trial"]["forward_velocity"]["value"] == pytest.approx(alone.trial.values["forward_velocity"], rel=1e-9)
+    assert tube["forward_velocity"]["value"] == alone.forward_velocity
+    assert "trial" not in slender
+    text = [block for block in blocks_of(found) if not isinstance(block, Detail)]
+    assert list(text[0].columns[0].cells) == ["slender", "tube", "trial"]
+    assert any("contact assumed, not validated" in str(line) for line in text[1:])
