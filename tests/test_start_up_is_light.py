@@ -43,12 +43,7 @@ class Loaded(NamedTuple):
 STEPS = (
     "import spirillum",
     "for said in (['--help'], ['predict', '--help'], ['page', '--help'], ['--version']): command(said)",
-<<<<<<< HEAD
-    "command(['predict', 'biorob2012-wide', '--json'])",
-=======
-    "command(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])",
     "command(['predict', 'biorob2012-wide', '--motion', 'held', '--json'])",
->>>>>>> 56c2d54b17d2134c434177c45c60c0db39fa07fc
 )
 
 
