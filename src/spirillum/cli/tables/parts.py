@@ -23,8 +23,10 @@ class Detail(str):
 Block = str | Table
 """A line, a detail or a table of an answer; the first one is its title, or has it."""
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "trial", "steady")
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "band", "trial", "steady")
 """Columns of numbers."""
+_BAND_WIDTH = 15
+"""Of a column with both ends of a band, so that names of quantities are whole at 80 columns."""
 
 
 def grid(title: str, *columns: str) -> Table:
@@ -64,14 +66,16 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
-    table = grid(title, "quantity", "held", "low", "high", "trial", "steady", "unit")
+    table = grid(title, "quantity", "held", "band", "trial", "steady", "unit")
+    table.columns[2].max_width = _BAND_WIDTH
     for name in answer if only is None else only:
         for row in rows_of(answer, [name]):
             released = (answer[column].get(name) for column in RELEASED_COLUMNS)
             cells = [
                 "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
             ]
-            table.add_row(row.name, row.value, row.low or "-", row.high or "-", *cells, row.unit)
+            band = f"{float(row.low):.3g} to {float(row.high):.3g}" if row.low and row.high else "-"
+            table.add_row(row.name, row.value, band, *cells, row.unit)
     return table
 
 

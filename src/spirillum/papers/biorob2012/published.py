@@ -37,6 +37,7 @@ def published_beside(found: Prediction) -> list[dict[str, Any]]:
     """
     if (
         not found.released
+        or found.model.name != "tube"
         or found.tail_rate is not None
         or found.batch.placement != RobotBatch.of(found.robot).placement
         or found.fitted_by
