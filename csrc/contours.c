@@ -27,9 +27,10 @@ EXPORT void edge_points(
     for (int64_t first = 0; first < count; first += BLOCK) {
         const int64_t length = count - first < BLOCK ? count - first : BLOCK;
         memset(both, 0, sizeof both);
-        for (int64_t m = 0; m < ALONG * ACROSS * 4; m++) {
-            const double weight = basis[m / (4 * ACROSS)][m / 4 % ACROSS];
-            for (int64_t n = 0; n < length; n++) both[m % 4][n] += weight * factors[m * count + first + n];
+        for (int64_t m = 0; m < ALONG * 4; m++) {
+            const double *weights = basis[m / 4], *factor = factors + (m / 4 * ACROSS * 4 + m % 4) * count + first;
+            for (int64_t n = 0; n < length; n++)
+                for (int64_t j = 0; j < ACROSS; j++) both[m % 4][n] += weights[j] * factor[4 * j * count + n];
         }
         for (int64_t n = 0; n < length; n++) {
             const bool lower = (both[2][n] - both[0][n]) * normals[first + n][0] > 0.0; /* the outer one of two rims */

@@ -251,16 +251,17 @@ EXPORT double robust_change(
 }
 
 EXPORT void sums_along(
-    const double *rows, const double *design, double middle, const double *trials, double *sums, int64_t count,
-    int64_t length, int64_t parameters, int64_t tried
+    const double *rows, const double (*design)[4], double middle, const double (*trials)[4], double *sums,
+    int64_t count, int64_t length, int64_t tried
 ) {
     for (int64_t q = 0; q < tried; q++) {
-        sums[q] = 0.0;
+        double total = 0.0;
         for (int64_t i = 0; i < count; i++) {
             double place = middle;
-            for (int64_t k = 0; k < parameters; k++) place += design[i * parameters + k] * trials[q * parameters + k];
+            for (int k = 0; k < 4; k++) place += design[i][k] * trials[q][k];
             place = rint(place);
-            if (0.0 <= place && place < (double)length) sums[q] += rows[i * length + (int64_t)place];
+            if (0.0 <= place && place < (double)length) total += rows[i * length + (int64_t)place];
         }
+        sums[q] = total;
     }
 }

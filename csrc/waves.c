@@ -66,8 +66,11 @@ static Wave with_taper(const Wave *wave) {
     return found;
 }
 
-/* Distance of the wire from the axis, m. */
-static double radius_at(const Wave *w, double xi) { return w->amplitude * (1.0 - exp(-w->decay * larger(xi, 0.0))); }
+/* Distance of the wire from the axis, m; far from the root, 1 - exp(-40) is 1. */
+static double radius_at(const Wave *w, double xi) {
+    const double far = w->decay * larger(xi, 0.0);
+    return far < 40.0 ? w->amplitude * (1.0 - exp(-far)) : w->amplitude;
+}
 
 /* Where the wire crosses a row. */
 typedef struct {

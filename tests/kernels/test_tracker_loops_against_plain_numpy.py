@@ -106,7 +106,7 @@ def test_a_robust_change_is_that_of_reweighted_least_squares(rng: np.random.Gene
 
 
 def test_sums_take_the_nearest_sample_of_each_row(rng: np.random.Generator) -> None:
-    rows, design, trials = rng.normal(size=(9, 20)), rng.normal(size=(9, 3)), rng.normal(size=(7, 3))
+    rows, design, trials = rng.normal(size=(9, 20)), rng.normal(size=(9, 4)), rng.normal(size=(7, 4))
     found = np.empty(7)
     sums_along(rows, design, 9.5, trials, found)
     at = np.round(9.5 + trials @ design.T).astype(int)

@@ -109,12 +109,12 @@ def robust_change(
 @native("sums")
 def sums_along(
     rows: Float64[Array, "n m"],
-    design: Float64[Array, "n k"],
+    design: Float64[Array, "n 4"],
     middle: float,
-    trials: Float64[Array, "q k"],
+    trials: Float64[Array, "q 4"],
     sums: Float64[Array, "q"],
 ) -> None:
-    """Sums of one sample from each row, at positions linear in trial parameters; 0 beyond the rows' ends.
+    """Sums of one sample from each row, at positions linear in four parameters; 0 beyond the rows' ends.
 
     Args:
         rows: samples.
