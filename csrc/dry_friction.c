@@ -130,17 +130,21 @@ static double along_step(const Balance *b, const double left[RATES], const doubl
     return found;
 }
 
-/* Move q along a step to where the residual along it is small; the residual's size. It grows along the step. */
-static double take_step(const Balance *b, const double step[RATES], double q[RATES], double left[RATES]) {
+/* Move q along a step to where the residual is half as large, or small along it, which grows along the step; the
+ * residual's size. Where a prescribed spin makes the step no descent of the convex function, the size decides alone. */
+static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES], double left[RATES]) {
     const double begin = along_step(b, left, step);
     double low = 0.0, high = INFINITY, share = 1.0, size = 0.0, trial[RATES];
     for (int round = 0; round < 60; round++) {
         for (int i = 0; i < RATES; i++) trial[i] = q[i] + share * step[i];
         size = residual(b, trial, left);
+        if (size <= 0.5 * before || (begin >= 0.0 && size < before)) break;
         const double here = along_step(b, left, step);
-        if (here <= -0.5 * fabs(begin))
+        if (begin >= 0.0)
+            high = share;
+        else if (here <= 0.5 * begin)
             low = share;
-        else if (here > 0.5 * fabs(begin))
+        else if (here > -0.5 * begin)
             high = share;
         else
             break;
@@ -184,7 +188,7 @@ double balance_rates(const Balance *b, double q[RATES], double left[RATES]) {
         find_step(b, h, left, step);
         move_duals(b, q, step, duals);
         const double before = size;
-        size = take_step(b, step, q, left);
+        size = take_step(b, before, step, q, left);
         if (size > 0.5 * before && size <= 1e4 * BALANCED * scale) break; /* rounding */
     }
     return size / scale;

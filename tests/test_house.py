@@ -34,7 +34,7 @@ def test_general_module_names_occur_once_at_most(name: str) -> None:
 
 
 def test_every_path_of_the_map_exists() -> None:
-    paths = set(re.findall(r"`([\w/-]+(?:\.py|\.md|/))`", MAP))
+    paths = set(re.findall(r"`([\w/-]+(?:\.py|\.c|\.md|/))`", MAP))
     roots = (ROOT, ROOT / "src", PACKAGE, PACKAGE / "fluid", PACKAGE / "view", PACKAGE / "vision")
     rooms = [path for path in PACKAGE.iterdir() if path.is_dir()]
     new = {"src/spirillum/fluid/closed/mymodel.py"}

@@ -39,7 +39,7 @@ def test_all_that_the_model_imports_is_in_the_key() -> None:
     needed = {
         *(f"fluid.tube.{name}" for name in ("confined", "domain", "rings", "solids", "tube", "wall")),
         *(f"fluid.wire.{name}" for name in ("interaction", "sources", "robot_geometry", "sources", "stokeslets")),
-        *(f"kernels.{name}" for name in ("blobs", "compiled", "panels", "rings", "tube_waves")),
+        *(f"kernels.{name}" for name in ("blobs", "native", "panels", "rings", "tube_waves")),
         *(f"robot.{name}" for name in ("geometry", "outline", "tube_pose")),
         "fluid.algebra",
     }

@@ -7,6 +7,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
+from spirillum.errors import InputError
 
 TAILS = """
 models = ["rft"]
@@ -47,16 +48,13 @@ def test_a_tail_that_does_not_fit_takes_no_walls_from_the_others() -> None:
     assert found == pytest.approx(wanted, rel=1e-12)
     short = {"tail.length": "10 mm"}  # solved for in less time
     (nobody,) = sp.study(robots | {"vary": {"tail.amplitude": ["12 mm"]}}, overrides=short)["model"].values.tolist()
-    assert nobody == "slender"
+    assert nobody == "tube"
 
 
-def test_a_robot_without_a_channel_says_that_it_takes_the_walls_of_the_others(tmp_path) -> None:
-    """With a short tail, which is solved for in less time."""
-    short = tmp_path / "short.toml"
-    short.write_text('extends = "ecoli"\nname = "ecoli"\ntail.length = "2 um"\n')
-    found = sp.study({"robots": ["biorob2012-wide", str(short)], "friction": ["none"]})
-    assert found["model"].values.tolist() == ["slender"]
-    assert "one model answers for all, and ecoli has no channel" in found.attrs["warnings"]
+def test_robots_with_and_without_a_channel_need_a_named_model() -> None:
+    mixed = {"robots": ["biorob2012-wide", "ecoli"], "friction": ["none"]}
+    with pytest.raises(InputError, match=r"ecoli has no channel, but others have; allowed: .* models = \["):
+        sp.study(mixed)
 
 
 @pytest.mark.parametrize(("amplitudes", "code"), [('["2.5 mm", "25 mm"]', 0), ('["25 mm"]', 2)])
