@@ -27,11 +27,11 @@
 
 /* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/axial_motor.py. */
 typedef struct {
-    double torque, emf, inductance;                                   /* K_m, N m/A; K_b, V s/rad; L, H */
-    double constant, decay, decay_rate, growth, growth_rate, slope;   /* R(I) of Table II */
-    double voltage, internal, polarity;                               /* V(I) of Table II; sign of the driven rate */
-    double speed, body, tail;                                         /* U, Omega, omega per joint torque */
-    double speed_flow, body_flow, tail_flow;                          /* U, Omega, omega per imposed mean flow */
+    double torque, emf, inductance;                                 /* K_m, N m/A; K_b, V s/rad; L, H */
+    double constant, decay, decay_rate, growth, growth_rate, slope; /* R(I) of Table II */
+    double voltage, internal, polarity;                             /* V(I) of Table II; sign of the driven rate */
+    double speed, body, tail;                                       /* U, Omega, omega per joint torque */
+    double speed_flow, body_flow, tail_flow;                        /* U, Omega, omega per imposed mean flow */
 } AxialRobot;
 
 typedef struct {
@@ -39,19 +39,20 @@ typedef struct {
     double squared_current, heat; /* integrals of I^2, A^2 s, and of R I^2, J */
 } AxialState;
 
-enum { BLOCK = 64 };                        /* robots of one block: their columns stay in the processor's cache */
-static const double PER_CONSTANT = 2.0;     /* pieces of a step for each time constant L/R of the motor at rest */
-static const double FEWEST = 28.0;          /* and besides; errors below 1e-6 (tested) */
+enum { BLOCK = 64 };                    /* robots of one block: their columns stay in the processor's cache */
+static const double PER_CONSTANT = 2.0; /* pieces of a step for each time constant L/R of the motor at rest */
+static const double FEWEST = 28.0;      /* and besides; errors below 1e-6 (tested) */
 static const double MOST = 1e12;
 static const double GROWTH = 3.0, GROWTH_PER = 0.25; /* the last piece over the first, less 1: at most, per constant */
-enum { LOOK = 8 };                          /* pieces between two looks whether the currents are steady */
-static const double STEADY = 1e-12;         /* relative change within the shortest time constant of a steady current */
-static const double LEAST = 1e-3;           /* a current is at least so large here, A */
+enum { LOOK = 8 };                                   /* pieces between two looks whether the currents are steady */
+static const double STEADY = 1e-12; /* relative change within the shortest time constant of a steady current */
+static const double LEAST = 1e-3;   /* a current is at least so large here, A */
 
 /* exp(x) for -40 < x < 30, to 2e-8 of the larger of it and 1, as the 32nd power of a polynomial. */
 static inline double exponential(double x) {
     const double z = clamped(x, -40.0, 30.0) * 0.03125;
-    double y = 1.0 / 720 + z * (1.0 / 5040 + z * (1.0 / 40320 + z * (1.0 / 362880 + z * (1.0 / 3628800 + z * (1.0 / 39916800)))));
+    double y = 1.0 / 720
+             + z * (1.0 / 5040 + z * (1.0 / 40320 + z * (1.0 / 362880 + z * (1.0 / 3628800 + z * (1.0 / 39916800)))));
     y = 1.0 + z * (1.0 + z * (1.0 / 2 + z * (1.0 / 6 + z * (1.0 / 24 + z * (1.0 / 120 + z * y)))));
     y *= y;
     y *= y;
@@ -71,7 +72,7 @@ typedef struct {
 static inline double resistance(const Block *b, int64_t k, double i) {
     const double size = fabs(i);
     return b->always[k] + b->falling[k] * exponential(b->fall[k] * size) + b->rising[k] * exponential(b->rise[k] * size)
-           + b->bend[k] * size;
+         + b->bend[k] * size;
 }
 
 static inline double slope(const Block *b, int64_t k, double i, double r) {
@@ -183,7 +184,7 @@ static double sliding_speed(const double r[3][3], double drag, double radius, do
  * bisected between free sliding and sticking. */
 EXPORT void contact_drag(const double *resistances, const double *force, const double *radius, const double *rate,
                          double smooth, double *out, int64_t count) {
-    const double(*r)[3][3] = (const double(*)[3][3])resistances;
+    const double (*r)[3][3] = (const double (*)[3][3])resistances;
     for (int64_t n = 0; n < count; n++) {
         const double slow = smooth * radius[n] * fabs(rate[n]);
         out[n] = 0.0 * force[n];

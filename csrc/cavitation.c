@@ -95,7 +95,8 @@ static Side side_of(double a, double b) {
 /* Whether the pressure of the linear film falls below the bound: 3 (1 + xi^2)^2 < a xi + 3 b/4 somewhere. */
 static bool cavitates(double a, double b) {
     const double root3 = sqrt(3.0);
-    const double xi = 2.0 / root3 * sinh(asinh(0.125 * root3 * a) / 3.0); /* of the least difference: xi^3 + xi = a/12 */
+    const double xi
+        = 2.0 / root3 * sinh(asinh(0.125 * root3 * a) / 3.0); /* of the least difference: xi^3 + xi = a/12 */
     const double wide = 1.0 + xi * xi;
     return wide * wide < a * xi / 3.0 + 0.25 * b;
 }
@@ -123,8 +124,9 @@ EXPORT void lift_of_cavitation(const double *gap, const double *bend, const doub
     for (int64_t n = 0; n < count; n++) {
         const LineContact contact = {gap[n], bend[n], opening[n], entrainment[n]};
         const Lift lift = cavitation_lift(&contact, viscosity, bound);
-        const double row[6] = {lift.normal, lift.along, lift.of_opening[0], lift.of_opening[1],
-                               lift.of_entrainment[0], lift.of_entrainment[1]};
+        const double row[6]
+            = {lift.normal,           lift.along, lift.of_opening[0], lift.of_opening[1], lift.of_entrainment[0],
+               lift.of_entrainment[1]};
         for (int k = 0; k < 6; k++) out[6 * n + k] = row[k];
     }
 }

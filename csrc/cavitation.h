@@ -6,17 +6,17 @@
 
 /* A film across a line contact: gap h0 + x^2/(2 R') at x across the body's axis. */
 typedef struct {
-    double gap, bend;    /* h0, R', m */
-    double opening;      /* V = dh0/dt, m/s */
-    double entrainment;  /* u, mean velocity of both surfaces along x, as seen from the contact line, m/s */
+    double gap, bend;   /* h0, R', m */
+    double opening;     /* V = dh0/dt, m/s */
+    double entrainment; /* u, mean velocity of both surfaces along x, as seen from the contact line, m/s */
 } LineContact;
 
 /* What the bound of the pressure adds per length, and its derivatives. */
 typedef struct {
-    double normal;               /* force that opens the gap, N/m */
-    double along;                /* force that works on u, N/m */
-    double of_opening[2];        /* derivatives of both in V */
-    double of_entrainment[2];    /* derivatives of both in u */
+    double normal;            /* force that opens the gap, N/m */
+    double along;             /* force that works on u, N/m */
+    double of_opening[2];     /* derivatives of both in V */
+    double of_entrainment[2]; /* derivatives of both in u */
 } Lift;
 
 Lift cavitation_lift(const LineContact *contact, double viscosity, double bound);

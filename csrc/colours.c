@@ -13,12 +13,9 @@ enum { BITS = 16 }; /* binary digits of fractions: sums are of whole numbers, wh
 #define CHROMA (112.0 / 255.0 * (1 << BITS))
 
 static const int32_t Y[3] = {WHOLE(RED * LUMA), WHOLE(GREEN * LUMA), WHOLE(BLUE * LUMA)};
-static const int32_t CB[3] = {
-    WHOLE(-RED / (1.0 - BLUE) * CHROMA), WHOLE(-GREEN / (1.0 - BLUE) * CHROMA), WHOLE(CHROMA)
-};
-static const int32_t CR[3] = {
-    WHOLE(CHROMA), WHOLE(-GREEN / (1.0 - RED) * CHROMA), WHOLE(-BLUE / (1.0 - RED) * CHROMA)
-};
+static const int32_t CB[3]
+    = {WHOLE(-RED / (1.0 - BLUE) * CHROMA), WHOLE(-GREEN / (1.0 - BLUE) * CHROMA), WHOLE(CHROMA)};
+static const int32_t CR[3] = {WHOLE(CHROMA), WHOLE(-GREEN / (1.0 - RED) * CHROMA), WHOLE(-BLUE / (1.0 - RED) * CHROMA)};
 
 /* Luma without light, and eight times chroma without colour; half a step more, as whole numbers are cut off. */
 static const int32_t BLACK = (16 << BITS) + (1 << (BITS - 1)), GREY = (128 << (BITS + 3)) + (1 << (BITS + 2));

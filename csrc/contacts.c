@@ -159,12 +159,12 @@ static double told(Nearest at, double *normal, double *point, double *j) {
 
 EXPORT double ring_gap(const double *y, const double *rotation, double radius, const double *site, double *normal,
                        double *point, double *j) {
-    const double(*axes)[3] = (const double(*)[3])rotation;
+    const double (*axes)[3] = (const double (*)[3])rotation;
     return told(site_nearest((const Site *)site, (const State *)y, axes, radius), normal, point, j);
 }
 
 EXPORT double crest(const double *y, const double *rotation, double radius, const double *wire, const double *bracket,
                     double *normal, double *point, double *j) {
-    const double(*axes)[3] = (const double(*)[3])rotation;
+    const double (*axes)[3] = (const double (*)[3])rotation;
     return told(wire_nearest((const Wire *)wire, (const State *)y, axes, radius, bracket), normal, point, j);
 }

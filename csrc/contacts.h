@@ -23,10 +23,10 @@ typedef struct {
 
 /* A place of the robot near the wall. */
 typedef struct {
-    double gap;          /* m */
-    double normal[3];    /* n in body axes, towards the wall */
-    double point[3];     /* the touching point from the origin in body axes, m */
-    double j[RATES];     /* the gap closes at j.q at the rates q */
+    double gap;       /* m */
+    double normal[3]; /* n in body axes, towards the wall */
+    double point[3];  /* the touching point from the origin in body axes, m */
+    double j[RATES];  /* the gap closes at j.q at the rates q */
 } Nearest;
 
 /* A contact with dry friction: mu_c N_c, N, and the sliding velocities along the tube and around it per rate, J_c. */
@@ -50,9 +50,9 @@ typedef struct {
 
 /* A slice of the lubrication film under the body's straight side: its velocities per rate. */
 typedef struct {
-    double gap, bend;                              /* h0, R', m */
-    double length;                                 /* along the body, m */
-    double opening[RATES], entrainment[RATES];     /* V and u per rate */
+    double gap, bend;                          /* h0, R', m */
+    double length;                             /* along the body, m */
+    double opening[RATES], entrainment[RATES]; /* V and u per rate */
 } Slice;
 
 enum { MOST_SLICES = 24 };
@@ -64,10 +64,10 @@ typedef struct {
     int64_t count;
     Slice slices[MOST_SLICES]; /* of a film that may cavitate */
     int64_t slice_count;
-    double viscosity, bound;   /* of the slices, Pa s; their pressure is not below -p_c, Pa */
-    double slow;      /* v_r, below which dry friction is smooth, m/s */
-    int along;        /* the rate along which a torque keeps a prescribed spin */
-    bool prescribed;  /* whether the spin q_3 + q_6 is */
+    double viscosity, bound; /* of the slices, Pa s; their pressure is not below -p_c, Pa */
+    double slow;             /* v_r, below which dry friction is smooth, m/s */
+    int along;               /* the rate along which a torque keeps a prescribed spin */
+    bool prescribed;         /* whether the spin q_3 + q_6 is */
 } Balance;
 
 Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]);

@@ -18,10 +18,8 @@ static void lens_basis(const double pose[3], const double reach[2], double basis
         for (int j = 0; j < ACROSS; j++) basis[i][j] = cos(i * turn_a) * cos(j * turn_b);
 }
 
-EXPORT void edge_points(
-    const double pose[3], const double *factors, const double (*normals)[2], const double reach[2], double (*points)[2],
-    int64_t count
-) {
+EXPORT void edge_points(const double pose[3], const double *factors, const double (*normals)[2], const double reach[2],
+                        double (*points)[2], int64_t count) {
     double basis[ALONG][ACROSS], both[4][BLOCK];
     lens_basis(pose, reach, basis);
     for (int64_t first = 0; first < count; first += BLOCK) {
@@ -40,10 +38,9 @@ EXPORT void edge_points(
     }
 }
 
-EXPORT void edge_places(
-    const double pose[3], const double *factors, const double (*normals)[2], const double reach[2], double axis_height,
-    const Camera *camera, double (*pixels)[2], double (*directions)[2], double *size, double (*slopes)[3], int64_t count
-) {
+EXPORT void edge_places(const double pose[3], const double *factors, const double (*normals)[2], const double reach[2],
+                        double axis_height, const Camera *camera, double (*pixels)[2], double (*directions)[2],
+                        double *size, double (*slopes)[3], int64_t count) {
     const double c = cos(pose[2]), s = sin(pose[2]), step = 1e-4; /* m */
     edge_points(pose, factors, normals, reach, pixels, count);
     for (int64_t i = 0; i < count; i++) {

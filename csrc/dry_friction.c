@@ -73,7 +73,8 @@ static double scale_of(const Balance *b, const double q[RATES]) {
 static void add_slice(const Slice *s, Lift lift, double h[RATES][RATES]) {
     for (int i = 0; i < RATES; i++) {
         const double v = s->length * (s->opening[i] * lift.of_opening[0] + s->entrainment[i] * lift.of_opening[1]);
-        const double u = s->length * (s->opening[i] * lift.of_entrainment[0] + s->entrainment[i] * lift.of_entrainment[1]);
+        const double u
+            = s->length * (s->opening[i] * lift.of_entrainment[0] + s->entrainment[i] * lift.of_entrainment[1]);
         for (int j = 0; j < RATES; j++) h[i][j] -= v * s->opening[j] + u * s->entrainment[j];
     }
 }
@@ -132,7 +133,8 @@ static double along_step(const Balance *b, const double left[RATES], const doubl
 
 /* Move q along a step to where the residual is half as large, or small along it, which grows along the step; the
  * residual's size. Where a prescribed spin makes the step no descent of the convex function, the size decides alone. */
-static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES], double left[RATES]) {
+static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES],
+                        double left[RATES]) {
     const double begin = along_step(b, left, step);
     double low = 0.0, high = INFINITY, share = 1.0, size = 0.0, trial[RATES];
     for (int round = 0; round < 60; round++) {

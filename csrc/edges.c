@@ -35,11 +35,9 @@ static double value_at(const Place *p, int64_t channel, int64_t next, int64_t be
     return total;
 }
 
-EXPORT void profiles_across(
-    const float *picture, const double origin[2], const double (*pixels)[2], const double (*normals)[2],
-    const double *offsets, double *profiles, int64_t height, int64_t width, int64_t channels, int64_t count,
-    int64_t length
-) {
+EXPORT void profiles_across(const float *picture, const double origin[2], const double (*pixels)[2],
+                            const double (*normals)[2], const double *offsets, double *profiles, int64_t height,
+                            int64_t width, int64_t channels, int64_t count, int64_t length) {
     const double last_u = (double)width - 2.0, last_v = (double)height - 2.0;
     for (int64_t i = 0; i < count; i++) {
         for (int64_t k = 0; k < length; k++) {
@@ -72,10 +70,8 @@ static Trend trend_of(const double *values, int64_t length) {
     return (Trend){found.mean / size, found.slope / spread};
 }
 
-EXPORT void shifts_of_profiles(
-    const double *profiles, const double *templates, const double *slopes, double *shifts, double *strengths,
-    double *residuals, int64_t count, int64_t length
-) {
+EXPORT void shifts_of_profiles(const double *profiles, const double *templates, const double *slopes, double *shifts,
+                               double *strengths, double *residuals, int64_t count, int64_t length) {
     const double half = 0.5 * ((double)length - 1.0);
     for (int64_t i = 0; i < count; i++) {
         const double *profile = profiles + i * length, *template = templates + i * length, *slope = slopes + i * length;
@@ -121,11 +117,9 @@ static double score_at(const double *sums, const double *seen, const double all_
 }
 
 /* The innermost loops run down the columns of all places, so that they vectorise. */
-EXPORT void edge_scores(
-    const double *slope_u, const double *slope_v, const double (*pixels)[2], const double (*normals)[2],
-    const int64_t *group, double first_u, double first_v, double *work, double *scores, int64_t width, int64_t height,
-    int64_t count, int64_t rows, int64_t columns
-) {
+EXPORT void edge_scores(const double *slope_u, const double *slope_v, const double (*pixels)[2],
+                        const double (*normals)[2], const int64_t *group, double first_u, double first_v, double *work,
+                        double *scores, int64_t width, int64_t height, int64_t count, int64_t rows, int64_t columns) {
     double all_of[GROUPS] = {0.0}, *restrict sums = work, *restrict seen = work + GROUPS * rows;
     for (int64_t i = 0; i < count; i++) all_of[group[i]] += 1.0;
     for (int64_t c = 0; c < columns; c++) {
@@ -176,10 +170,8 @@ static void solve(double normal[3][3], double right[3]) {
 }
 
 /* Weighted least squares for the pose change; `size` scales its three slopes for conditioning. */
-static void least_squares(
-    const double *shifts, const double (*slopes)[3], const double *weights, const double size[3], double change[3],
-    int64_t count
-) {
+static void least_squares(const double *shifts, const double (*slopes)[3], const double *weights, const double size[3],
+                          double change[3], int64_t count) {
     double normal[3][3] = {{0.0}}, right[3] = {0.0};
     for (int64_t i = 0; i < count; i++) {
         if (!(weights[i] > 0.0)) continue;
@@ -222,10 +214,8 @@ static double median(double *values, int64_t count) {
     return 0.5 * (lower + upper);
 }
 
-EXPORT double robust_change(
-    const double *shifts, const double (*slopes)[3], const double *weights, double *work, double *used,
-    double change[3], int64_t count
-) {
+EXPORT double robust_change(const double *shifts, const double (*slopes)[3], const double *weights, double *work,
+                            double *used, double change[3], int64_t count) {
     const double mad_to_sigma = 1.4826; /* of a normal distribution, 1/Phi^-1(3/4) */
     double size[3] = {1e-300, 1e-300, 1e-300}, level = 1.0, *misses = work, *known = work + count;
     for (int64_t i = 0; i < count; i++) {
@@ -250,10 +240,8 @@ EXPORT double robust_change(
     return level;
 }
 
-EXPORT void sums_along(
-    const double *rows, const double (*design)[4], double middle, const double (*trials)[4], double *sums,
-    int64_t count, int64_t length, int64_t tried
-) {
+EXPORT void sums_along(const double *rows, const double (*design)[4], double middle, const double (*trials)[4],
+                       double *sums, int64_t count, int64_t length, int64_t tried) {
     for (int64_t q = 0; q < tried; q++) {
         double total = 0.0;
         for (int64_t i = 0; i < count; i++) {

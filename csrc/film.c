@@ -17,11 +17,21 @@ enum { ODD = 3 }; /* motions of the order from here on change their sign with th
 
 Film film_opened(const double *packed) {
     return (Film){
-        .tube = packed[0], .body = packed[1], .half = packed[2],
-        .rear = packed[3], .rear_round = packed[4], .front = packed[5], .front_round = packed[6],
-        .first = packed[7], .last = packed[8], .intervals = (int64_t)packed[9],
-        .second_first = packed[10], .second_last = packed[11], .second_intervals = (int64_t)packed[12],
-        .yaw = packed[13], .yaws = (int64_t)packed[14],
+        .tube = packed[0],
+        .body = packed[1],
+        .half = packed[2],
+        .rear = packed[3],
+        .rear_round = packed[4],
+        .front = packed[5],
+        .front_round = packed[6],
+        .first = packed[7],
+        .last = packed[8],
+        .intervals = (int64_t)packed[9],
+        .second_first = packed[10],
+        .second_last = packed[11],
+        .second_intervals = (int64_t)packed[12],
+        .yaw = packed[13],
+        .yaws = (int64_t)packed[14],
         .coefficients = (const float *)(packed + FILM_HEAD),
     };
 }
@@ -231,7 +241,7 @@ double film_resistance(const Film *f, double e, double pitch, double yaw, double
 
 EXPORT double film_at(const double *packed, double e, double pitch, double yaw, double *out) {
     const Film film = film_opened(packed);
-    return film_resistance(&film, e, pitch, yaw, (double(*)[6])out);
+    return film_resistance(&film, e, pitch, yaw, (double (*)[6])out);
 }
 
 EXPORT double smallest_gap(const double *head, double e, double pitch, double yaw) {

@@ -52,7 +52,8 @@ void field_loads(const Drive *drive, double time, const double rotation[3][3], d
     if (drive->kind != MAGNETIC || !(drive->duty > 0.0)) return;
     double field[3], b[3];
     field_at(time, (const double *)drive, field);
-    for (int i = 0; i < 3; i++) b[i] = rotation[0][i] * field[0] + rotation[1][i] * field[1] + rotation[2][i] * field[2];
+    for (int i = 0; i < 3; i++)
+        b[i] = rotation[0][i] * field[0] + rotation[1][i] * field[1] + rotation[2][i] * field[2];
     const double *m = drive->moment;
     force[3] = m[1] * b[2] - m[2] * b[1];
     force[4] = m[2] * b[0] - m[0] * b[2];
@@ -143,7 +144,7 @@ void eliminate(double a[RATES][RATES], double b[RATES][2]) {
 static void differentiate_motor(const Drive *drive, double current, double slip, State *dy) {
     const double size = fabs(current);
     const double resistance = drive->constant + drive->decay * exp(-drive->decay_rate * size)
-                              + drive->growth * exp(drive->growth_rate * size) + drive->slope * size;
+                            + drive->growth * exp(drive->growth_rate * size) + drive->slope * size;
     const double supply = drive->duty * (drive->voltage - drive->internal_resistance * size);
     dy->current = (supply - resistance * current - drive->back_emf * slip) / drive->inductance;
     dy->electrical = supply * current;
@@ -159,9 +160,13 @@ void differentiate(const State *y, const Drive *drive, const double rotation[3][
     *dy = (State){
         .attitude = {0.5 * (-i * turn[0] - j * turn[1] - k * turn[2]), 0.5 * (w * turn[0] + j * turn[2] - k * turn[1]),
                      0.5 * (w * turn[1] + k * turn[0] - i * turn[2]), 0.5 * (w * turn[2] + i * turn[1] - j * turn[0])},
-        .phase = u[JOINT], .roll = u[SPIN],
-        .driven = seen->drive_power, .friction = seen->friction_power, .dissipated = seen->dissipated_power,
-        .contact = seen->contact_power, .flow = seen->flow_power,
+        .phase = u[JOINT],
+        .roll = u[SPIN],
+        .driven = seen->drive_power,
+        .friction = seen->friction_power,
+        .dissipated = seen->dissipated_power,
+        .contact = seen->contact_power,
+        .flow = seen->flow_power,
     };
     for (int n = 0; n < 3; n++) dy->position[n] = rotation[n][0] * u[0] + rotation[n][1] * u[1] + rotation[n][2] * u[2];
     if (drive->kind == MOTOR) differentiate_motor(drive, y->current, drive->polarity * u[JOINT], dy);

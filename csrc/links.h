@@ -24,21 +24,21 @@ typedef struct {
 
 /* What is observed in a state; the last half in a tube alone. Its rates are where the next solution begins. */
 typedef struct {
-    double rates[RATES];                                /* m/s; rad/s */
-    double drive_torque, film;                          /* N m; thinnest film (in a tube: smallest gap of the body), m */
+    double rates[RATES];       /* m/s; rad/s */
+    double drive_torque, film; /* N m; thinnest film (in a tube: smallest gap of the body), m */
     double friction_power, dissipated_power, drive_power; /* W; the last of field and drive */
-    double pressed;                                     /* energy of pressed roughness, J */
-    double contact_force, contact_friction;             /* normal and tangential, sums over contacts, N */
-    double contact_power, flow_power;                   /* lost to dry friction, and from the imposed flow, W */
-    double mean_flow;                                   /* m/s */
-    double tail_gap;                                    /* smallest gap of the wire where it is near the wall, m */
-    double offset, azimuth, pitch, yaw, turn;           /* e, A, p, psi; roll of the body against F; see tube_motion.c */
-    double outside;                                     /* 0 inside the table, else the range that was left */
-    double balance;                                     /* what the solution leaves of the forces, 1 */
+    double pressed;                                       /* energy of pressed roughness, J */
+    double contact_force, contact_friction;               /* normal and tangential, sums over contacts, N */
+    double contact_power, flow_power;                     /* lost to dry friction, and from the imposed flow, W */
+    double mean_flow;                                     /* m/s */
+    double tail_gap;                                      /* smallest gap of the wire where it is near the wall, m */
+    double offset, azimuth, pitch, yaw, turn; /* e, A, p, psi; roll of the body against F; see tube_motion.c */
+    double outside;                           /* 0 inside the table, else the range that was left */
+    double balance;                           /* what the solution leaves of the forces, 1 */
     /* Forces towards the wall at the body's mid-length, N, which sum to zero: of weight and buoyancy, of the film, of the
      * fluid besides (the tail's side force, an imposed flow) and of the asperities. */
     double weight_load, film_load, outer_load, contact_load;
-    double lift;                                        /* what the bound of the film's pressure adds away from it, N */
+    double lift; /* what the bound of the film's pressure adds away from it, N */
 } Seen;
 
 enum { STATES = sizeof(State) / sizeof(double), SEEN = sizeof(Seen) / sizeof(double) };
@@ -47,8 +47,8 @@ enum { MOTOR, TORQUE, RATE, MAGNETIC }; /* kinds of drives */
 typedef struct {
     double kind, fixed, duty; /* one of the kinds; whether the joint is fixed; duty of the remote */
     union {
-        double given;         /* prescribed torque, N m, or rate, rad/s */
-        double moment[3];     /* magnetic moment, A m^2 */
+        double given;     /* prescribed torque, N m, or rate, rad/s */
+        double moment[3]; /* magnetic moment, A m^2 */
     };
     double field, field_rate;                                       /* T; its rotation rate, rad/s */
     double polarity, torque_constant, back_emf, inductance;         /* sign; K_m, N m/A; K_b, V s/rad; L, H */

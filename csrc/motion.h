@@ -30,11 +30,11 @@ enum { CLOSED, OPEN, IMPOSED }; /* kinds of ends */
 
 /* The columns of kernels/tube_motion.py. */
 typedef struct {
-    double radius, roughness, load;  /* R, m; s, m; load at half of it, N */
-    double coefficient, sliding;     /* mu_c; v_r, m/s */
-    double viscosity, ends, length;  /* Pa s; one of the kinds; L_eff, m */
-    double cavitation;               /* the film's pressure is not below -p_c, Pa; infinite: without a bound */
-    double sites, stations;          /* their numbers */
+    double radius, roughness, load; /* R, m; s, m; load at half of it, N */
+    double coefficient, sliding;    /* mu_c; v_r, m/s */
+    double viscosity, ends, length; /* Pa s; one of the kinds; L_eff, m */
+    double cavitation;              /* the film's pressure is not below -p_c, Pa; infinite: without a bound */
+    double sites, stations;         /* their numbers */
 } Tube;
 
 /* A robot in its tube, opened from `packed` of tube_motion.py. */

@@ -17,9 +17,8 @@ static void sample(const uint8_t *image, int64_t height, int64_t width, double u
     }
 }
 
-EXPORT void sampled(
-    const uint8_t *image, const double (*pixels)[2], double (*colours)[3], int64_t height, int64_t width, int64_t count
-) {
+EXPORT void sampled(const uint8_t *image, const double (*pixels)[2], double (*colours)[3], int64_t height,
+                    int64_t width, int64_t count) {
     for (int64_t k = 0; k < count; k++) sample(image, height, width, pixels[k][0], pixels[k][1], colours[k]);
 }
 
@@ -30,10 +29,8 @@ static void insert(double *series, int64_t count, double value) {
     series[k] = value;
 }
 
-EXPORT void profile_of_rows(
-    const uint8_t *image, const double (*first)[2], const double (*last)[2], double *work, double (*colours)[3],
-    int64_t height, int64_t width, int64_t count, int64_t rows
-) {
+EXPORT void profile_of_rows(const uint8_t *image, const double (*first)[2], const double (*last)[2], double *work,
+                            double (*colours)[3], int64_t height, int64_t width, int64_t count, int64_t rows) {
     for (int64_t n = 0; n < count; n++) {
         int64_t seen = 0;
         for (int64_t m = 0; m < rows; m++) {
@@ -57,7 +54,7 @@ EXPORT void profile_of_rows(
 
 /* Colours of the stripes in their order around the axis. */
 typedef struct {
-    const int64_t *order;      /* class of each stripe */
+    const int64_t *order;       /* class of each stripe */
     const double (*palette)[3]; /* colour of each class */
     int64_t stripes, classes;
 } Pattern;
@@ -76,22 +73,21 @@ static void stripe_colour(const Pattern *p, double angle, double blur, double ro
     for (int c = 0; c < 3; c++) colour[c] = one[c] * (1.0 - before) + two[c] * (before - after) + three[c] * after;
 }
 
-EXPORT void stripes_at(
-    const double *angles, const double *blur, double roll, const int64_t *order, const double (*palette)[3],
-    double (*colours)[3], int64_t count, int64_t stripes, int64_t classes
-) {
+EXPORT void stripes_at(const double *angles, const double *blur, double roll, const int64_t *order,
+                       const double (*palette)[3], double (*colours)[3], int64_t count, int64_t stripes,
+                       int64_t classes) {
     const Pattern pattern = {order, palette, stripes, classes};
     for (int64_t n = 0; n < count; n++) stripe_colour(&pattern, angles[n], blur[n], roll, colours[n]);
 }
 
 /* A sample of a colour profile, and what the fit makes of it. */
 typedef struct {
-    double angle, blur;       /* rad; standard deviation of the blur there */
-    double colour[3];         /* observed; 0 where invisible */
+    double angle, blur;        /* rad; standard deviation of the blur there */
+    double colour[3];          /* observed; 0 where invisible */
     double shade[3], sheen[3]; /* shading factor and additive sheen of each channel */
-    double model[3];          /* colour of the stripes */
-    double base, weight;      /* weight of the angle, and that of its residual */
-    double score;             /* its contribution to the fit's gradient */
+    double model[3];           /* colour of the stripes */
+    double base, weight;       /* weight of the angle, and that of its residual */
+    double score;              /* its contribution to the fit's gradient */
 } Sample;
 
 enum { SAMPLE = 17 };
@@ -167,9 +163,8 @@ static double even_loss(Profile p, const Pattern *pattern, double cut) {
 }
 
 /* Losses on a grid of rotation angles; returns the index of the least. Only every other sample is used. */
-static int64_t search_grid(
-    Profile p, const Pattern *pattern, Robustness r, double period, double *losses, int64_t tries
-) {
+static int64_t search_grid(Profile p, const Pattern *pattern, Robustness r, double period, double *losses,
+                           int64_t tries) {
     const Profile some = {p.first, (p.count + 1) / 2, 2};
     double gain[3];
     int64_t best = 0;
@@ -213,7 +208,7 @@ static Sums sums_about(Profile p, const Pattern *pattern, double roll, const dou
 
 /* Standard error of the angle; neighbouring angles share pixels, so that residuals are correlated. */
 static double error_of(Profile p, const Sums *sums, double usual) {
-    enum { CORRELATED = 6 }; /* largest lag, in angles */
+    enum { CORRELATED = 6 };                  /* largest lag, in angles */
     if (sums->information < 1e-6) return NAN; /* the colours do not depend on the angle */
     double most = 0.0;
     for (int64_t n = 0; n < p.count; n++) most = larger(most, p.first[n].base);
@@ -224,9 +219,8 @@ static double error_of(Profile p, const Sums *sums, double usual) {
 }
 
 /* Whether enough of the surface is visible: neither hidden nor too oblique. */
-static bool is_visible(
-    const double (*profile)[3], const double *scale, const double *trust, double blur, Sample *samples, int64_t count
-) {
+static bool is_visible(const double (*profile)[3], const double *scale, const double *trust, double blur,
+                       Sample *samples, int64_t count) {
     const double oblique = 0.15, least = 0.3; /* of the largest scale, and of the surface */
     double most = scale[0], seen = 0.0, all_of = 0.0;
     for (int64_t n = 1; n < count; n++) most = larger(most, scale[n]);
@@ -253,12 +247,10 @@ static double distant_loss(const double *losses, int64_t tries, int64_t best, in
     return least;
 }
 
-EXPORT void stripe_fit(
-    const double (*profile)[3], const double *scale, const double *trust, const double *angles,
-    const double (*shade)[6], const int64_t *order, const double (*palette)[3], double period, double tint, double cut,
-    double usual, double blur, double *work, double *losses, double answer[8], int64_t count, int64_t stripes,
-    int64_t classes, int64_t tries
-) {
+EXPORT void stripe_fit(const double (*profile)[3], const double *scale, const double *trust, const double *angles,
+                       const double (*shade)[6], const int64_t *order, const double (*palette)[3], double period,
+                       double tint, double cut, double usual, double blur, double *work, double *losses,
+                       double answer[8], int64_t count, int64_t stripes, int64_t classes, int64_t tries) {
     const Pattern pattern = {order, palette, stripes, classes};
     const Profile all = {(Sample *)work, count, 1};
     const Robustness robust = {tint, cut};

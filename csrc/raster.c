@@ -4,7 +4,7 @@
  */
 #include "core.h"
 
-enum { SAMPLES = 16 };              /* of a pixel */
+enum { SAMPLES = 16 };             /* of a pixel */
 static const double EMPTY = -1e30; /* height of a sample that has met nothing */
 
 /* Reflection of light by a material (Blinn-Phong), as the Python layer packs it. */
@@ -16,11 +16,9 @@ _Static_assert(sizeof(Material) == 4 * sizeof(double), "the layout of a packed m
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-EXPORT void shade(
-    const double (*normals)[3], const double turn[3][3], const double (*towards)[3], const double (*halfway)[3],
-    const double *strength, const Material *materials, const int64_t *kind, double *diffuse, double *specular,
-    int64_t triangles, int64_t lamps, int64_t kinds
-) {
+EXPORT void shade(const double (*normals)[3], const double turn[3][3], const double (*towards)[3],
+                  const double (*halfway)[3], const double *strength, const Material *materials, const int64_t *kind,
+                  double *diffuse, double *specular, int64_t triangles, int64_t lamps, int64_t kinds) {
     (void)kinds;
     for (int64_t i = 0; i < 3 * triangles; i++) {
         const Material material = materials[kind[i / 3]];
@@ -75,10 +73,8 @@ static void colour_at(const Surface *s, double share_b, double share_c, float co
 }
 
 /* Draw a triangle into the samples of a pixel, given its shares at the pixel's centre. */
-static void draw_pixel(
-    const Plane *p, const Surface *surface, double share_b, double share_c, int count, const int *which,
-    const double *du, const double *dv, float *depth, float (*picture)[3]
-) {
+static void draw_pixel(const Plane *p, const Surface *surface, double share_b, double share_c, int count,
+                       const int *which, const double *du, const double *dv, float *depth, float (*picture)[3]) {
     const double base = p->z + share_b * p->zb + share_c * p->zc;
     const double zu = p->zb * p->bu + p->zc * p->cu, zv = p->zb * p->bv + p->zc * p->cv;
     double heights[SAMPLES];
@@ -114,9 +110,15 @@ static void draw_triangle(const Window *w, const Spots *spots, const double *cor
     if (!(twice < 0.0)) return; /* v runs downwards: outward triangles that are seen turn the other way */
     const double inverse = 1.0 / twice;
     const Plane p = {
-        .u = a[0], .v = a[1], .z = a[2], .zb = b[2] - a[2], .zc = c[2] - a[2],
-        .bu = (c[1] - a[1]) * inverse, .bv = -(c[0] - a[0]) * inverse,
-        .cu = -(b[1] - a[1]) * inverse, .cv = (b[0] - a[0]) * inverse,
+        .u = a[0],
+        .v = a[1],
+        .z = a[2],
+        .zb = b[2] - a[2],
+        .zc = c[2] - a[2],
+        .bu = (c[1] - a[1]) * inverse,
+        .bv = -(c[0] - a[0]) * inverse,
+        .cu = -(b[1] - a[1]) * inverse,
+        .cv = (b[0] - a[0]) * inverse,
     };
     /* A pixel in which a share falls short by more than this lies outside. */
     const double spare_b = -0.5 * (fabs(p.bu) + fabs(p.bv)), spare_c = -0.5 * (fabs(p.cu) + fabs(p.cv));
@@ -132,20 +134,17 @@ static void draw_triangle(const Window *w, const Spots *spots, const double *cor
             const double share_c = ((double)u - p.u) * p.cu + ((double)v - p.v) * p.cv;
             if (share_b < spare_b || share_c < spare_c || share_b + share_c > spare_a) continue;
             const int64_t variant = 4 * (v & 3) + (u & 3), at = ((v - w->top) * w->columns + u - w->left) * SAMPLES;
-            draw_pixel(
-                &p, surface, share_b, share_c, spots->count, spots->which, spots->du[variant], spots->dv[variant],
-                w->depth + at, w->picture + at
-            );
+            draw_pixel(&p, surface, share_b, share_c, spots->count, spots->which, spots->du[variant],
+                       spots->dv[variant], w->depth + at, w->picture + at);
         }
     }
 }
 
-EXPORT void draw(
-    const double (*seen)[3], const int64_t (*faces)[3], const double (*colour)[3], const double (*gloss)[3],
-    const double (*diffuse)[3], const double (*specular)[3], const double spots[16][2][SAMPLES], int64_t first,
-    int64_t every, int64_t left, int64_t top, float *depth, float (*picture)[3], int64_t vertices, int64_t triangles,
-    int64_t rows, int64_t columns
-) {
+EXPORT void draw(const double (*seen)[3], const int64_t (*faces)[3], const double (*colour)[3],
+                 const double (*gloss)[3], const double (*diffuse)[3], const double (*specular)[3],
+                 const double spots[16][2][SAMPLES], int64_t first, int64_t every, int64_t left, int64_t top,
+                 float *depth, float (*picture)[3], int64_t vertices, int64_t triangles, int64_t rows,
+                 int64_t columns) {
     (void)vertices;
     const Window window = {left, top, rows, columns, depth, picture};
     const Spots chosen = spots_of(spots, first, every);
@@ -158,9 +157,9 @@ EXPORT void draw(
 
 /* A soft shadow on the floor, a rounded bar, as the Python layer packs it; m. */
 typedef struct {
-    double x, y, axis_x, axis_y;      /* its centre; unit vector along it */
-    double half_length, radius;       /* without the rounded ends; of these */
-    double softness, darkness;        /* width of its edge; relative loss of light */
+    double x, y, axis_x, axis_y; /* its centre; unit vector along it */
+    double half_length, radius;  /* without the rounded ends; of these */
+    double softness, darkness;   /* width of its edge; relative loss of light */
 } Shadow;
 
 _Static_assert(sizeof(Shadow) == 8 * sizeof(double), "the layout of a packed shadow");
@@ -172,11 +171,9 @@ static double lit(const Shadow *s, double x, double y) {
     return 1.0 - s->darkness / (1.0 + exp(smaller(far / s->softness, 50.0)));
 }
 
-EXPORT void blend(
-    float *depth, const float (*samples)[3], int64_t left, int64_t top, const float *over, const float *shine,
-    const float (*floors)[2], const Shadow *shadow, const double tint[3], float (*picture)[3], int64_t rows,
-    int64_t columns, int64_t whole_rows, int64_t whole_columns
-) {
+EXPORT void blend(float *depth, const float (*samples)[3], int64_t left, int64_t top, const float *over,
+                  const float *shine, const float (*floors)[2], const Shadow *shadow, const double tint[3],
+                  float (*picture)[3], int64_t rows, int64_t columns, int64_t whole_rows, int64_t whole_columns) {
     (void)whole_rows;
     for (int64_t cell = 0; cell < rows * columns; cell++) {
         const int64_t pixel = (top + cell / columns) * whole_columns + left + cell % columns;
@@ -196,11 +193,9 @@ EXPORT void blend(
     }
 }
 
-EXPORT void develop(
-    const float *light, const double *lens, const double gain[3], const double *curve, const float *grain,
-    const int64_t *starts, double sigma, uint8_t *restrict image, int64_t rows, int64_t columns, int64_t steps,
-    int64_t grains
-) {
+EXPORT void develop(const float *light, const double *lens, const double gain[3], const double *curve,
+                    const float *grain, const int64_t *starts, double sigma, uint8_t *restrict image, int64_t rows,
+                    int64_t columns, int64_t steps, int64_t grains) {
     const double last = (double)steps - 1.0;
     for (int64_t v = 0; v < rows; v++) {
         int64_t at = starts[v];

@@ -152,17 +152,16 @@ static Print print_at(const Ruler *ruler, double x, double y) {
     return inked ? (Print){0.0, 1.0} : (Print){1.0, 0.0};
 }
 
-EXPORT void still_picture(
-    const VirtualCamera *camera, const double *spots, const double colours[3][3], const Ruler *ruler,
-    const GlassTube *tube, const FloorWave *waves, const double oil[3], float *light, float *over, float *shine,
-    float (*floors)[2], int64_t samples, int64_t wave_count, int64_t rows, int64_t columns
-) {
+EXPORT void still_picture(const VirtualCamera *camera, const double *spots, const double colours[3][3],
+                          const Ruler *ruler, const GlassTube *tube, const FloorWave *waves, const double oil[3],
+                          float *light, float *over, float *shine, float (*floors)[2], int64_t samples,
+                          int64_t wave_count, int64_t rows, int64_t columns) {
     const double *ground = colours[0], *paper = colours[1], *ink = colours[2];
     const int64_t few = samples / 4 > 1 ? samples / 4 : 1; /* samples that also see the glass */
     const double size = (double)samples, some = (double)few;
     for (int64_t pixel = 0; pixel < rows * columns; pixel++) {
         const int64_t u = pixel % columns, v = pixel / columns;
-        const double(*spot)[2] = (const double(*)[2])(spots + 2 * samples * (4 * (v & 3) + (u & 3)));
+        const double (*spot)[2] = (const double (*)[2])(spots + 2 * samples * (4 * (v & 3) + (u & 3)));
         const Ray middle = sightline(camera, (double)u, (double)v);
         const double path = camera->surface / -middle.dz;
         const double at_x = middle.x + path * middle.dx, at_y = middle.y + path * middle.dy;

@@ -18,8 +18,10 @@ static double surface_crossing(double d, double a, double b, double n) {
     for (int k = 0; k < STEPS; k++) {
         const double rest = d - s, up = sqrt(s * s + a * a), down = sqrt(rest * rest + b * b);
         const double value = s / up - n * rest / down;
-        if (value > 0.0) high = s;
-        else low = s;
+        if (value > 0.0)
+            high = s;
+        else
+            low = s;
         const double step = value / (a * a / (up * up * up) + n * b * b / (down * down * down));
         s -= step;
         if (fabs(step) < 1e-9 * d) break;
@@ -95,8 +97,7 @@ EXPORT void pixels_of_points(const double (*points)[3], const Camera *camera, do
     for (int64_t i = 0; i < count; i++) pixel_of_point(camera, points[i], pixels[i]);
 }
 
-EXPORT void points_of_pixels(
-    const double (*pixels)[2], double level, const Camera *camera, double (*points)[3], int64_t count
-) {
+EXPORT void points_of_pixels(const double (*pixels)[2], double level, const Camera *camera, double (*points)[3],
+                             int64_t count) {
     for (int64_t i = 0; i < count; i++) point_of_pixel(camera, pixels[i], level, points[i]);
 }

@@ -43,10 +43,16 @@ static const double COEFFICIENTS[STAGES][STAGES] = {
      -54.66780262877968, -9.48861652309627},
 };
 /* c_i and d_i */
-static const double NODES[STAGES] = {0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716,
-                                     0.4288403609558664, 1.0, 1.0, 1.0};
-static const double TIMES[STAGES] = {0.21193756319429014, -0.42387512638858027, -0.3384627126235924,
-                                     1.8046452872882734, 2.325825639765069, 0.0, 0.0, 0.0};
+static const double NODES[STAGES]
+    = {0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0, 1.0};
+static const double TIMES[STAGES] = {0.21193756319429014,
+                                     -0.42387512638858027,
+                                     -0.3384627126235924,
+                                     1.8046452872882734,
+                                     2.325825639765069,
+                                     0.0,
+                                     0.0,
+                                     0.0};
 /* Continuous output (1 - s) y_0 + s (y_1 + (1 - s) (k_1 + s (k_2 + s k_3))), k = DENSE u, s from 0 to 1 over a step. */
 static const double DENSE[3][STAGES] = {
     {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
@@ -172,7 +178,7 @@ typedef struct {
 } Factors;
 
 static void factorise(Factors *factors) {
-    double(*a)[ACTING] = factors->a;
+    double (*a)[ACTING] = factors->a;
     for (int k = 0; k < ACTING; k++) {
         int best = k;
         for (int i = k + 1; i < ACTING; i++)
@@ -259,7 +265,7 @@ static double error_of(const Step *s, const Sizes *sizes, double near, double to
 
 /* The state inside a step, of order 4, at a share of it from 0 to 1. */
 EXPORT void interpolate(double share, const double *y, const double *end, const double *increments, double *out) {
-    const double(*u)[STATES] = (const double(*)[STATES])increments;
+    const double (*u)[STATES] = (const double (*)[STATES])increments;
     for (int i = 0; i < STATES; i++) {
         double k[3] = {0.0, 0.0, 0.0};
         for (int j = 0; j < STAGES; j++)
@@ -294,8 +300,8 @@ EXPORT void observe(const double *time, const double *states, double *data, cons
     }
 }
 
-EXPORT void gaps_of(const double *y, double *data, const double *table, double *gaps, int64_t size,
-                    int64_t table_size, int64_t count) {
+EXPORT void gaps_of(const double *y, double *data, const double *table, double *gaps, int64_t size, int64_t table_size,
+                    int64_t count) {
     const Robot robot = robot_opened(data, table, size, table_size);
     (void)count;
     find_gaps(&robot, y, gaps);
@@ -313,9 +319,9 @@ typedef struct {
     const Sizes *sizes;
     const Limits *limits;
     double rough, tolerance, stop;
-    bool clip;      /* whether a step ends at `stop` */
+    bool clip; /* whether a step ends at `stop` */
     Memory *memory;
-    int64_t count;  /* of what is watched */
+    int64_t count;                                      /* of what is watched */
     double now[MOST_CONTACTS + WATCHED], rates[STATES]; /* at the end of the step */
     Step step;
 } Run;
@@ -360,9 +366,16 @@ EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double toleranc
                        const double *sizes, const double *limits, double rough, double *data, const double *table,
                        int64_t count, int64_t sample_count, int64_t size, int64_t table_size) {
     Run run = {
-        .robot = robot_opened(data, table, size, table_size), .sizes = (const Sizes *)sizes,
-        .limits = (const Limits *)limits, .rough = rough, .tolerance = tolerance, .stop = stop, .clip = clip != 0,
-        .memory = (Memory *)memory, .count = count, .step.u = (double(*)[STATES])increments,
+        .robot = robot_opened(data, table, size, table_size),
+        .sizes = (const Sizes *)sizes,
+        .limits = (const Limits *)limits,
+        .rough = rough,
+        .tolerance = tolerance,
+        .stop = stop,
+        .clip = clip != 0,
+        .memory = (Memory *)memory,
+        .count = count,
+        .step.u = (double (*)[STATES])increments,
     };
     Step *s = &run.step;
     int64_t answered = 0;
@@ -373,7 +386,8 @@ EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double toleranc
         copy(y, s->y);
         if (!found_step(&run)) return STUCK;
         for (; answered < sample_count && samples[answered] <= run.memory->time; answered++)
-            interpolate((samples[answered] - s->time) / s->length, s->y, s->end, increments, states + answered * STATES);
+            interpolate((samples[answered] - s->time) / s->length, s->y, s->end, increments,
+                        states + answered * STATES);
         run.memory->answered = (double)answered;
         copy(s->y, before);
         copy(s->end, y);

@@ -18,28 +18,34 @@
 
 enum { HEADER = 8, YAW_LIMIT = 7, YAW_ORDERS = 6, MOST_NODES = 12, MOST_PHASES = 99 };
 
-static const double STEEPEST[2] = {12.0 * PI / 180.0, 8.0 * PI / 180.0}; /* largest pitch of a table nose up, down, rad */
-static const double PITCH_SLACK = 1.1; /* of the largest pitch: where the glass sets it, the tail touches beyond it */
-static const double YAW_SLACK = 1.1;   /* of the largest yaw, likewise */
-static const double ROUNDING = 1e-9;   /* of angles given in degrees */
-static const double BEYOND = 1.3;      /* the largest pitch, so that the logarithm stays finite at contact */
+static const double STEEPEST[2]
+    = {12.0 * PI / 180.0, 8.0 * PI / 180.0}; /* largest pitch of a table nose up, down, rad */
+static const double PITCH_SLACK = 1.1;  /* of the largest pitch: where the glass sets it, the tail touches beyond it */
+static const double YAW_SLACK = 1.1;    /* of the largest yaw, likewise */
+static const double ROUNDING = 1e-9;    /* of angles given in degrees */
+static const double BEYOND = 1.3;       /* the largest pitch, so that the logarithm stays finite at contact */
 static const double BEYOND_YAWED = 2.5; /* of what a yaw adds: its largest one is less at such pitches */
-static const double BEYOND_YAW = 1.2;  /* the largest yaw, so that the inverse tangent stays finite at contact */
-static const double LAST_YAW = 0.95;   /* yaw of the last nodes, over the largest one */
-static const double LEAST_YAW = 1e-3;  /* rad, where the tail nearly touches the glass without a yaw */
+static const double BEYOND_YAW = 1.2;   /* the largest yaw, so that the inverse tangent stays finite at contact */
+static const double LAST_YAW = 0.95;    /* yaw of the last nodes, over the largest one */
+static const double LEAST_YAW = 1e-3;   /* rad, where the tail nearly touches the glass without a yaw */
 
 Table table_opened(const double *packed) {
     Table t = {
-        .radius = packed[0], .rings = (int64_t)packed[1], .gaps = (int64_t)packed[2], .up = (int64_t)packed[3],
-        .down = (int64_t)packed[4], .phases = (int64_t)packed[5], .yaw_gaps = (int64_t)packed[6],
+        .radius = packed[0],
+        .rings = (int64_t)packed[1],
+        .gaps = (int64_t)packed[2],
+        .up = (int64_t)packed[3],
+        .down = (int64_t)packed[4],
+        .phases = (int64_t)packed[5],
+        .yaw_gaps = (int64_t)packed[6],
         .yaw_pitches = (int64_t)packed[7],
     };
     const int64_t block = t.phases * FACTOR;
-    t.outline = (const double(*)[4])(packed + HEADER);
+    t.outline = (const double (*)[4])(packed + HEADER);
     t.gap_nodes = packed + HEADER + 4 * t.rings;
     t.up_nodes = t.gap_nodes + t.gaps;
     t.down_nodes = t.up_nodes + t.up;
-    t.most = (const double(*)[2])(t.down_nodes + t.down);
+    t.most = (const double (*)[2])(t.down_nodes + t.down);
     t.yaw_gap_nodes = t.down_nodes + t.down + 2 * t.gaps;
     t.yaw_pitch_nodes = t.yaw_gap_nodes + t.yaw_gaps;
     t.yaw_limit = t.yaw_pitch_nodes + t.yaw_pitches;
@@ -257,7 +263,7 @@ static double offset_at_gap(const Film *film, double gap, double pitch, double y
 }
 
 EXPORT double contact_offset(const double *rings, double radius, double pitch, int64_t count) {
-    return contact_offset_at((const double(*)[4])rings, count, radius, pitch);
+    return contact_offset_at((const double (*)[4])rings, count, radius, pitch);
 }
 
 EXPORT double contact_offset_of(const double *packed, double pitch) {
@@ -282,13 +288,13 @@ EXPORT void outer_coefficients(const double *packed, double e, double pitch, dou
 EXPORT int64_t resistance_at(const double *packed, double e, double pitch, double yaw, double phase, double *out) {
     const Table table = table_opened(packed);
     double film[6][6];
-    return table_resistance(&table, (Pose){e, pitch, yaw}, phase, film, (double(*)[MOTIONS])out);
+    return table_resistance(&table, (Pose){e, pitch, yaw}, phase, film, (double (*)[MOTIONS])out);
 }
 
 EXPORT int64_t mean_resistance_at(const double *packed, double e, double pitch, double yaw, int64_t phases,
                                   double *out) {
     const Table table = table_opened(packed);
-    return table_mean_resistance(&table, (Pose){e, pitch, yaw}, phases, (double(*)[MOTIONS])out);
+    return table_mean_resistance(&table, (Pose){e, pitch, yaw}, phases, (double (*)[MOTIONS])out);
 }
 
 EXPORT void mean_resistances(const double *tables, const int64_t *which, const double *gap, const double *pitch,
@@ -297,7 +303,7 @@ EXPORT void mean_resistances(const double *tables, const int64_t *which, const d
     (void)rows;
     for (int64_t n = 0; n < count; n++) {
         const Table table = table_opened(tables + which[n] * size);
-        double(*matrix)[MOTIONS] = (double(*)[MOTIONS])(out + n * MOTIONS * MOTIONS);
+        double (*matrix)[MOTIONS] = (double (*)[MOTIONS])(out + n * MOTIONS * MOTIONS);
         const double e = offset_at_gap(&table.film, gap[n], pitch[n], yaw[n]);
         int left = TOO_FAR_PITCHED;
         if (e >= 0.0) left = table_mean_resistance(&table, (Pose){e, pitch[n], yaw[n]}, phases, matrix);

@@ -5,21 +5,21 @@
 #include "core.h"
 #include "film.h"
 
-enum { MOTIONS = 8 };                             /* U and Omega of the body, omega_m of the rotor against it, mean flow */
-enum { FACTOR = MOTIONS * (MOTIONS + 1) / 2 };    /* entries of a Cholesky factor */
-enum { INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED };  /* how a table's range was left */
+enum { MOTIONS = 8 };                          /* U and Omega of the body, omega_m of the rotor against it, mean flow */
+enum { FACTOR = MOTIONS * (MOTIONS + 1) / 2 }; /* entries of a Cholesky factor */
+enum { INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED }; /* how a table's range was left */
 
 /* A packed table, opened; see `packed` of spirillum/kernels/tube_table.py. */
 typedef struct {
-    double radius;                                         /* R of the tube, m */
+    double radius; /* R of the tube, m */
     int64_t rings, gaps, up, down, phases, yaw_gaps, yaw_pitches;
-    const double (*outline)[4];                            /* rings: x, rho, semi-axis along, across, m */
-    const double *gap_nodes, *up_nodes, *down_nodes;       /* t; f nose up; f nose down */
-    const double (*most)[2];                               /* largest pitch nose up, nose down at the nodes t, rad */
+    const double (*outline)[4];                      /* rings: x, rho, semi-axis along, across, m */
+    const double *gap_nodes, *up_nodes, *down_nodes; /* t; f nose up; f nose down */
+    const double (*most)[2];                         /* largest pitch nose up, nose down at the nodes t, rad */
     const double *yaw_gap_nodes, *yaw_pitch_nodes;
-    const double *yaw_limit;                               /* of `limited_yaw` */
-    const double *outer;                                   /* (gaps, up + down - 1, phases, FACTOR) */
-    const double *yawed;                                   /* (yaw_gaps, yaw_pitches, YAW_ORDERS, phases, FACTOR) */
+    const double *yaw_limit; /* of `limited_yaw` */
+    const double *outer;     /* (gaps, up + down - 1, phases, FACTOR) */
+    const double *yawed;     /* (yaw_gaps, yaw_pitches, YAW_ORDERS, phases, FACTOR) */
     Film film;
 } Table;
 

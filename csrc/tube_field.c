@@ -44,9 +44,9 @@ typedef struct {
 
 /* Waves of one k and order p at places. */
 typedef struct {
-    double k, wall, z[LANES];          /* k R and k rho */
-    double scale[LANES];                /* I_p(k rho)/I_p(k R) */
-    double cos[LANES], sin[LANES];      /* of p theta */
+    double k, wall, z[LANES];      /* k R and k rho */
+    double scale[LANES];           /* I_p(k rho)/I_p(k R) */
+    double cos[LANES], sin[LANES]; /* of p theta */
 } Waves;
 
 /* Order 0; `top` is exp(-k R) I_0(k R). */

@@ -22,10 +22,16 @@ TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *ta
     const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
     const double *flow = (const double *)(stations + (int64_t)tube->stations);
     return (TubeRobot){
-        .links = (const Links *)packed, .tube = tube, .wire = wire, .sites = sites, .stations = stations,
-        .flow = (const double(*)[2])flow,
-        .site_count = (int64_t)tube->sites, .station_count = (int64_t)tube->stations,
-        .flow_count = (packed + size - flow) / 2, .table = table_opened(table),
+        .links = (const Links *)packed,
+        .tube = tube,
+        .wire = wire,
+        .sites = sites,
+        .stations = stations,
+        .flow = (const double (*)[2])flow,
+        .site_count = (int64_t)tube->sites,
+        .station_count = (int64_t)tube->stations,
+        .flow_count = (packed + size - flow) / 2,
+        .table = table_opened(table),
     };
 }
 
@@ -52,7 +58,7 @@ static void note_place(const State *y, const double rotation[3][3], double radiu
 
 /* Imposed mean velocity, m/s: straight between its times, constant beyond. */
 static double imposed_flow(const TubeRobot *robot, double time) {
-    const double(*flow)[2] = robot->flow;
+    const double (*flow)[2] = robot->flow;
     int64_t before = 0, after = robot->flow_count - 1;
     if (time >= flow[after][0]) return flow[after][1];
     if (time <= flow[0][0]) return flow[0][1];
@@ -84,8 +90,7 @@ static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *s
     for (int i = 0; i < RATES; i++) {
         fluid->opened[i] = opened * m[i][7];
         fluid->stream[i] = tube->viscosity * m[i][7] * seen->mean_flow;
-        for (int j = 0; j < RATES; j++)
-            fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
+        for (int j = 0; j < RATES; j++) fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
     }
 }
 
@@ -96,7 +101,7 @@ typedef struct {
     double rotation[3][3];
     Balance *balance; /* forces and contacts that are added to */
     Seen *seen;
-    double *gaps;     /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
+    double *gaps; /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
 } Touch;
 
 /* Add one contact to the balance, and its push to the force. */
@@ -238,7 +243,9 @@ static void set_slices(const TubeRobot *robot, const State *y, const double rota
         const double roll = 2.0 * PI * width * squared(width) / (s->bend * squared(s->gap));
         for (int i = 0; i < 6; i++)
             for (int j = 0; j < 6; j++)
-                sliced[i][j] += length * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
+                sliced[i][j]
+                    += length
+                     * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
     }
     b->viscosity = robot->tube->viscosity / larger(largest_share(fluid->film, sliced), 1.0);
 }
@@ -281,8 +288,8 @@ static double towards_wall(const double force[3], const double rotation[3][3], d
 }
 
 /* Note the forces towards the wall, which sum to zero, and take from the fluid's power what the film's bound saves. */
-static void note_loads(const Balance *b, double mu, const Fluid *fluid, const double weight[RATES], const double asperities[RATES],
-                       const double rotation[3][3], Seen *seen) {
+static void note_loads(const Balance *b, double mu, const Fluid *fluid, const double weight[RATES],
+                       const double asperities[RATES], const double rotation[3][3], Seen *seen) {
     const double *q = seen->rates;
     double film[3], outer[3], contact[3], lift[3] = {0.0};
     for (int i = 0; i < 3; i++) {

@@ -102,8 +102,8 @@ EXPORT void wave_extensions(double k, double radius, const double *rho, const do
                 fill_flows(p, z, wall, r, v);
                 for (int i = 0; i < 9; i += 3) {
                     for (int j = 0; j < 3; j++) {
-                        EACH_LANE u[i + j][l] =
-                            size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
+                        EACH_LANE u[i + j][l]
+                            = size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
                     }
                 }
                 for (int l = 0; l < some; l++) {

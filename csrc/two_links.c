@@ -14,7 +14,10 @@ TwoLinks two_links_opened(const double *packed, int64_t size) {
     const double *drag = packed + sizeof(Links) / sizeof(double), *wall = drag + RATES * RATES;
     const double *rings = wall + sizeof(Wall) / sizeof(double);
     return (TwoLinks){
-        .links = (const Links *)packed, .drag = drag, .wall = (const Wall *)wall, .rings = (const Ring *)rings,
+        .links = (const Links *)packed,
+        .drag = drag,
+        .wall = (const Wall *)wall,
+        .rings = (const Ring *)rings,
         .ring_count = (packed + size - rings) * (int64_t)sizeof(double) / (int64_t)sizeof(Ring),
     };
 }
@@ -61,8 +64,8 @@ static double film_resistance_of(const Ring *ring, const Wall *wall, double film
  *
  * Films are counted from the tips of the roughness s. Thinner than s, these are pressed together, with the force
  * N (s/h - 1) and the energy N (s log(s/h) - s + h) for a load N of the robot's order. */
-static void add_films(const TwoLinks *robot, const State *y, const double rotation[3][3],
-                      double fluid[RATES][RATES], double force[RATES], Seen *seen) {
+static void add_films(const TwoLinks *robot, const State *y, const double rotation[3][3], double fluid[RATES][RATES],
+                      double force[RATES], Seen *seen) {
     const double rough = robot->wall->roughness, load = robot->wall->load;
     seen->film = INFINITY;
     seen->pressed = 0.0;
@@ -120,5 +123,5 @@ double two_links_film(const TwoLinks *robot, const State *y) {
 }
 
 EXPORT double film_of(const double *y, const double *rotation, const double *wall, const double *ring, double *j) {
-    return film_at_ring((const Ring *)ring, (const Wall *)wall, (const State *)y, (const double(*)[3])rotation, j);
+    return film_at_ring((const Ring *)ring, (const Wall *)wall, (const State *)y, (const double (*)[3])rotation, j);
 }

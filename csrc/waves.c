@@ -8,10 +8,9 @@
  */
 #include "newey_west.h"
 
-EXPORT void ridge_of(
-    const uint8_t *image, const double (*middle)[2], const double (*across)[2], const double contrast[3],
-    int64_t inner, double *work, double *ridge, int64_t height, int64_t width, int64_t rows, int64_t columns
-) {
+EXPORT void ridge_of(const uint8_t *image, const double (*middle)[2], const double (*across)[2],
+                     const double contrast[3], int64_t inner, double *work, double *ridge, int64_t height,
+                     int64_t width, int64_t rows, int64_t columns) {
     const double half = 0.5 * ((double)columns - 1.0);
     const int64_t side = 2 * inner + 1;
     double *sums = work; /* through the columns before */
@@ -78,9 +77,8 @@ typedef struct {
 } Crossing;
 
 /* `cos_xi`, `sin_xi` are r cos(a) and r sin(a) at xi; `hand` = -1 mirrors the heights. */
-static Crossing crossing_of(
-    const Wave *w, const Tilt *tilt, double xi, double phase, double cos_xi, double sin_xi, double hand
-) {
+static Crossing crossing_of(const Wave *w, const Tilt *tilt, double xi, double phase, double cos_xi, double sin_xi,
+                            double hand) {
     const double at = xi - tilt->e * hand * sin_xi, at_turn = -tilt->e * hand * cos_xi; /* with its derivative by phi */
     const double a = w->wavenumber * at + w->angle + phase, a_turn = 1.0 + w->wavenumber * at_turn;
     const double r = radius_at(w, at), r_turn = at > 0.0 ? (w->amplitude - r) * w->decay * at_turn : 0.0;
@@ -93,10 +91,9 @@ static Crossing crossing_of(
     };
 }
 
-EXPORT void wave_scores(
-    const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double step, int64_t every,
-    const double (*turns)[2], double *scores, int64_t rows, int64_t columns, int64_t phases
-) {
+EXPORT void wave_scores(const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double step,
+                        int64_t every, const double (*turns)[2], double *scores, int64_t rows, int64_t columns,
+                        int64_t phases) {
     const Wave wave = with_taper(packed);
     const double half = 0.5 * ((double)columns - 1.0);
     int64_t count = 0;
@@ -143,9 +140,8 @@ typedef struct {
 } Strip;
 
 /* Lateral distance of the ridge from the curve in a row, within a search window; `aside` is the curve's offset. */
-static void find_residual(
-    const Strip *strip, const Wave *wave, double phase, double window, double aside, int64_t i, Row *row
-) {
+static void find_residual(const Strip *strip, const Wave *wave, double phase, double window, double aside, int64_t i,
+                          Row *row) {
     const double *line = strip->ridge + i * strip->columns, xi = strip->xi[i], step = strip->step, usual = strip->usual;
     const double half = 0.5 * ((double)strip->columns - 1.0), last = (double)strip->columns - 1.0;
     row->residual = row->basis[0] = row->y = row->mirrored = row->ridge = 0.0;
@@ -232,10 +228,8 @@ static void invert(double m[3][3], double inverse[3][3]) {
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* Standard error, inlier share, handedness and amplitude error of a converged fit. */
-static void assess(
-    const Strip *strip, Row *rows, const View *view, const Normal *normal, double inverse[3][3], double width,
-    double answer[10]
-) {
+static void assess(const Strip *strip, Row *rows, const View *view, const Normal *normal, double inverse[3][3],
+                   double width, double answer[10]) {
     double close = 0.0, square = 0.0, mean = 0.0, other[3][3];
     for (int64_t i = 0; i < strip->rows; i++) {
         Row *row = rows + i;
@@ -267,11 +261,9 @@ static void assess(
     }
 }
 
-EXPORT void wave_fit(
-    const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double phase, double step,
-    double width, double usual, double likely_offset, double likely_lean, double *work, double answer[10],
-    int64_t count, int64_t columns
-) {
+EXPORT void wave_fit(const double *ridge, const double *xi, const Tilt *tilt, const Wave *packed, double phase,
+                     double step, double width, double usual, double likely_offset, double likely_lean, double *work,
+                     double answer[10], int64_t count, int64_t columns) {
     const Wave wave = with_taper(packed);
     const Strip strip = {ridge, xi, tilt, count, columns, step, usual};
     const double length = xi[count - 1] - xi[0];

@@ -6,7 +6,7 @@ typedef struct {
     double rest[MOTIONS][MOTIONS], radius, body, sliding, axial, largest, stations[5][2];
 } StandIn;
 
-static Table stand_in_opened(const double *packed) { return (Table){.outline = (const double(*)[4])packed}; }
+static Table stand_in_opened(const double *packed) { return (Table){.outline = (const double (*)[4])packed}; }
 
 static void cross(const double a[3], const double b[3], double out[3]) {
     for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
@@ -60,5 +60,5 @@ static int stand_in_resistance(const Table *table, Pose pose, double phase, doub
 EXPORT void stand_in_at(const double *table, double offset, double *out) {
     const Table opened = stand_in_opened(table);
     double film[6][6];
-    stand_in_resistance(&opened, (Pose){offset, 0.0, 0.0}, 0.0, film, (double(*)[MOTIONS])out);
+    stand_in_resistance(&opened, (Pose){offset, 0.0, 0.0}, 0.0, film, (double (*)[MOTIONS])out);
 }

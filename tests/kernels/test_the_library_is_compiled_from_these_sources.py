@@ -1,6 +1,10 @@
 """The library is that of csrc/, compiles without a warning, and its stubs check what they are given."""
 
+import os
 import runpy
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -44,3 +48,38 @@ def test_an_argument_of_another_type_or_order_is_copied() -> None:
     expected = contact_offset(rings, 9.0, 0.1)
     assert contact_offset(np.asfortranarray(rings), 9.0, 0.1) == contact_offset(rings.astype(np.float32), 9.0, 0.1)
     assert contact_offset(rings=rings, radius=9, pitch=np.float32(0.1)) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_no_command_reads_or_writes_outside_of_its_arrays(build: dict[str, Any], tmp_path: Path) -> None:
+    """A copy of the package with a library that checks every access and undefined behaviour."""
+    sanitizer = (
+        shutil.which("gcc")
+        and subprocess.run(
+            ["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
+        ).stdout.strip()
+    )
+    if not sanitizer or not Path(sanitizer).is_file():
+        pytest.skip("gcc has no address sanitizer here")
+    package = tmp_path / "spirillum"
+    shutil.copytree(Path(native.__file__).parents[1], package, ignore=shutil.ignore_patterns("_core*", "__pycache__"))
+    flags = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined")
+    build["compile_all"](package / "kernels", flags)
+    environment = os.environ | {
+        "LD_PRELOAD": sanitizer,
+        "ASAN_OPTIONS": "detect_leaks=0",
+        "PYTHONPATH": str(tmp_path),
+        "SPIRILLUM_CACHE": "off",
+    }
+    commands = (
+        ["predict", "biorob2012-wide", "--motion", "held", "--json"],
+        ["predict", "biorob2012-wide", "--model", "slender", "--motion", "held", "--json"],
+        ["simulate", "biorob2012-wide", "--duration", "0.2s", "-o", "tube.nc"],
+        ["simulate", "biorob2012-wide", "--model", "slender", "--duration", "0.2s", "-o", "free.nc"],
+        ["simulate", "biorob2012-wide", "--motion", "held", "--model", "sbt", "--duration", "0.2s", "-o", "held.nc"],
+        ["render", "biorob2012-wide", "--duration", "0.2s", "-o", "film.mp4"],
+    )
+    for command in commands:
+        line = [sys.executable, "-m", "spirillum", *command]
+        said = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert said.returncode == 0, said.stderr[-3000:]
