@@ -94,8 +94,8 @@ def released_columns(answer: Answer) -> Iterator[Block]:
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
         yield from _over_unknowns(answer["trial"])
     if "steady" in there and "steady" not in missing:
-        constant = answer["steady"]["time_constant"]
-        after = f", approached with a time constant of {in_words(constant)}" if constant["value"] else ""
+        constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
+        after = f", approached with a time constant of {constant:.2g} s" if constant else ""
         yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
 
 
