@@ -346,7 +346,7 @@ def held_against_check(
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
         words = (
-            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked from "
+            f"{_falls(time, int(near[0]))} {_length(float(gap[near].min()))}, and its table was checked from "
             f"{_length(least)} on: the error estimate is that of larger gaps"
         )
         said.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
