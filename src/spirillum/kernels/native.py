@@ -176,7 +176,7 @@ class _Call:
         self._function.restype = _SCALARS.get(returned)
         passed: list[Any] = [_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()]
         self._function.argtypes = passed + [ctypes.c_int64] * len(self._names)
-        self._passed = [_PASSED.get(hint, _pointer) for hint in hints.values()]
+        self._passed: list[Callable[[Any], Any]] = [_PASSED.get(hint, _pointer) for hint in hints.values()]
         self._is_truth = returned is bool
         self._last: tuple[list[tuple[int, ...]], _Sizes] | None = None
 
