@@ -131,22 +131,21 @@ static double along_step(const Balance *b, const double left[RATES], const doubl
     return found;
 }
 
-/* Move q along a step to where the residual is half as large, or small along it, which grows along the step; the
- * residual's size. Where a prescribed spin makes the step no descent of the convex function, the size decides alone. */
+/* Move q along a step to where the residual along it, which grows, is small; the residual's size. Where a prescribed spin
+ * bends the step from that of the convex function, the size decides too. */
 static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES],
                         double left[RATES]) {
     const double begin = along_step(b, left, step);
+    const bool descends = begin < 0.0 || !b->prescribed;
     double low = 0.0, high = INFINITY, share = 1.0, size = 0.0, trial[RATES];
-    for (int round = 0; round < 60; round++) {
+    for (int round = 0; round < (descends ? 60 : 10); round++) {
         for (int i = 0; i < RATES; i++) trial[i] = q[i] + share * step[i];
         size = residual(b, trial, left);
-        if (size <= 0.5 * before || (begin >= 0.0 && size < before)) break;
+        if (b->prescribed && (size <= 0.5 * before || (!descends && size < before))) break;
         const double here = along_step(b, left, step);
-        if (begin >= 0.0)
-            high = share;
-        else if (here <= 0.5 * begin)
+        if (descends && here <= -0.5 * fabs(begin))
             low = share;
-        else if (here > -0.5 * begin)
+        else if (!descends || here > 0.5 * fabs(begin))
             high = share;
         else
             break;
