@@ -35,8 +35,9 @@ Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]) 
 
 static int skipped_row(const Balance *b) { return b->prescribed ? b->along : -1; }
 
-/* What rates leave of the balance; its size, in the measure of A's diagonal, without the row of a torque. */
-static double residual(const Balance *b, const double q[RATES], double left[RATES]) {
+/* What rates leave of the balance, and the lifts of its slices; its size, in the measure of A's diagonal, without the row
+ * of a torque. */
+static double residual(const Balance *b, const double q[RATES], double left[RATES], Lift lifts[MOST_SLICES]) {
     for (int i = 0; i < RATES; i++) {
         left[i] = -b->force[i];
         for (int j = 0; j < RATES; j++) left[i] += b->a[i][j] * q[j];
@@ -45,10 +46,11 @@ static double residual(const Balance *b, const double q[RATES], double left[RATE
         const Sliding s = sliding_at(c, q, b->slow);
         for (int i = 0; i < RATES; i++) left[i] += s.drag * (c->rows[0][i] * s.u + c->rows[1][i] * s.v);
     }
-    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
-        const Lift lift = lift_at(b, s, q);
+    for (int64_t n = 0; n < b->slice_count; n++) {
+        const Slice *s = b->slices + n;
+        lifts[n] = lift_at(b, s, q);
         for (int i = 0; i < RATES; i++)
-            left[i] -= s->length * (lift.normal * s->opening[i] + lift.along * s->entrainment[i]);
+            left[i] -= s->length * (lifts[n].normal * s->opening[i] + lifts[n].along * s->entrainment[i]);
     }
     double size = 0.0;
     for (int i = 0; i < RATES; i++)
@@ -83,7 +85,8 @@ static void add_slice(const Slice *s, Lift lift, double h[RATES][RATES]) {
  *
  * mu_c N_c J_c' (1 - (w v' + v w')/(2 s)) J_c/s with v = J_c q, s = sqrt(|v|^2 + v_r^2): positive definite, and the
  * derivative itself where w = v/s. */
-static void set_tangent(const Balance *b, const Duals duals, const double q[RATES], double h[RATES][RATES]) {
+static void set_tangent(const Balance *b, const Duals duals, const double q[RATES], const Lift lifts[MOST_SLICES],
+                        double h[RATES][RATES]) {
     for (int i = 0; i < RATES; i++)
         for (int j = 0; j < RATES; j++) h[i][j] = b->a[i][j];
     for (int64_t n = 0; n < b->count; n++) {
@@ -97,7 +100,7 @@ static void set_tangent(const Balance *b, const Duals duals, const double q[RATE
             for (int j = 0; j < RATES; j++) h[i][j] += x * c->rows[0][j] + z * c->rows[1][j];
         }
     }
-    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) add_slice(s, lift_at(b, s, q), h);
+    for (int64_t n = 0; n < b->slice_count; n++) add_slice(b->slices + n, lifts[n], h);
 }
 
 /* Largest share of a step from w that stays in the unit circle. */
@@ -133,14 +136,14 @@ static double along_step(const Balance *b, const double left[RATES], const doubl
 
 /* Move q along a step to where the residual along it, which grows, is small; the residual's size. Where a prescribed spin
  * bends the step from that of the convex function, the size decides too. */
-static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES],
-                        double left[RATES]) {
+static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES], double left[RATES],
+                        Lift lifts[MOST_SLICES]) {
     const double begin = along_step(b, left, step);
     const bool descends = begin < 0.0 || !b->prescribed;
     double low = 0.0, high = INFINITY, share = 1.0, size = 0.0, trial[RATES];
     for (int round = 0; round < (descends ? 60 : 10); round++) {
         for (int i = 0; i < RATES; i++) trial[i] = q[i] + share * step[i];
-        size = residual(b, trial, left);
+        size = residual(b, trial, left, lifts);
         if (b->prescribed && (size <= 0.5 * before || (!descends && size < before))) break;
         const double here = along_step(b, left, step);
         if (descends && here <= -0.5 * fabs(begin))
@@ -176,7 +179,8 @@ static void find_step(const Balance *b, double h[RATES][RATES], const double lef
 double balance_rates(const Balance *b, double q[RATES], double left[RATES]) {
     double h[RATES][RATES], step[RATES];
     Duals duals;
-    double size = residual(b, q, left);
+    Lift lifts[MOST_SLICES];
+    double size = residual(b, q, left, lifts);
     const double scale = larger(scale_of(b, q), 1e-300);
     for (int64_t n = 0; n < b->count; n++) {
         const Sliding s = sliding_at(b->contacts + n, q, b->slow);
@@ -185,11 +189,11 @@ double balance_rates(const Balance *b, double q[RATES], double left[RATES]) {
         duals[n][1] = s.v / speed;
     }
     for (int round = 0; round < ROUNDS && !(size <= BALANCED * scale); round++) {
-        set_tangent(b, duals, q, h);
+        set_tangent(b, duals, q, lifts, h);
         find_step(b, h, left, step);
         move_duals(b, q, step, duals);
         const double before = size;
-        size = take_step(b, before, step, q, left);
+        size = take_step(b, before, step, q, left, lifts);
         if (size > 0.5 * before && size <= 1e4 * BALANCED * scale) break; /* rounding */
     }
     return size / scale;
