@@ -107,7 +107,7 @@ class FreeRobot(ABC):
         return np.zeros(0)
 
     def observe(self, time: Samples, states: Samples) -> Samples:
-        """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 26) in a tube."""
+        """What is observed in states, (n, 19), at times, s: (n, 13), or (n, 31) in a tube."""
         out = np.empty((time.size, self.observed))
         stiff_steps.observe(time, states, self.data, self.table, out)
         return out

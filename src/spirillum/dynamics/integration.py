@@ -79,7 +79,7 @@ class Trajectory:
     states: Samples
     """States, see `spirillum.kernels.rigid_links` (n, 19)."""
     observed: Samples
-    """What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 26) observes."""
+    """What `spirillum.kernels.two_links` (n, 13) or `tube_motion` (n, 31) observes."""
     events: tuple[Event, ...]
     """What happened, in the order of time."""
     last: Checkpoint

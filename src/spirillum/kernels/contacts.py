@@ -23,13 +23,11 @@ STATION = 4
 @native()
 def asperity_load(gap: float, height: float, load: float) -> float:
     """Return N(h), N, of asperities of a height, m, with a load at half of it, N."""
-    raise NotImplementedError
 
 
 @native()
 def asperity_energy(gap: float, height: float, load: float) -> float:
     """Return E(h), J."""
-    raise NotImplementedError
 
 
 @native("normal", "point", "j")
@@ -53,7 +51,6 @@ def ring_gap(
         point: result, the touching point from the origin in body axes, m (3,).
         j: result, (7,): the gap closes at j.q at the rates q.
     """
-    raise NotImplementedError
 
 
 @native("normal", "point", "j")
@@ -71,7 +68,6 @@ def crest(
 
     Arguments as of `ring_gap`; `bracket` is where along the wire to look: from, first guess, to; m from the root.
     """
-    raise NotImplementedError
 
 
 @native("q", "left")
@@ -95,4 +91,3 @@ def balanced(
         q: first guess, and the result.
         left: result, what is left of the forces.
     """
-    raise NotImplementedError

@@ -78,7 +78,6 @@ def watched(
     gaps: Float64[Array, "watched"],
 ) -> float:
     """Write what a run is watched for into `gaps`; return the smallest gap."""
-    raise NotImplementedError
 
 
 @native("out")
@@ -135,4 +134,3 @@ def advance(
     Returns:
         One of `DONE`, `PAUSED`, `CROSSED`, `STUCK`.
     """
-    raise NotImplementedError
