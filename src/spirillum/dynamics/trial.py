@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.envelope import quantity
 from spirillum.errors import InputError
 from spirillum.notes import Note, notes_in
 from spirillum.quantities import QUANTITIES
@@ -88,8 +89,8 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     basis = {
         "assumption": ASSUMPTION,
         "state": "standing" if _is_held(notes) else "swimming",
-        "wait": {"value": float(run.attrs["wait"]), "unit": QUANTITIES["wait"].unit},
-        "duration": {"value": length, "unit": "s"},
+        "wait": quantity(float(run.attrs["wait"]), QUANTITIES["wait"].unit),
+        "duration": quantity(length, "s"),
         "warnings": [str(note) for note in notes],
     }
     return ReleasedMotion(values, basis)
@@ -110,7 +111,7 @@ def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
         "assumption": ASSUMPTION,
         "state": _state_of(motion),
         "statement": lying.statement,
-        "time_constant": {"value": _finite(lying.approach_time), "unit": "s"},
+        "time_constant": quantity(lying.approach_time, "s"),
         "warnings": [str(note) for note in motion.warnings],
     }
     pose = {name: float(getattr(lying, name)) for name in (*_POSE, "contact_force")}
@@ -123,10 +124,6 @@ def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
 def _is_held(notes: Iterable[Note]) -> bool:
     """Whether dry friction holds the robot."""
     return any(note.code == "held-by-friction" for note in notes)
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def _state_of(motion: Prediction) -> str:

@@ -14,14 +14,14 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.envelope import quantity
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+from spirillum.robot.toml_writer import with_numbers
 from spirillum.swimming.released_motion import ReleasedMotion, TrialInterval
 
 RUNS = 64
 """Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
 LEVEL = 0.9
 """Level of the interval over the unknowns."""
-_GRAVITY = 9.81
 _FEWEST = 0.5
 """Share of the runs that have to swim."""
 
@@ -119,16 +119,12 @@ def samples_of(robot: Robot, weight: float, unknowns: Sequence[TrialUnknown]) ->
     found = []
     for number in range(RUNS):
         own = {name: float(column[number]) for name, column in values.items()}
-        one = robot
+        fields = {name: value for name, value in own.items() if name == "fluid.cavitation_pressure"}
         if "weight" in own and robot.body.mass is not None:
-            mass = robot.body.mass + (own["weight"] - 1.0) * weight / _GRAVITY
-            one = one.model_copy(update={"body": one.body.model_copy(update={"mass": mass})})
+            fields["body.mass"] = robot.body.mass + (own["weight"] - 1.0) * weight / STANDARD_GRAVITY
         if "friction.effective" in own and robot.motor is not None:
-            effective = own["friction.effective"] * robot.motor.rotor_friction
-            one = one.model_copy(update={"friction": one.friction.model_copy(update={"effective": effective})})
-        if "fluid.cavitation_pressure" in own:
-            bound = {"cavitation_pressure": own["fluid.cavitation_pressure"]}
-            one = one.model_copy(update={"fluid": one.fluid.model_copy(update=bound)})
+            fields["friction.effective"] = own["friction.effective"] * robot.motor.rotor_friction
+        one = with_numbers(robot, fields)
         height = 0.5 * robot.body.diameter * own["roughness"] if "roughness" in own else None
         found.append(TrialSample(one, own.get("wait"), height, own.get("friction_coefficient")))
     return found
