@@ -192,6 +192,23 @@ def study(
             show_default=False,
         ),
     ] = None,
+    trial: Annotated[
+        bool | None,
+        typer.Option(
+            "--trial/--no-trial",
+            help="A trial of each robot in its tube too, as predict has it (seconds a robot), or not; else as the "
+            "study says.",
+            show_default=False,
+        ),
+    ] = None,
+    interval: Annotated[
+        bool | None,
+        typer.Option(
+            "--interval/--no-interval",
+            help="Of each trial the 90 % interval too (half a minute a robot), or not; else as the study says.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute: tcp://HOST:8786.")
@@ -229,6 +246,8 @@ def study(
             band=band,
             predicted=predicted,
             settled=settled,
+            trial=trial,
+            interval=interval,
             workers=workers if cluster is None else cluster,
             store=store,
             calibration=calibration,
