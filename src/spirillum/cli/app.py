@@ -118,6 +118,10 @@ def compare_models(
     request: Request,
     *,
     output: Picture = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw why models differ, effect by effect: .png, .pdf or .svg."),
+    ] = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     all_of_it: All = False,
     json: Json = False,
@@ -129,9 +133,11 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
+    draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.effects:effects_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
-    renderer.show(renderer.with_files(result.to_dict(), file=draw(result)), json=json, all_of_it=all_of_it)
+    files = {"file": draw(result), "plot": draw_effects(result)}
+    renderer.show(renderer.with_files(result.to_dict(), **files), json=json, all_of_it=all_of_it)
 
 
 @from_function(
