@@ -40,7 +40,7 @@ def schema_of(name: str) -> dict[str, Any]:
 
 
 _REQUIRING = ("required", "if", "else")
-"""Words of a table that say what it requires."""
+"""Keys of a table that state its requirements."""
 
 
 def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:

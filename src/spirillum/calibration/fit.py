@@ -53,7 +53,7 @@ from spirillum.swimming.steady import requirements
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
-    """Return whether a fit may be one with walls: so it is asked for, or with `auto` its free numbers allow it.
+    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters.
 
     Args:
         asked: name of a model, or `auto`.

@@ -63,7 +63,7 @@ def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ModelRank:
-    """One model's place."""
+    """The rank of one model."""
 
     model: str
     elpd: float

@@ -98,7 +98,7 @@ def _root(
     },
 )
 def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> None:
-    """Predict the swimming of one robot: held at its pose, and in its tube what a trial measures and where it leads.
+    """Predict one robot: held at a pose, in a trial after release in its tube, and in the steady state.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """

@@ -139,7 +139,7 @@ _A = TypeVar("_A", "Ranking", "Suggestion")
 
 
 def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
-    """An answer that says whose robots were taken, where fields were set and none was named."""
+    """Refuse settings without a named robot, where the robots come from another file."""
     from spirillum.robot.load import PAPER_ROBOTS_TAKEN
 
     return found if robot or not settings else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
@@ -171,7 +171,7 @@ def rank_models(
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Rank models by how well they predict tails that they were not fitted to, and say where each fails.
+    """Rank models by cross-validation over the tails, with the tails where each fails.
 
     Example: `spirillum rank-models observations.csv --model sbt --model rft --model slender`
     """

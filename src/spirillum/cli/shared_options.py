@@ -13,7 +13,7 @@ import typer
 MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
 PLACE_PANEL = "Place in the channel (model tube)"
-"""Panel of the help: where in its channel the robot lies."""
+"""Panel of the help: pose of the robot in its channel."""
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
@@ -144,7 +144,7 @@ METAVARS = {
     "posterior_for": "new|measured",
     "subject_to": "CONDITION",
 }
-"""What stands for a value in the help, where its kind does not tell."""
+"""Placeholder of a value in the help, where its kind does not give one."""
 _FRICTION = (
     "Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall brakes "
     "the body; paper: as eq. (19) is printed, on the tail from outside."
@@ -188,7 +188,7 @@ Settings = Annotated[
     ),
 ]
 All = Annotated[bool, typer.Option("--all", help="All quantities instead of those that matter most.")]
-Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")

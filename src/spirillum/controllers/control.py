@@ -223,7 +223,7 @@ def control(
     bench: Callable[[Plant, Lab, int], Senses] | None = None,
     progress: Progress | None = None,
 ) -> Control:
-    """Control a robot: plant, sensors, remote and controller in a closed loop, all of it drawn from a seed.
+    """Control a robot: plant, sensors, remote and controller in a closed loop, sampled from a seed.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
@@ -301,7 +301,7 @@ class _Pace:
 
 
 def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[Note]]:
-    """A lab without the pulse of flow where a model knows no flow, and the sentence that says so."""
+    """A lab without the pulse of flow for a model without imposed flow, and the sentence about it."""
     if model == "tube" or not lab.pulse.velocity:
         return lab, []
     still = lab.pulse.model_copy(update={"velocity": 0.0})

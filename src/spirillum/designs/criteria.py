@@ -1,4 +1,4 @@
-"""How a design is judged: one table for Python and the command line."""
+"""Objectives and constraints of a design: one table for Python and the command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from spirillum.robot.arguments import Options
 
 
 class Judged(Options):
-    """How designs are judged under what is not known."""
+    """Statistics of designs under uncertainty."""
 
     argument: ClassVar[str] = "judged"
 
@@ -22,7 +22,7 @@ class Judged(Options):
     confidence: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
     """Share of the draws in which a condition has to hold."""
     draws: Annotated[int, Field(strict=True, ge=8, le=16384)] = 256
-    """Draws under which the search swims every design; what is stated rests on four times as many, drawn anew."""
+    """Draws used by the search; the stated statistics use four times as many new ones."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Seed of draws and search."""
 

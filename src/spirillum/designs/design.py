@@ -47,7 +47,7 @@ _NEAR = 0.1
 """The runner-up differs from the best design by at least this share of a range."""
 _FRONT_POINTS = 13
 _MOST_OF_STEP_OUT = 0.95
-"""Share of the step-out rate above which a warning says how little room there is."""
+"""Share of the step-out rate above which a warning states the margin."""
 _STATED_SEED = 7919
 """Added to the seed for the draws of what is stated."""
 

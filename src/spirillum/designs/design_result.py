@@ -118,9 +118,9 @@ class Design(DisplayMixin):
     breaking: int
     warnings: tuple[Note, ...]
     learned: Learned | None = None
-    """How well a model that solves for the flow is known; None where it was asked for every design."""
+    """Accuracy of a model that solves for the flow; None where it was evaluated for every design."""
     model_reason: str = ""
-    """Why the model was taken, in half a sentence; empty where it was asked for."""
+    """Reason of the model, in half a sentence; empty where it was named."""
 
     @property
     def calibrated(self) -> bool:

@@ -47,7 +47,7 @@ class ModelComparison(DisplayMixin):
 
     @cached_property
     def reference(self) -> str:
-        """The model that the others are held against.
+        """The reference model of the comparison.
 
         The last that puts a number on its own error, for such a model resolves what the others neglect; the first
         that answers where none does.
@@ -157,7 +157,7 @@ def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Se
 
 
 def estimated_error(prediction: Prediction) -> float | None:
-    """The relative error that a model estimates of its own speed; None where it states its error in words only."""
+    """Relative error that a model estimates for its own speed; None where its error is stated in words only."""
     return prediction.error_estimate if math.isfinite(prediction.error_estimate) else None
 
 
@@ -254,7 +254,7 @@ def _chosen(models: Sequence[str] | None) -> list[str]:
 
 
 def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
-    """A sentence and every model's reason; what has nothing to do with models, such as a wrong rate, is said once."""
+    """One sentence with every model's reason; an error common to all models is stated once."""
     reasons = list(dict.fromkeys(refusals.values()))
     if len(reasons) == 1:
         return reasons[0], ()

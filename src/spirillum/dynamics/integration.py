@@ -46,13 +46,13 @@ class Reach(NamedTuple):
     """What ends a run, or its drive."""
 
     nose: float
-    """Place of the nose's tip on the motor axis, m."""
+    """Position of the nose's tip on the motor axis, m."""
     tip: float
-    """Place of the tail's tip, m."""
+    """Position of the tail's tip, m."""
     channel: float
     """Half the channel's length, m; infinite without one."""
     middle: float
-    """Place of the channel's middle, m."""
+    """Position of the channel's middle, m."""
     charge: float
     """Charge of the battery, A s; infinite without a rating."""
 

@@ -122,7 +122,7 @@ def _imposed_flow(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 _MOST_ALIKE = 4
-"""Events of one kind that are told one by one."""
+"""Events of one kind that are listed one by one."""
 
 
 class Told(NamedTuple):

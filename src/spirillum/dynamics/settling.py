@@ -1,4 +1,4 @@
-"""How a robot that is laid down in its tube settles: the way through its film, and where it comes to lie.
+"""Settling of a robot after release in its tube: drainage of its film, and its steady state.
 
 It is the free motion of `spirillum.predict` with the way there: the same run, the same steady motion.
 
@@ -101,7 +101,7 @@ _SAMPLES = 400
 
 @dataclass(frozen=True, repr=False)
 class Settling(DisplayMixin):
-    """How a robot settles, SI; azimuths about +x from the lowest place."""
+    """Settling of a robot, SI; azimuths about +x from the lowest point of the tube."""
 
     prediction: Prediction
     """The steady motion that it comes to, means over a turn of the tail."""
@@ -118,7 +118,7 @@ class Settling(DisplayMixin):
 
     @property
     def lying(self) -> SteadyState:
-        """Where it comes to lie."""
+        """The steady state."""
         return self._free.run.lying
 
     @property
@@ -234,7 +234,7 @@ def settle(
     until: str | float | None = None,
     progress: Progress | None = None,
 ) -> Settling:
-    """Follow a robot from rest in its tube to where it comes to lie; floats are in SI units, rates in rad/s.
+    """Follow a robot from rest in its tube to its steady state; floats are in SI units, rates in rad/s.
 
     The run is that of `spirillum.simulate` with the model `tube`, from the robot's table, which is made first where
     there is none; it is followed until a turn of the tail no longer changes where the robot lies.

@@ -36,7 +36,7 @@ _MOST_TURNS = 2000
 
 
 def why_not_released(held: Prediction, *, fitted: bool) -> str:
-    """Return why no released motion stands beside a held answer, in a sentence; empty where one does.
+    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one.
 
     Args:
         held: the answer.

@@ -50,8 +50,9 @@ class TubeRobot(FreeRobot):
     """A robot in its tube: see `spirillum.kernels.tube_motion`."""
 
     tolerance: ClassVar[float] = 1e-7
-    """Path and place of a minute in contact are then good to some parts in 1e7, energies to 1e-6; a tenth of it takes
-    two and a half times as long."""
+    """Trajectory and pose of a minute in contact are then accurate to some parts in 1e7, energies to 1e-6; a tenth of
+    it takes two and a half times as long.
+    """
     observed: ClassVar[int] = rigid_links.SEEN
 
     tube: Samples
@@ -110,7 +111,7 @@ class TubeRobot(FreeRobot):
 
 
 _RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
-"""What `resistance_at` says was left."""
+"""How `resistance_at` reports that a pose is outside the table."""
 
 
 def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn: float, weight: bool) -> TubeRobot:

@@ -1,4 +1,4 @@
-"""A free run of a robot in its tube from what a user asks for: table, place, ends, flow, roughness, friction."""
+"""A free run of a robot in its tube from a user's request: table, pose, ends, flow, roughness, friction."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
 
 
 def weight_words(links: TubeRobot) -> str:
-    """Whether weight and buoyancy act on a robot, as a run's attribute `weight` says it."""
+    """Whether weight and buoyancy act on a robot, as the attribute `weight` of a run."""
     return "acts" if links.weight.any() else "left out"
 
 
@@ -139,9 +139,9 @@ def _number(dataset: xr.Dataset, name: str) -> float:
 
 
 _STARTS = ("gap", "eccentricity", "pitch", "yaw")
-"""Fields of a placement that say where a robot is laid down."""
+"""Fields of a placement that define the initial pose."""
 _PLACES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
-"""Where a run says what a table is asked for."""
+"""Where a run names a missing table."""
 
 
 def run_in_tube(
@@ -213,7 +213,7 @@ def links_in_tube(
     *,
     weight: bool,
 ) -> tuple[TubeRobot, StartPlace]:
-    """What a robot's rates in its tube follow from, and where it is laid down.
+    """Coefficients of a robot's rates in its tube, and its initial pose.
 
     Args:
         steady: the steady prediction of the robot.
@@ -252,7 +252,7 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
-    """Refuse what a run in a tube cannot be told, before minutes go into a table."""
+    """Refuse requests that a run in a tube does not support, before minutes go into a table."""
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
@@ -308,20 +308,20 @@ def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | N
 
 
 class Checked(NamedTuple):
-    """What the stated error of a table says of a motion."""
+    """Effect of the stated error of a table on a motion."""
 
     known: bool
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
     """Whether it comes nearer to the glass than where the table was checked."""
     said: list[Note]
-    """What there is to say of both, a sentence each."""
+    """Cautions about both, a sentence each."""
 
 
 def held_against_check(
     table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
 ) -> Checked:
-    """Hold the places of a motion against those at which its table was checked.
+    """Compare the poses of a motion with those at which its table was checked.
 
     Args:
         table: the packed table.

@@ -18,7 +18,7 @@ _A = TypeVar("_A", bound=FreeRobot)
 
 
 class Field(Options):
-    """What coils are asked for from now on; what is not given stays as it was."""
+    """Settings of the coils from now on; what is not given stays as it was."""
 
     argument: ClassVar[str] = "field"
     prefixed: ClassVar[bool] = True
@@ -82,7 +82,7 @@ class TurningField:
 
 
 def in_tilted_field(links: _A, asked: Field) -> _A:
-    """A robot in the field of its file, which turns about the axis that is asked for.
+    """A robot in the field of its file, which rotates about the given axis.
 
     Args:
         links: what its rates follow from.

@@ -112,10 +112,10 @@ _IMPLIED = {
     },
     "mirrored": {"stripe-order", "handedness"},
 }
-"""Flags that say nothing more beside another one that withholds a number, by its name; it withholds what they do."""
+"""Flags that are redundant beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
-"""Flags that say nothing more where the robot does not move one way throughout."""
+"""Flags that are redundant where the robot does not move one way throughout."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 

@@ -122,7 +122,7 @@ _BAND = {
 
 
 class BesideModels(NamedTuple):
-    """Answers of robots one by one, which stand beside those of the models."""
+    """Answers of robots one by one, beside those of the models."""
 
     laid_down: Sequence[tuple[LaidDownTask, Part]] = ()
     """Of robots that made the runs of a design."""
@@ -146,7 +146,7 @@ def assembled(
     fingerprint: str,
     warnings: Sequence[Note],
 ) -> xr.Dataset:
-    """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots one by one."""
+    """Collect all answers in one Dataset: at the reference pose, at the poses of a band, of robots one by one."""
     dataset = laid_out(loaded, answers, band, beside, observed)
     dataset.attrs = described(loaded, observed, fingerprint, warnings)
     dataset.attrs["checksum"] = _checksum(dataset)
@@ -217,7 +217,7 @@ _ANY = "surrogatepass"
 
 
 def _checksum(dataset: xr.Dataset) -> str:
-    """Of all values and attributes but itself: damage is noticed, and the dataset computed anew."""
+    """Checksum of all other values and attributes: damage is detected, and the dataset computed again."""
     found = hashlib.sha256()
     for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
         found.update(f"{name}={value}\n".encode(errors=_ANY))
@@ -324,7 +324,7 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
 
 
 _LARGEST_LEFT, _LARGEST_OF_A_ROBOT = 16 << 20, 1 << 16
-"""Bytes of a dataset: of its attributes, and of each of its robots with all models, readings, rates and places."""
+"""Bytes of a dataset: of its attributes, and of each of its robots with all models, readings, rates and poses."""
 
 
 def read_dataset(path: Path, robots: int) -> xr.Dataset | None:

@@ -1,4 +1,4 @@
-"""Columns that stand beside the models of a study: held by `tube`, and what a trial of each robot measures."""
+"""Columns beside the models of a study: held by `tube`, and the trial of each robot."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor
 POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
 """Where a robot is in a trial, means over it."""
 ENDS = ("median", "low", "high")
-"""Of an interval over what nobody states."""
+"""Of an interval over the unknowns."""
 STATES = ("no-trial", "swimming", "standing")
 """What became of a robot in its trial; the index in this list is the value in the dataset."""
 _MOST_HELD = 1000
-"""Robots of a study that are held by `tube` without being asked for."""
+"""Robots of a study that are computed by `tube` without a request."""
 
 
 @dataclass(frozen=True)

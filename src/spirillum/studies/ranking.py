@@ -50,11 +50,11 @@ class QuantityRanking(NamedTuple):
 
 
 LET_GO = "forward_velocity_settled"
-"""The speed in steady motion, of robots that were let go."""
+"""The speed in steady motion after release."""
 HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
 """The speed by `tube` where no model of the study computes walls, and that of a trial."""
 _BESIDE = (HELD, TRIAL, LET_GO)
-"""Speeds that stand beside that of a model, where the study has them."""
+"""Speeds beside that of a model, where the study has them."""
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
     HELD: QuantityRanking("tube", "fastest held by tube", 1.0),
@@ -66,7 +66,7 @@ RANKED = {
 }
 """Quantities that rank robots, in the order in which they are shown."""
 SETTLED_BASIS = "steady: by model tube, let go, in steady motion; all else: by the model above, not let go"
-"""What the speed of robots that were let go rests on, and the other quantities do not."""
+"""Assumptions of the speed after release that the other quantities do not share."""
 ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
@@ -82,7 +82,7 @@ class RankedRobot(NamedTuple):
     name: str
     """Its name, or its channel and tail."""
     place: int
-    """Its place in the flat order of the study."""
+    """Its index in the flat order of the study."""
     values: Mapping[str, float]
     low: Mapping[str, float]
     """Least values of bands or lower limits of intervals; NaN without one."""
@@ -108,9 +108,9 @@ class Best(NamedTuple):
     quantity: str
     robot: RankedRobot
     places: int
-    """Number of places, the reference place one of them, at which it is the best; 0 without a band."""
+    """Number of poses, the reference pose one of them, at which it is the best; 0 without a band."""
     of_places: int
-    """Number of places at which the robots have answers."""
+    """Number of poses at which the robots have answers."""
     spread: float
     """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
     known: int
@@ -122,7 +122,7 @@ class Best(NamedTuple):
 
     @property
     def alike(self) -> bool:
-        """Whether there are several robots, and the quantity hardly tells them apart."""
+        """Whether there are several robots, and the quantity hardly differs between them."""
         return self.spread < _ALIKE
 
     def to_dict(self) -> dict[str, Any]:
@@ -153,7 +153,7 @@ class StudyRanking:
 
     @property
     def message(self) -> str:
-        """What the ranking says, in a sentence."""
+        """The ranking in a sentence."""
         if not self.robots:
             return "no robot has an answer"
         first = self.robots[0]
@@ -165,7 +165,7 @@ class StudyRanking:
 
     @property
     def settled(self) -> bool:
-        """Whether robots were let go, and are ordered by the speed in steady motion."""
+        """Whether robots were released, and are ordered by the speed in steady motion."""
         return LET_GO in self.quantities
 
     @property

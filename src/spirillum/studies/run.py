@@ -72,7 +72,7 @@ _LARGEST_PART = 1 << 30
 
 
 def _as_kept(item: zipfile.ZipInfo) -> bool:
-    """Whether an array stands in the file as it is: what is compressed could be a thousand times as large."""
+    """Whether an array is stored uncompressed: what is compressed could be a thousand times as large."""
     return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
 
 
@@ -88,7 +88,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
-    """Hash of question and program: a dataset of another version is computed anew."""
+    """Hash of request and program: a dataset of another version is computed again."""
     question = [loaded.fingerprint, observed.question() if observed else None, own_version()]
     return hashlib.sha256(json.dumps(question).encode()).hexdigest()
 
@@ -196,7 +196,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
 
 
 def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
-    """What answers of robots that are held at places in their tube leave out."""
+    """Limits of answers for robots held at a pose in their tube."""
     walled = [model.name for model in models if model.placed]
     if not walled:
         words = "band = true has no effect: no model of the study includes walls; add model tube"
@@ -264,7 +264,7 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
 
 
 def _why_without_table(robot: Robot, placement: Placement) -> str:
-    """What robots have not that are not let go; a place for the name of the first."""
+    """What robots that are not released lack; a placeholder for the name of the first."""
     if robot.channel is None:
         return "have no channel in which they could be let go, the first: {}"
     if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):

@@ -46,12 +46,12 @@ class LoadedStudy:
     fit: Fit = NO_FIT
     """Fitted values that act on the robots, or draws over which answers have intervals."""
     placements: tuple[Placement, ...] = ()
-    """Where each of `robots` lies by a calibration; none where the study says it."""
+    """Pose of each of `robots` by a calibration; none where the study states it."""
     model_reason: str = ""
     """Why the model in place of `auto` was taken; empty where all models are named."""
 
     def placement_of(self, number: int) -> Placement:
-        """Where one of `robots` lies."""
+        """Pose of one of `robots`."""
         return self.placements[number] if self.placements else self.study.placement
 
     @property
@@ -208,7 +208,7 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
 
 
 def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
-    """Refuse asperities on which robots that are let go would be pressed by more than their weight."""
+    """Refuse asperities that would carry more than the weight of a released robot."""
     if not (study.settled or study.trial) or study.contact.roughness is None:
         return
     from spirillum.dynamics.tube_start import check_roughness  # loads compiled loops
@@ -278,7 +278,7 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
 
 
 def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
-    """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks."""
+    """Pose of each robot by a calibration, as `predict` takes it; none where the study states it, or none is needed."""
     if fit.file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
         return ()
     if fit.friction_coefficient:
@@ -299,7 +299,7 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
 
 
 def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> tuple[Study, str]:
-    """The study with one model for all robots in place of `auto`, and why that was taken."""
+    """The study with one model for all robots in place of `auto`, and the reason."""
     if AUTO not in study.models:
         return study, ""
     afloat = [robot.name for robot in robots if robot.channel is None]

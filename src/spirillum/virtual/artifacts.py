@@ -114,7 +114,7 @@ class Troubles(Options):
     mirrored_lamps: Annotated[int, BeforeValidator(whole(0, 8))] = 0
     """Number of lamps that the oil's surface mirrors into the picture."""
     grid_paper: Annotated[bool, Field(strict=True)] = False
-    """Whether grid paper lies under the tube, instead of a ruler beside it."""
+    """Whether grid paper is under the tube, instead of a ruler beside it."""
     glass_cover: Annotated[bool, Field(strict=True)] = False
     """Whether the body before its seal is a cover of glass with a battery and a board inside, as the paper's."""
 

@@ -222,7 +222,7 @@ class _Filmed(NamedTuple):
     model: str
     """The study's first."""
     placement: Placement | None
-    """Where the study says that robots lie."""
+    """Poses of the robots in the study."""
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:

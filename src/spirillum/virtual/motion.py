@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _USUAL = 20.0
 """Length of a video of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
-"""Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
+"""Largest turn of the tail between two samples of a run above which a video states that it interpolates, rad."""
 
 
 @dataclass(frozen=True)

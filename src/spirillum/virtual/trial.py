@@ -321,7 +321,7 @@ def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles,
 
 
 def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
-    """A sentence on a seed of a film of which nothing is drawn at random; none without a seed."""
+    """A sentence on a seed of a video that uses no random numbers; none without a seed."""
     plain = Degradation(crf=degradation.crf)
     if not seed or degradation != plain or troubles.uses_seed:
         return []

@@ -77,7 +77,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
 
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
-"""What follows from other rows, and stands in the JSON only."""
+"""Rows that follow from others and are in the JSON only."""
 _SHORT = {
     "forward_velocity": "speed",
     "tail_rotation_rate": "tail",

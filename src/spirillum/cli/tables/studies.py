@@ -114,7 +114,7 @@ _SHOWN = (
     "shaft_power",
     "hydrodynamic_efficiency",
 )
-"""Quantities of a design that stand in the table; all are in the JSON."""
+"""Quantities of a design in the table; all are in the JSON."""
 
 
 def design(answer: Answer) -> Blocks:
