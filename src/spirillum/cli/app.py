@@ -120,7 +120,7 @@ def compare_models(
     output: Picture = None,
     plot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw why models differ, effect by effect: .png, .pdf or .svg."),
+        typer.Option(metavar="FILE", help="Plot why models differ, effect by effect: .png, .pdf or .svg."),
     ] = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     all_of_it: All = False,
@@ -176,7 +176,7 @@ def study(
         bool | None,
         typer.Option(
             "--band/--no-band",
-            help="Model tube: the band over gap and pitch too, or not; else as the study says.",
+            help="Also the band over gap and pitch (model tube); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -184,8 +184,7 @@ def study(
         bool | None,
         typer.Option(
             "--predicted/--no-predicted",
-            help="Lay the robots down in their tubes and let them go too, with nothing fitted (minutes), or not; else "
-            "as the study says.",
+            help="Also simulate release from rest in the tubes (minutes); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -193,8 +192,7 @@ def study(
         bool | None,
         typer.Option(
             "--settled/--no-settled",
-            help="Let the robots go in their tubes and follow each to its steady motion too (seconds a robot), or not; "
-            "else as the study says.",
+            help="Also find the steady state of each robot after release (seconds a robot); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -202,8 +200,7 @@ def study(
         bool | None,
         typer.Option(
             "--trial/--no-trial",
-            help="A trial of each robot in its tube too, as predict has it (seconds a robot), or not; else as the "
-            "study says.",
+            help="Also a trial of each robot in its tube (seconds a robot); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -211,7 +208,7 @@ def study(
         bool | None,
         typer.Option(
             "--interval/--no-interval",
-            help="Of each trial the 90 % interval too (half a minute a robot), or not; else as the study says.",
+            help="Also the 90 % interval of each trial (half a minute a robot); default: as in the study.",
             show_default=False,
         ),
     ] = None,

@@ -146,7 +146,7 @@ METAVARS = {
 }
 """Placeholder of a value in the help, where its kind does not give one."""
 _FRICTION = (
-    "Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall brakes "
+    "Friction model. none; rotor: in the joint, between body and tail; body: between body and wall "
     "the body; paper: as eq. (19) is printed, on the tail from outside."
 )
 TEXTS = {
@@ -177,7 +177,7 @@ Posterior = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Posterior of a calibration: its middle replaces the robot's values; intervals.",
+        help="Posterior of a calibration: its median replaces the robot's values; intervals.",
         rich_help_panel=MODEL_PANEL,
     ),
 ]
@@ -187,7 +187,7 @@ Settings = Annotated[
         "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
     ),
 ]
-All = Annotated[bool, typer.Option("--all", help="All quantities instead of those that matter most.")]
+All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[

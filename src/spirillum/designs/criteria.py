@@ -20,7 +20,7 @@ class Judged(Options):
     level: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
     """Of the quantile: the share of the draws that are worse."""
     confidence: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
-    """Share of the draws in which a condition has to hold."""
+    """Share of the draws that must satisfy a condition."""
     draws: Annotated[int, Field(strict=True, ge=8, le=16384)] = 256
     """Draws used by the search; the stated statistics use four times as many new ones."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1

@@ -84,7 +84,7 @@ def design(
         minimise: a quantity to make small.
         subject_to: a condition, as ``"motor_current <= 0.4 A"``, or several.
         unknown: dotted field to the range over which it is uniform.
-        posterior: file of a calibration's posterior, whose draws are what is not known.
+        posterior: posterior of a calibration; its draws are the unknowns.
         judged: `statistic`, `level`, `confidence`, `draws`, `seed`.
         bench: `mandrel`, `clearance`.
         model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from

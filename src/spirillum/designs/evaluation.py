@@ -103,7 +103,7 @@ class Evaluation:
     bench: Manufacturability
     drawn: SampledRobots
     confidence: float
-    """Share of the draws in which a condition has to hold."""
+    """Share of the draws that must satisfy a condition."""
     tail_rate: float | None = None
     """Prescribed rate of the tail, rad/s; None: the robot's own drive."""
 

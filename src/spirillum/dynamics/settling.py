@@ -249,7 +249,7 @@ def settle(
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: `azimuth` of the start and `friction_coefficient`, see `spirillum.simulate`.
-        until: gap to which the draining of the film is timed, with its unit or a float in m; None: a fifth of that at
+        until: gap at the end of the drainage time, with its unit or a float in m; None: a fifth of that at
             the start.
         progress: told what is being computed, how much is done, and of how much.
 

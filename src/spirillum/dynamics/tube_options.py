@@ -47,8 +47,7 @@ class InTube(Options):
     prefixed: ClassVar[bool] = True
 
     azimuth: Angle = 0.0
-    """Azimuth of the body's centre about +x from the lowest point of the tube; gap, pitch and yaw are relative to the
-    wall there.
+    """Azimuth of the body's centre about +x from the lowest point of the tube.
     """
     wait: Time | None = None
     """Waiting time after release with the drive off, before the run; None: 60 s, as in a trial, in a flow none."""

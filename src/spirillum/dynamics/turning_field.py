@@ -26,9 +26,9 @@ class Field(Options):
     rotation_rate: Rate | None = None
     """Rotation rate of the field about its axis."""
     yaw: Yaw | None = None
-    """Angle to +y, up to 45 degrees, of the axis about which the field turns; along the lab's +x without it."""
+    """Angle to +y of the field's axis of rotation, up to 45 degrees; along the lab's +x without it."""
     pitch: Pitch | None = None
-    """Angle of that axis upwards, from the horizontal."""
+    """Elevation of that axis from the horizontal."""
     strength: MagneticField | None = None
     """Flux density, at right angles to the axis."""
 

@@ -251,9 +251,9 @@ def predict(
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        band: answer with the band over what the placement leaves open, or at the reference place alone; None: with it
+        band: answer with the band over unknown gap and pitch, or at the reference pose alone; None: with it
             where the robot has a table, without which it takes minutes.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `rft` or
+        motion: `held` (lateral motion and tilt constrained) or `free`. Free with `rft` or
             `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.

@@ -34,7 +34,7 @@ class Degradation(Options):
     noise: Annotated[float, BeforeValidator(in_range(0.0, 64.0))] = 0.0
     """Standard deviation of the noise, in steps of 255; independent in every pixel and colour."""
     lamp_drift: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
-    """Share by which the lamp's brightness changes; its colour by a quarter of that."""
+    """Relative change of the lamp's brightness."""
     crf: Annotated[int, BeforeValidator(whole(0, 51))] = 18
     """Constant rate factor of the compression (H.264), 0 (lossless) to 51."""
     dropped: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
