@@ -134,6 +134,8 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
     for name in SEEN:  # what is not given has no mean, and no frames left out of it
         if any(name in flag.spoils for flag in flags):
             implied |= {f"{kind}-{name.replace('_', '-')}" for kind in ("not-steady", "stray-frames")}
+    if "robot-stands-still" in names:
+        implied.add("short-turn")
     if _CHANGES & names:
         implied |= _OF_CHANGES
     count = track.time.size
