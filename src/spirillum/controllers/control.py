@@ -62,6 +62,8 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
+_START = "released at its placement and controlled from time 0, without the waiting of a trial"
+"""How a run begins."""
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
 _SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
 _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
@@ -161,6 +163,7 @@ class Control(DisplayMixin):
             "model": self.model,
             **({"model_reason": self.model_reason} if self.model_reason else {}),
             "task": {"kind": self.task.kind, **_fields(self.task)},
+            "start": _START,
             "controller": self.controller,
             "seed": self.seed,
             "good": self.score.good,

@@ -25,6 +25,8 @@ class Judged(Options):
     """Draws used by the search; the stated statistics use four times as many new ones."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Seed of draws and search."""
+    confirm: Annotated[bool, Field(strict=True)] = False
+    """Make the tables that trials of the best three designs lack: 4 to 12 minutes of one core each."""
 
     def check_read(self, *, known: bool, conditions: bool) -> None:
         """Refuse what was given and nothing reads; a seed serves the search in any case.
@@ -36,7 +38,11 @@ class Judged(Options):
         Raises:
             InputError: naming it.
         """
-        given = [name for name in type(self).model_fields if name in self.model_fields_set and name != "seed"]
+        given = [
+            name
+            for name in type(self).model_fields
+            if name in self.model_fields_set and name not in ("seed", "confirm")
+        ]
         if given and known:
             raise InputError(
                 f"{', '.join(given)} where nothing is unknown; allowed: with a field that is not known (unknown) or a "

@@ -359,6 +359,7 @@ def control(answer: Answer) -> Blocks:
         yield f"learnt: {_learnt(answer['learnt'], answer['drawn'])}"
     if answer["scores"] is not None:
         yield from _scores(answer["scores"], answer["error"]["unit"])
+    yield Detail(f"start: {answer['start']}")
     yield from reason_of(answer)
     yield from files_of(answer, plot="plot", movie="movie", file="run")
 
