@@ -255,6 +255,23 @@ static void set_slices(const TubeRobot *robot, const State *y, const double rota
     b->viscosity = robot->tube->viscosity / larger(largest_share(fluid->film, sliced), 1.0);
 }
 
+/* The same under a curve: a straight piece of it is a friction of the joint, and the next one is tried where it ends. */
+static double solve_on_curve(Balance *b, const Drive *drive, Seen *seen) {
+    const double sense = drive->motor.polarity, own = b->a[JOINT][JOINT], force = b->force[JOINT];
+    double *q = seen->rates, left[RATES];
+    int64_t number = -1;
+    for (int n = 0; n < MOST_POINTS; n++) number = next_piece(&drive->curve, number, sense * q[JOINT]);
+    Piece piece = {0.0, 0.0};
+    for (int64_t before = -2, n = 0; number != before && n < MOST_TRIALS; n++) {
+        piece = piece_of(&drive->curve, before = number, drive->duty);
+        b->a[JOINT][JOINT] = own - piece.slope;
+        b->force[JOINT] = force + sense * piece.torque;
+        seen->balance = balance_rates(b, q, left);
+        number = next_piece(&drive->curve, before, sense * q[JOINT]);
+    }
+    return sense * piece.torque + piece.slope * q[JOINT];
+}
+
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
  * a trial inside the wall has none, and the next one must not begin with them. */
 static double solve_rates(Balance *b, const Drive *drive, double current, Seen *seen) {
@@ -264,7 +281,8 @@ static double solve_rates(Balance *b, const Drive *drive, double current, Seen *
     for (int i = 0; i < RATES && !finite; i++) q[i] = 0.0;
     b->along = driven_rate(drive);
     b->prescribed = drive->kind == RATE && drive->duty > 0.0;
-    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, 0.0, 1.0);
+    if (drive->kind == CURVE) return solve_on_curve(b, drive, seen);
+    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, q, q);
     b->force[b->along] += torque;
     if (drive->fixed != 0.0) {
         b->force[JOINT] = q[JOINT] = 0.0;

@@ -46,7 +46,7 @@ def packed(
     Args:
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
         weight: submerged weight of body and rotor, and its first moments, (8,).
-        drive: drive and motor, (23,).
+        drive: drive and motor, (48,).
         tube: the tube, (9,) up to the numbers of sites and stations.
         wire: the wire, see `contacts`, (6,).
         sites: sites of body and coupling, see `contacts`, (n, 5).

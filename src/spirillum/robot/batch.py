@@ -16,7 +16,7 @@ from spirillum.robot import geometry
 from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
-from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables
+from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables, TorqueCurve
 from spirillum.robot.tail_form import TailForm
 
 
@@ -69,6 +69,24 @@ class Electrics:
     duty: Annotated[PerRobot, Column("drive.duty", unset=1.0)]
     gear_ratio: Annotated[PerRobot, Column("motor.gear_ratio", unset=1.0)]
     polarity: PerRobot
+
+    @property
+    def columns(self) -> tuple[Values, ...]:
+        """The numbers of a motor in the order of the compiled equations, torques and rates at the joint."""
+        return (
+            self.joint_torque_constant,
+            self.joint_back_emf_constant,
+            self.inductance,
+            self.constant,
+            self.decay,
+            self.decay_rate,
+            self.growth,
+            self.growth_rate,
+            self.slope,
+            self.voltage,
+            self.internal_resistance,
+            self.polarity,
+        )
 
     @property
     def joint_torque_constant(self) -> Values:
@@ -134,6 +152,7 @@ class RobotBatch:
     tail_density: Annotated[PerRobot, Column("tail.density", optional=True)]
     hand: PerRobot
     electrics: Electrics | None
+    curve: TorqueCurve | None
     calibration: Mapping[str, CalibrationFactors]
     shape: Shape
     front: End | None
@@ -172,6 +191,7 @@ class RobotBatch:
             **{name: _column(items, source) for name, source in _columns("RobotBatch").items()},
             hand=hand,
             electrics=_electrics(items, hand),
+            curve=first.drive and first.drive.curve,
             calibration={name: _factors(items, name) for name in first.calibration},
             shape=first.body.shape,
             front=first.body.front_end,
@@ -375,7 +395,7 @@ def _shared(robot: RobotTables) -> tuple[object, ...]:
         robot.body.rear_end,
         robot.tail.form,
         robot.model.model_dump_json(exclude={"rft": {"axis_height"}}),
-        drive and (drive.kind, drive.joint),
+        drive and (drive.kind, drive.joint, drive.curve),
         robot.friction.reading,
         robot.motor is None or robot.battery is None,
         tuple(sorted(robot.calibration)),

@@ -27,7 +27,7 @@ _WEIGHED = {
     "coupling": ("diameter", "length", "clearance"),
 }
 # What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
-_SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's"}
+_SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's", "drive.torques": "the motor's"}
 _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8

@@ -8,6 +8,8 @@ import numpy as np
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.kernels.axial_motor import CONSTANT, SLOPE
+from spirillum.kernels.drive import MOTOR, windings
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.limits import assembly_limits, broken
@@ -32,15 +34,12 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
     It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
     """
-    r = motor.resistance
     current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)
+    r, motors, found = motor.resistance, np.zeros((current.size, MOTOR)), np.empty((current.size, 2))
+    motors[:, CONSTANT : SLOPE + 1] = r.constant, r.decay, r.decay_rate, r.growth, r.growth_rate, r.slope
+    windings(motors, current, found)
+    resistance = found[:, 0]
     with np.errstate(over="ignore"):
-        resistance = (
-            r.constant
-            + r.decay * np.exp(-r.decay_rate * current)
-            + r.growth * np.exp(np.minimum(r.growth_rate * current, 600.0))
-            + r.slope * current
-        )
         drop = resistance * current + battery.internal_resistance * current
     stall = int(np.searchsorted(np.maximum.accumulate(drop), battery.voltage))
     upto = slice(0, min(stall + 2, current.size))
@@ -54,6 +53,8 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
 def _in_words(value: Any, unit: str | None) -> str:
     """A field's value with the unit in which people read it."""
+    if unit is not None and isinstance(value, tuple):
+        return ", ".join(_in_words(item, unit) for item in value)
     if unit is None or not isinstance(value, float):
         return str(value)
     si = unit.replace("**", "^")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from math import pi
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.kernels.drive import MOST_POINTS
 from spirillum.notes import Note
 from spirillum.robot.fields import (
     AlsoReads,
@@ -35,24 +37,81 @@ from spirillum.robot.geometry import Body, ChannelOrNone, Coupling, Fluid, SealO
 from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.units import KINDS
 
-DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
+DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
 
 FrictionReading = Literal["none", "rotor", "body", "paper"]
+
+
+class TorqueCurve(NamedTuple):
+    """Torque of a motor against its rate, straight between its points, in the motor's own sense; SI."""
+
+    rates: tuple[float, ...]
+    """Rates, rad/s: from 0, increasing."""
+    torques: tuple[float, ...]
+    """Torques, N m: not increasing, down to 0."""
+    sense: float
+    """1 where the motor turns the tail as its hand swims forward, else -1."""
 
 
 class Drive(Section):
     """What turns the tail, and the joint between tail and body."""
 
     kind: DriveKind
-    """`dc-motor` (motor and battery of the file), `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
+    """`dc-motor` (motor and battery of the file), `torque-speed` (any other motor, by its torque against its rate),
+    `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
     rate: Rate | None = None
     """For `rate`: rotation rate of the tail about +x in the lab."""
     torque: Torque | None = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
+    rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"]] = None
+    """For `torque-speed`: rates of the tail against the body, 2 to 12 that increase from 0; three give a knee."""
+    torques: Annotated[tuple[Torque, ...] | None, KINDS["torque"]] = None
+    """For `torque-speed`: torque at each of these rates, straight between them: from the stall torque down to 0."""
+    polarity: Literal["forward", "reverse"] = "forward"
+    """For `torque-speed`: `forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
     duty: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     """For `dc-motor`: pulse-width duty of the voltage controller; 1 is full throttle."""
+
+    @property
+    def curve(self) -> TorqueCurve | None:
+        """Torque against rate; None for another drive."""
+        if self.rates is None or self.torques is None:
+            return None
+        return TorqueCurve(self.rates, self.torques, 1.0 if self.polarity == "forward" else -1.0)
+
+    def curve_problems(self) -> list[str]:
+        """A sentence for each rule of a curve that is broken."""
+        is_curve = self.kind == "torque-speed"
+        problems = [
+            f"drive.{name} is {'missing' if is_curve else 'set'} with drive.kind = '{self.kind}'; "
+            f"allowed: drive.{name} exactly when drive.kind = 'torque-speed'"
+            for name in ("rates", "torques")
+            if (getattr(self, name) is not None) != is_curve
+        ]
+        if not is_curve:
+            if self.polarity != "forward":
+                problems.append("drive.polarity = 'reverse'; allowed: only with drive.kind = 'torque-speed'")
+            return problems
+        if self.joint == "fixed":
+            problems.append("drive.joint = 'fixed' with drive.kind = 'torque-speed'; allowed: 'revolute'")
+        if self.rates is None or self.torques is None:
+            return problems
+        if len(self.rates) != len(self.torques) or not 2 <= len(self.rates) <= MOST_POINTS:
+            return [
+                *problems,
+                f"drive.rates has {len(self.rates)} and drive.torques has {len(self.torques)} values; allowed: as many "
+                f"of both, from 2 to {MOST_POINTS}",
+            ]
+        if self.rates[0] != 0.0 or any(b <= a for a, b in pairwise(self.rates)):
+            problems.append("drive.rates must increase from 0; allowed: such as ['0 Hz', '170 Hz', '300 Hz']")
+        if self.torques[0] <= 0.0 or self.torques[-1] != 0.0 or any(b > a for a, b in pairwise(self.torques)):
+            problems.append(
+                "drive.torques must fall, or stay, from a positive stall torque to 0 at the last rate; "
+                "allowed: such as ['0.3 mN m', '0.28 mN m', '0 N m']"
+            )
+        return problems
 
 
 class MotorResistance(Section):
@@ -233,6 +292,7 @@ class RobotTables(Section):
             problems.append(
                 f"drive.duty = {drive.duty:g} with drive.kind = '{drive.kind}'; allowed: only for 'dc-motor'"
             )
+        problems += drive.curve_problems()
         magnetic = drive.kind == "magnetic"
         if magnetic and drive.joint == "revolute":
             problems.append("drive.joint = 'revolute' with drive.kind = 'magnetic'; allowed: 'fixed'")
