@@ -78,11 +78,14 @@ typedef struct {
     double opened[RATES];        /* mean flow of open ends per q */
 } Fluid;
 
+static const double FOLLOWED = 20.0 * PI / 180.0; /* tilt up to which a run goes on outside the table's range */
+
 static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
     const Tube *tube = robot->tube;
     const Pose pose = {seen->offset, seen->pitch, seen->yaw};
     double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
     seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
+    if (fabs(pose.pitch) < FOLLOWED && fabs(pose.yaw) < FOLLOWED) seen->outside = 0.0;
     turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
     turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
     const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;

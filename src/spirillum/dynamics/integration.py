@@ -23,7 +23,8 @@ from spirillum.kernels import rigid_links, stiff_steps
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
-_END = "end of the channel"
+END_OF_CHANNEL = "end of the channel"
+"""Event of a robot whose nose or tail reaches the end of its channel."""
 _STUCK = "no step is small enough"
 INTERRUPTED = "interrupted"
 """The event of a run that was interrupted, which keeps what was done."""
@@ -197,7 +198,8 @@ def _stretch(
 ) -> _Stretch:
     robot = run.robot.at_duty(duty).between(run.time, stop)
     data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
-    stiff_steps.watched(run.state, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
+    outside = float(observed_at(robot, run.state)[rigid_links.OUTSIDE]) if robot.table.size else 0.0
+    stiff_steps.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, rigid_links.STATES))
     sizes, done = robot.step_sizes(), 0
     sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
@@ -270,7 +272,7 @@ def _crossed(
         if place == sites + stiff_steps.CHARGE_LEFT:
             what = BATTERY_EMPTY
         elif place == sites + stiff_steps.ROOM:
-            what = _END
+            what = END_OF_CHANNEL
         else:
             what = robot.range_left(inner, moment)
         run.state[:] = inner
