@@ -23,7 +23,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import largest_yaw, resistance_at
+from spirillum.kernels.tube_table import MOTIONS, largest_yaw, range_of, resistance_at
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -336,9 +336,11 @@ def held_against_check(
     said = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
-    outside = np.array(
-        [resistance_at(table, *pose, 0.0, np.empty((8, 8))) for pose in zip(offset, pitch, yaw, strict=True)]
-    )
+    held = range_of(table)
+    doubtful = (np.abs(yaw) > checked) | (pitch > held.up.min()) | (-pitch > held.down.min())
+    outside = np.zeros(pitch.size, dtype=bool)
+    for row in np.flatnonzero(doubtful):
+        outside[row] = resistance_at(table, offset[row], pitch[row], yaw[row], 0.0, np.empty((MOTIONS, MOTIONS)))
     if outside.any():
         beyond = np.flatnonzero(outside)
         up, aside = (np.degrees(np.abs(angle[beyond]).max()) for angle in (pitch, yaw))
