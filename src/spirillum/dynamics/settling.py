@@ -22,6 +22,7 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.run_state import state_of
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
@@ -127,6 +128,12 @@ class Settling(DisplayMixin):
         return float(self._free.robot.weight[: rigid_links.MOMENT_BODY].sum())
 
     @property
+    def weight_uncertainty(self) -> float | None:
+        """Uncertainty of that weight where mass and volume are each known to 1 %, N; None without masses."""
+        found = self.robot.derived().get("submerged_weight_uncertainty")
+        return None if found is None or not self.weight else found.value
+
+    @property
     def roughness(self) -> float:
         """Height of the asperities, m."""
         return self._free.robot.roughness
@@ -188,9 +195,10 @@ class Settling(DisplayMixin):
             "forward_velocity": quantity(motion.forward_velocity, "m/s"),
             "tail_rotation_rate": quantity(motion.tail_rotation_rate, "rad/s"),
             "body_rotation_rate": quantity(motion.body_rotation_rate, "rad/s"),
-            "submerged_weight": quantity(self.weight, "N"),
+            "submerged_weight": quantity(self.weight, "N", uncertainty=self.weight_uncertainty),
             "roughness": quantity(self.roughness, "m"),
             "friction_coefficient": quantity(self.friction_coefficient, "1"),
+            "state": state_of(self.lying, self.warnings),
             "lying": self.lying.to_dict(),
             "drainage_time": quantity(self.drainage_time, "s", until=quantity(self.until, "m")),
             "passing": {

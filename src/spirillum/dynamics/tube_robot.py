@@ -105,7 +105,7 @@ class TubeRobot(FreeRobot):
         name = _RANGES.get(int(seen[rigid_links.OUTSIDE]), "place")
         offset, pitch, yaw = seen[[kernel.OFFSET, kernel.WALL_PITCH, kernel.WALL_YAW]]
         return (
-            f"the range of the robot's table in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
+            f"{kernel.RANGE_LEFT} in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
             f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
         )
 

@@ -128,7 +128,7 @@ def _waited(
     if wait <= 0.0:
         return state, ()
     run = integrate(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
-    if run.time[-1] < 0.0:
+    if run.time[-1] < 0.0 and not run.events[-1].what.startswith(kernel.RANGE_LEFT):
         if run.events[-1].what == INTERRUPTED:
             raise KeyboardInterrupt
         raise InputError(

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
+from spirillum.dynamics.run_state import end_state
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
@@ -22,7 +23,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import largest_yaw
+from spirillum.kernels.tube_table import MOTIONS, largest_yaw, range_of, resistance_at
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -196,6 +197,7 @@ def run_in_tube(
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
         **note_attributes(said),
+        state=end_state(dataset, said, float(links.tube[kernel.SLIDING])),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -334,7 +336,20 @@ def held_against_check(
     said = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
-    if beyond.size:
+    held = range_of(table)
+    doubtful = (np.abs(yaw) > checked) | (pitch > held.up.min()) | (-pitch > held.down.min())
+    outside = np.zeros(pitch.size, dtype=bool)
+    for row in np.flatnonzero(doubtful):
+        outside[row] = resistance_at(table, offset[row], pitch[row], yaw[row], 0.0, np.empty((MOTIONS, MOTIONS)))
+    if outside.any():
+        beyond = np.flatnonzero(outside)
+        up, aside = (np.degrees(np.abs(angle[beyond]).max()) for angle in (pitch, yaw))
+        words = (
+            f"{_from(time, beyond[0])}it tilts beyond its table (pitch {up:.3g} deg, yaw {aside:.3g} deg): the "
+            "resistance is that of the nearest pose inside, without error estimate"
+        )
+        said.append(Note("table-not-checked", words, ("wall_pitch", "wall_yaw", "error_estimate")))
+    elif beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
         words = (
             f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "

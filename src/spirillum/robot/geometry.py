@@ -8,7 +8,19 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from spirillum.arrays import Values, Vectors
-from spirillum.robot.fields import NONE, AlsoReads, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
+from spirillum.robot.fields import (
+    NONE,
+    AlsoReads,
+    Angle,
+    Density,
+    Length,
+    LengthOrZero,
+    Mass,
+    Pressure,
+    Section,
+    SignedLength,
+    Viscosity,
+)
 from spirillum.robot.shape_input import read_along, read_tail
 from spirillum.robot.tail_form import PLAIN, Along, CurvePoints, TailForm
 
@@ -53,7 +65,7 @@ Taper = Annotated[
 ]
 
 
-def _read_end(value: Any) -> Any:
+def _read_none(value: Any) -> Any:
     return None if value == "none" else value
 
 
@@ -62,11 +74,25 @@ End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
     End | None,
-    BeforeValidator(_read_end),
+    BeforeValidator(_read_none),
     WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]}),
 ]
 
 _DEFAULT_END: dict[str, End] = {"capsule": "hemisphere", "cylinder": "flat"}
+
+
+class CenterOfMass(Section):
+    """Where the mass of the body is centred, without coupling and tail: a battery is seldom in the middle."""
+
+    x: SignedLength | None = None
+    """Place along the motor axis from the body's mid-length, positive towards the nose; unset: of uniform density."""
+    radial: LengthOrZero = 0.0
+    """Distance from the motor axis; the body then rights itself."""
+    angle: Angle = 0.0
+    """Its angle about +x from the lowest place (-z of the body), as an azimuth."""
+
+
+CenterOfMassOrNone = Annotated[CenterOfMass | None, BeforeValidator(_read_none), NONE]
 
 
 class Body(Section):
@@ -86,6 +112,8 @@ class Body(Section):
     """Edge radius of an end that is a `fillet`."""
     mass: Mass | None = None
     """Mass of body and coupling together (Table I), measured."""
+    center_of_mass: CenterOfMassOrNone = None
+    """Centre of mass of the body alone, or `none` (here None) for a body of uniform density."""
 
     @property
     def front_end(self) -> End | None:
@@ -212,11 +240,7 @@ class Channel(Section):
 ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
 
 
-def _read_pressure(value: Any) -> Any:
-    return None if value == "none" else value
-
-
-PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_pressure), NONE]
+PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_none), NONE]
 
 
 class Fluid(Section):

@@ -69,8 +69,8 @@ class Links(NamedTuple):
 def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
-    `body.mass` is that of body and coupling together, assumed to be of uniform density. The wire has
-    `tail.density`.
+    `body.mass` is that of body and coupling together, assumed to be of uniform density; where `body.center_of_mass`
+    is given, the body's mass is displaced there as a whole. The wire has `tail.density`.
     """
     solids = robot_solids(robot) if solids is None else solids
     body, wire = solids["body"], solids["tail"]
@@ -78,7 +78,12 @@ def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None =
     density = np.nan if robot.body.mass is None else robot.body.mass / main
     wire_density = np.nan if robot.tail.density is None else robot.tail.density
     rotor = [(solids["coupling"], density)] if "coupling" in solids else []
-    return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
+    found = _link([(body, density)])
+    if (center := robot.body.center_of_mass) is not None:
+        x = float(found.centre[0]) if center.x is None else center.x
+        side, up = center.radial * np.sin(center.angle), -center.radial * np.cos(center.angle)
+        found = found._replace(centre=np.array([x, side, up]))
+    return Links(found, _link([*rotor, (wire, wire_density)]))
 
 
 def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:

@@ -333,6 +333,14 @@ def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     return (Note("robot-file-doubtful", words, ("body.mass", "tail.density", "fluid.density")),)
 
 
+def _displaced(robot: Robot) -> tuple[Note, ...]:
+    """Warn that only released motion knows the righting torque of a centre of mass."""
+    if robot.body.center_of_mass is None:
+        return ()
+    words = "body.center_of_mass acts in released motion only; axial motion leaves its torque out: use motion 'free'"
+    return (Note("robot-file-doubtful", words, ("body.center_of_mass",)),)
+
+
 def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
     if robot.body.mass is None:
@@ -364,7 +372,12 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> 
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
         derived = problems.derived()  # once: it integrates the solids
-        doubts = (*_floating(derived), *_too_dense(problems, derived), *_too_smooth(problems))
+        doubts = (
+            *_floating(derived),
+            *_displaced(problems),
+            *_too_dense(problems, derived),
+            *_too_smooth(problems),
+        )
         problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)

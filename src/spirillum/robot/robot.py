@@ -115,8 +115,8 @@ class Robot(RobotTables):
     def derived(self) -> dict[str, Derived]:
         """Derived quantities: lengths, volumes, weight, centre of mass.
 
-        Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. The
-        centre of mass assumes that the measured mass is spread evenly over body and coupling.
+        Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. Without
+        `body.center_of_mass` the measured mass is assumed to be spread evenly over body and coupling.
         """
         batch, tail = RobotBatch.of(self), self.tail
         alpha, arc = float(batch.arc_fraction[0]), float(batch.arc_length[0])
@@ -143,6 +143,9 @@ class Robot(RobotTables):
         masses = np.array([link.mass for link in links])
         mass = float(np.sum(masses))
         centre = masses @ np.array([link.centre[0] for link in links]) / mass
+        assumed = "assumes body.mass spread evenly over body and coupling"
+        if self.body.center_of_mass is not None:
+            assumed = "with body.center_of_mass"
         buoyancy = volumes @ np.array([link.centroid[0] for link in links]) / volume
         return found | {
             "tail_mass": Derived(tail.density * solids["tail"].volume, "kg", "mass of the wire"),
@@ -150,8 +153,11 @@ class Robot(RobotTables):
             "submerged_weight": Derived(
                 (mass - self.fluid.density * volume) * STANDARD_GRAVITY, "N", "weight less buoyancy"
             ),
-            "centre_of_mass": Derived(
-                float(centre), "m", "x of the centre of mass (assumes body.mass spread evenly over body and coupling)"
+            "submerged_weight_uncertainty": Derived(
+                0.01 * float(np.hypot(mass, self.fluid.density * volume)) * STANDARD_GRAVITY,
+                "N",
+                "of submerged_weight, a small difference, where mass and volume are each known to 1 %",
             ),
+            "centre_of_mass": Derived(float(centre), "m", f"x of the centre of mass ({assumed})"),
             "centre_of_buoyancy": Derived(float(buoyancy), "m", "x of the centre of buoyancy"),
         }

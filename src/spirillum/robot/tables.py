@@ -35,7 +35,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.geometry import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
-from spirillum.units import KINDS
+from spirillum.units import KINDS, show
 
 DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
 
@@ -200,6 +200,22 @@ class Friction(Section):
     """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""
 
 
+def _center_problems(body: Body) -> list[str]:
+    """Problems of the body's centre of mass: it needs a mass, and lies inside the body."""
+    center = body.center_of_mass
+    if center is None:
+        return []
+    problems = [] if body.mass is not None else ["body.center_of_mass requires body.mass; set both, or neither"]
+    for name, value, most in (("x", abs(center.x or 0.0), body.length), ("radial", center.radial, body.diameter)):
+        if value > 0.5 * most:
+            size = "length" if name == "x" else "diameter"
+            problems.append(
+                f"body.center_of_mass.{name} = {show(value, 'mm')} lies outside the body; allowed: at most "
+                f"{show(0.5 * most, 'mm')}, half of body.{size}"
+            )
+    return problems
+
+
 class RobotTables(Section):
     """The tables of a robot file; SI inside, frozen. `Robot` adds what its geometry has to fulfil."""
 
@@ -262,7 +278,7 @@ class RobotTables(Section):
 
     def _end_problems(self) -> list[str]:
         body, rft = self.body, self.model.rft
-        problems = []
+        problems = _center_problems(body)
         if body.shape in ("sphere", "spheroid"):
             idle = [name for name in ("front", "rear", "fillet") if getattr(body, name) is not None]
             problems += [

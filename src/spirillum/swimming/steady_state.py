@@ -13,6 +13,17 @@ State = Literal["steady", "orbits", "goes around", "changing"]
 or none of these within the turns that were followed.
 """
 
+END_STATES = {
+    "reaches-end": "nose or tail reached an end of the channel",
+    "left-table": "the robot tilted farther than its table of resistances is followed",
+    "standing": "the robot stands still: dry friction holds it, or its drive is off",
+    "orbit": "the robot went around the tube against its weight",
+    "ceiling": "the robot swims along the upper half of the tube",
+    "steady": "speed and tail rate are steady over turns of the tail",
+    "changing": "the motion still changes",
+}
+"""Final states of a released robot, the first that applies, and what they mean."""
+
 
 @dataclass(frozen=True)
 class SteadyState:

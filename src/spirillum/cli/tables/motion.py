@@ -32,6 +32,7 @@ from spirillum.dynamics.run_summary import told
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.steady_quantities import headline
+from spirillum.swimming.steady_state import END_STATES
 from spirillum.units import display_unit, in_unit
 
 
@@ -205,11 +206,18 @@ def simulation(answer: Answer) -> Blocks:
         yield from placement_of(answer["placement"])
     if "in_tube" in answer:
         yield _in_tube(answer["in_tube"])
+    if "state" in answer:
+        yield _end_state(answer)
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
     yield Detail(f"last 2/3: over the last two thirds of {whole}, on or off")
     yield Detail(f"steady: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
+
+
+def _end_state(answer: Answer) -> Detail:
+    """The state in which a released robot ends, and what it means."""
+    return Detail(f"state at the end: {answer['state']} ({END_STATES[answer['state']]})")
 
 
 def _in_tube(pose: Answer) -> Detail:
