@@ -119,6 +119,8 @@ def resistance(
     known = (*chosen.parts, _BOTH) if isinstance(chosen, SwimmerModel) else chosen.parts
     if part not in known:
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(known)}")
+    if part == "body" and not ready.has_body:
+        raise InputError("part = 'body': this robot has none (body = 'none'); allowed: tail or robot")
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
     angle = parse_option("phase", phase, KINDS["angle"])

@@ -179,7 +179,7 @@ class RobotBatch:
             form=first.tail.form,
             options=first.model,
             drive=first.drive.kind if first.drive else None,
-            joint=first.drive.joint if first.drive else "revolute",
+            joint=first.drive.joint if first.drive else "revolute" if first.has_body else "fixed",
             friction=first.friction.reading,
             placement=placement or Placement(),
         )
@@ -290,6 +290,14 @@ class RobotBatch:
         """x_r = L_b/2 + L_c: distance of the tail's root behind the origin, m."""
         return 0.5 * self.body_length + self.coupling_length
 
+    @property
+    def pose(self) -> Placement:
+        """The placement; a bare tail, which no body lays on the floor, is on the tube's axis where no gap is given."""
+        given = self.placement
+        if self.shape != "none" or given.gap is not None or given.eccentricity is not None:
+            return given
+        return given.model_copy(update={"eccentricity": 0.0})
+
     @cached_property
     def body_volume(self) -> PerRobot:
         """Volume of the body, m^3."""
@@ -300,6 +308,8 @@ class RobotBatch:
 
 _OF_CURVE = ("tail.wavelength", "tail.amplitude", "tail.length", "tail.taper")
 """Fields that follow from a centre line through points."""
+
+
 _S = TypeVar("_S", RobotBatch, Electrics, CalibrationFactors)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -57,7 +59,7 @@ def _read_end(value: Any) -> Any:
     return None if value == "none" else value
 
 
-Shape = Literal["capsule", "sphere", "spheroid", "cylinder"]
+Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
@@ -73,7 +75,7 @@ class Body(Section):
     """The robot's body, a solid of revolution about the motor axis."""
 
     shape: Shape = "capsule"
-    """Outline of the body."""
+    """Outline of the body; `none`, as `body = "none"`, is a bare tail."""
     diameter: Length
     """Largest diameter D_b (Table I)."""
     length: Length
@@ -101,6 +103,22 @@ class Body(Section):
         """Radius of the rounding of an end of this body, m: 0 where it is flat."""
         return {"hemisphere": 0.5 * self.diameter, "fillet": self.fillet or 0.0}.get(end or "", 0.0)
 
+
+def _read_body(value: Any) -> Any:
+    none = value == "none" or (isinstance(value, Mapping) and value.get("shape") == "none")
+    if not none:
+        return value
+    given = [] if value == "none" else [name for name, item in value.items() if name != "shape" and _is_size(item)]
+    if given:
+        raise ValueError(f"'none' without body.{given[0]}")
+    return Body.model_construct(shape="none", diameter=0.0, length=0.0)
+
+
+def _is_size(value: Any) -> bool:
+    return value is not None and not (isinstance(value, str) and re.match(r"[+-]?0(\.0*)?\s", value))
+
+
+BodyOrNone = Annotated[Body, BeforeValidator(_read_body), NONE]
 
 StripeColour = Literal["red", "yellow", "green", "blue", "white", "black", "orange", "magenta", "cyan"]
 
@@ -382,6 +400,8 @@ def body_volume(
 ) -> Values:
     """Volume of the body, m^3."""
     radius = 0.5 * diameter
+    if shape == "none":
+        return 0.0 * radius
     if shape in ("sphere", "spheroid"):
         return 4.0 / 3.0 * np.pi * radius**2 * (0.5 * length)
     straight = length - shortest_body(diameter, fillet, front, rear)

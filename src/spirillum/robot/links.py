@@ -42,6 +42,10 @@ class HomogeneousSolid(NamedTuple):
     """Inertia about the centroid at density 1, m^5, (3, 3)."""
 
 
+_NOTHING = HomogeneousSolid(0.0, np.zeros(3), np.zeros((3, 3)))
+"""A solid that is not there, at the origin."""
+
+
 class Link(NamedTuple):
     """A rigid link in the frame of the body at phase 0 of the tail; SI."""
 
@@ -73,9 +77,10 @@ def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None =
     `tail.density`.
     """
     solids = robot_solids(robot) if solids is None else solids
-    body, wire = solids["body"], solids["tail"]
+    body, wire = solids.get("body", _NOTHING), solids["tail"]
     main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)
     density = np.nan if robot.body.mass is None else robot.body.mass / main
+    density = density if main > 0 else 0.0
     wire_density = np.nan if robot.tail.density is None else robot.tail.density
     rotor = [(solids["coupling"], density)] if "coupling" in solids else []
     return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
@@ -99,8 +104,10 @@ def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
 
 
 def outlines_of(robot: RobotTables) -> dict[str, Outline]:
-    """Outlines of `body` and, where there is one, `coupling`."""
+    """Outlines of `body` and `coupling`, where they are."""
     body, coupling = robot.body, robot.coupling
+    if not robot.has_body:
+        return solid_outlines(None, 0.0, coupling.diameter, coupling.length, coupling.clearance)
     outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
@@ -193,10 +200,10 @@ def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:
     masses = np.array([solid.volume * density for solid, density in parts])
     centroids = np.array([solid.centroid for solid, _ in parts])
     mass = float(np.sum(masses))
-    centre = masses @ centroids / mass
+    centre = masses @ centroids / mass if mass else centroids[0]
     inertia = np.zeros((3, 3))
     for (solid, density), own, centroid in zip(parts, masses, centroids, strict=True):
         arm = centroid - centre
         inertia += density * solid.inertia + own * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     volume = float(np.sum(volumes))
-    return Link(mass, centre, inertia, volume, volumes @ centroids / volume)
+    return Link(mass, centre, inertia, volume, volumes @ centroids / volume if volume else centroids[0])

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.errors import InputError
 from spirillum.notes import Note
 from spirillum.robot.fields import (
     AlsoReads,
@@ -31,7 +32,7 @@ from spirillum.robot.fields import (
     Voltage,
     quantity_schema,
 )
-from spirillum.robot.geometry import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.robot.geometry import BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.units import KINDS
 
@@ -150,8 +151,8 @@ class RobotTables(Section):
     """What it is, in a sentence."""
     reference: Text = Field(default="", max_length=2000)
     """Where its numbers come from."""
-    body: Body
-    """The body."""
+    body: BodyOrNone
+    """The body, or `none` for a bare tail."""
     seal: SealOrNone = None
     """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
     coupling: Coupling = Coupling()
@@ -196,10 +197,36 @@ class RobotTables(Section):
 
     @model_validator(mode="after")
     def _no_field_missing_or_idle(self) -> Self:
-        problems = [*self._end_problems(), *self._drive_problems()]
+        problems = [*self._end_problems(), *self._drive_problems(), *self._problems_without_body()]
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
+
+    @property
+    def has_body(self) -> bool:
+        """Whether there is a body, against which a joint can turn."""
+        return self.body.shape != "none"
+
+    def check_body(self, what: str) -> None:
+        """Refuse a bare tail for what takes a body.
+
+        Raises:
+            InputError: if there is none.
+        """
+        if not self.has_body:
+            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: a robot with a body")
+
+    def _problems_without_body(self) -> list[str]:
+        if self.has_body:
+            return []
+        problems = []
+        if self.seal is not None:
+            problems.append("seal is set with body = 'none'; allowed: seal = 'none'")
+        if self.drive is not None and self.drive.joint == "revolute":
+            problems.append(
+                "drive.joint = 'revolute' with body = 'none', against which nothing turns; allowed: 'fixed'"
+            )
+        return problems
 
     def _end_problems(self) -> list[str]:
         body, rft = self.body, self.model.rft

@@ -131,6 +131,7 @@ class Contour:
 
 def contour_of(robot: Robot, optics: Optics) -> Contour:
     """Compute the apparent contour of a robot's body."""
+    robot.check_body("the tracker, which follows the body's outline,")
     outlines = {name: outline for name, outline in outlines_of(robot).items() if name in ("body", "coupling")}
     outline, radius = outlines["body"], 0.5 * robot.body.diameter
     spacing = 1.2 * optics.length_per_pixel
