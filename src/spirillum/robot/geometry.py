@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_v
 
 from spirillum.arrays import Values, Vectors
 from spirillum.robot.fields import NONE, AlsoReads, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
-from spirillum.robot.shape_input import read_along, read_tail
+from spirillum.robot.shape_input import read_along, read_profile, read_tail
 from spirillum.robot.tail_form import PLAIN, Along, CurvePoints, TailForm
 
 
@@ -55,11 +55,15 @@ Taper = Annotated[
 ]
 
 
+ProfilePoints = tuple[tuple[float, float], ...]
+"""Points (x, r) along a body's outline, mm."""
+
+
 def _read_end(value: Any) -> Any:
     return None if value == "none" else value
 
 
-Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "none"]
+Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
@@ -71,11 +75,17 @@ EndOrNone = Annotated[
 _DEFAULT_END: dict[str, End] = {"capsule": "hemisphere", "cylinder": "flat"}
 
 
+_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+ProfileOrNone = Annotated[
+    ProfilePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})
+]
+
+
 class Body(Section):
     """The robot's body, a solid of revolution about the motor axis."""
 
     shape: Shape = "capsule"
-    """Outline of the body; `none`, as `body = "none"`, is a bare tail."""
+    """Outline of the body; `profile` is that of `body.profile`, `none`, as `body = "none"`, a bare tail."""
     diameter: Length
     """Largest diameter D_b (Table I)."""
     length: Length
@@ -88,6 +98,15 @@ class Body(Section):
     """Edge radius of an end that is a `fillet`."""
     mass: Mass | None = None
     """Mass of body and coupling together (Table I), measured."""
+    profile: ProfileOrNone = None
+    """Outline from pole to pole: a CSV file beside this one, or points (x, r) in mm; it gives diameter and length."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, raw: Any) -> Any:
+        if not isinstance(raw, Mapping) or raw.get("profile") in (None, "none"):
+            return raw
+        return read_profile(dict(raw))
 
     @property
     def front_end(self) -> End | None:
@@ -161,7 +180,6 @@ _SIZE = {
 _VARYING = AlsoReads(lambda _: _SIZE)
 """A length from the root to the tip, or points (distance from the root, value)."""
 
-_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
 AlongOrNone = Annotated[
     Along | None, BeforeValidator(read_along), WithJsonSchema({"anyOf": [_NUMBERS, {"const": "none"}]})
 ]

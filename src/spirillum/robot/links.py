@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Samples, Tensors, Vectors
+from spirillum.arrays import Tensors, Vectors
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
-from spirillum.robot.outline import Arc, Outline, Segment, body_outline, solid_outlines
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
 from spirillum.robot.tail_form import PLAIN, TailForm
 
@@ -108,30 +108,20 @@ def outlines_of(robot: RobotTables) -> dict[str, Outline]:
     body, coupling = robot.body, robot.coupling
     if not robot.has_body:
         return solid_outlines(None, 0.0, coupling.diameter, coupling.length, coupling.clearance)
-    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    outline = body_outline(
+        body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end, body.profile or ()
+    )
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
 
 def revolution_solid(outline: Outline) -> HomogeneousSolid:
     """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding."""
-    t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
-    x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
+    x, square, dx = outline.sections()
     volume = float(np.pi * np.sum(square * dx))
     middle = float(np.pi * np.sum(square * x * dx)) / volume
     about_axis = 0.5 * np.pi * float(np.sum(square**2 * dx))
     across = 0.5 * about_axis + float(np.pi * np.sum(square * (x - middle) ** 2 * dx))
     return HomogeneousSolid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
-
-
-def _run(piece: Segment | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
-    """x, rho^2 and the weighted -dx (the outline runs from front to rear) at t from 0 to 1."""
-    x, rho = piece.points(t)
-    if isinstance(piece, Segment):
-        slope = np.full_like(t, piece.end[0] - piece.start[0])
-    else:
-        turn = piece.angles[1] - piece.angles[0]
-        slope = -piece.semi_axes[0] * np.sin(piece.angles[0] + turn * t) * turn
-    return x, rho**2, -slope * weight
 
 
 def wire_solid(

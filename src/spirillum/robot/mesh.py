@@ -183,7 +183,7 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
 def _check_seal(robot: Robot, seal: Seal) -> None:
     """The seal ends behind the nose."""
     body = robot.body
-    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid") else body.rounding(body.front_end)
+    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
     longest = body.length - nose
     if seal.length > longest * (1.0 + 1e-12):
         raise InputError(

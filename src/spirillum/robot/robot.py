@@ -54,6 +54,8 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
 def _in_words(value: Any, unit: str | None) -> str:
     """A field's value with the unit in which people read it."""
+    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+        return f"{len(value)} points"
     if unit is None or not isinstance(value, float):
         return str(value)
     si = unit.replace("**", "^")

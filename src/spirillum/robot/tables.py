@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from spirillum.errors import InputError
 from spirillum.notes import Note
 from spirillum.robot.fields import (
+    NONE,
     AlsoReads,
     BackEmfConstant,
     Charge,
@@ -41,6 +42,10 @@ DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
 FrictionReading = Literal["none", "rotor", "body", "paper"]
 
 
+_UNSET = BeforeValidator(lambda value: None if value == "none" else value)
+"""A value that the word `none` takes away, also one of a preset."""
+
+
 class Drive(Section):
     """What turns the tail, and the joint between tail and body."""
 
@@ -48,9 +53,9 @@ class Drive(Section):
     """`dc-motor` (motor and battery of the file), `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
-    rate: Rate | None = None
+    rate: Annotated[Rate | None, _UNSET, NONE] = None
     """For `rate`: rotation rate of the tail about +x in the lab."""
-    torque: Torque | None = None
+    torque: Annotated[Torque | None, _UNSET, NONE] = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
     duty: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     """For `dc-motor`: pulse-width duty of the voltage controller; 1 is full throttle."""
@@ -231,7 +236,7 @@ class RobotTables(Section):
     def _end_problems(self) -> list[str]:
         body, rft = self.body, self.model.rft
         problems = []
-        if body.shape in ("sphere", "spheroid"):
+        if body.shape in ("sphere", "spheroid", "profile"):
             idle = [name for name in ("front", "rear", "fillet") if getattr(body, name) is not None]
             problems += [
                 f"body.{name} is set, but a {body.shape} has no ends; allowed: leave it out, or 'none'" for name in idle

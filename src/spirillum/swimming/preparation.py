@@ -219,8 +219,6 @@ def _has_nodes(geometry: RobotGeometry, radius: float) -> bool:
 def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:
     """What decides the table of the first robot of a batch."""
     radius = tube_radius(batch)
-    if batch.shape == "none":
-        raise InputError("a bare tail (body = 'none') has no table; allowed: single poses, model.tube.form = 'direct'")
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
     check_usual_resolution(batch.options)
