@@ -142,7 +142,11 @@ def compare_models(
 
 @from_function(
     "spirillum.fluid.resistance:resistance",
-    without={**NO_FORM, "resolution.phases": "the matrix is that of one phase"},
+    without={
+        **NO_FORM,
+        "resolution.phases": "the matrix is that of one phase",
+        "accuracy": "the option is that of the resolution",
+    },
     complete={"model": complete_resistance_models},
 )
 def resistance(request: Request, *, json: Json = False) -> None:

@@ -126,6 +126,7 @@ class ExportFile(NamedTuple):
 
 def check_masses(robot: Robot, target: Path) -> None:
     """Require the masses that a robot description needs."""
+    robot.check_body(target.suffix)
     for table, name in (("body", "mass"), ("tail", "density")):
         if getattr(getattr(robot, table), name) is None:
             raise InputError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -21,7 +23,7 @@ from spirillum.robot.fields import (
     SignedLength,
     Viscosity,
 )
-from spirillum.robot.shape_input import read_along, read_tail
+from spirillum.robot.shape_input import read_along, read_profile, read_tail
 from spirillum.robot.tail_form import PLAIN, Along, CurvePoints, TailForm
 
 
@@ -65,11 +67,15 @@ Taper = Annotated[
 ]
 
 
+ProfilePoints = tuple[tuple[float, float], ...]
+"""Points (x, r) along a body's outline, mm."""
+
+
 def _read_none(value: Any) -> Any:
     return None if value == "none" else value
 
 
-Shape = Literal["capsule", "sphere", "spheroid", "cylinder"]
+Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
@@ -94,12 +100,17 @@ class CenterOfMass(Section):
 
 CenterOfMassOrNone = Annotated[CenterOfMass | None, BeforeValidator(_read_none), NONE]
 
+_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+ProfileOrNone = Annotated[
+    ProfilePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})
+]
+
 
 class Body(Section):
     """The robot's body, a solid of revolution about the motor axis."""
 
     shape: Shape = "capsule"
-    """Outline of the body."""
+    """Outline of the body; `profile` is that of `body.profile`, `none`, as `body = "none"`, a bare tail."""
     diameter: Length
     """Largest diameter D_b (Table I)."""
     length: Length
@@ -114,6 +125,15 @@ class Body(Section):
     """Mass of body and coupling together (Table I), measured."""
     center_of_mass: CenterOfMassOrNone = None
     """Centre of mass of the body alone, or `none` (here None) for a body of uniform density."""
+    profile: ProfileOrNone = None
+    """Outline from pole to pole: a CSV file beside this one, or points (x, r) in mm; it gives diameter and length."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, raw: Any) -> Any:
+        if not isinstance(raw, Mapping) or raw.get("profile") in (None, "none"):
+            return raw
+        return read_profile(dict(raw))
 
     @property
     def front_end(self) -> End | None:
@@ -129,6 +149,22 @@ class Body(Section):
         """Radius of the rounding of an end of this body, m: 0 where it is flat."""
         return {"hemisphere": 0.5 * self.diameter, "fillet": self.fillet or 0.0}.get(end or "", 0.0)
 
+
+def _read_body(value: Any) -> Any:
+    none = value == "none" or (isinstance(value, Mapping) and value.get("shape") == "none")
+    if not none:
+        return value
+    given = [] if value == "none" else [name for name, item in value.items() if name != "shape" and _is_size(item)]
+    if given:
+        raise ValueError(f"'none' without body.{given[0]}")
+    return Body.model_construct(shape="none", diameter=0.0, length=0.0)
+
+
+def _is_size(value: Any) -> bool:
+    return value is not None and not (isinstance(value, str) and re.match(r"[+-]?0(\.0*)?\s", value))
+
+
+BodyOrNone = Annotated[Body, BeforeValidator(_read_body), NONE]
 
 StripeColour = Literal["red", "yellow", "green", "blue", "white", "black", "orange", "magenta", "cyan"]
 
@@ -171,7 +207,6 @@ _SIZE = {
 _VARYING = AlsoReads(lambda _: _SIZE)
 """A length from the root to the tip, or points (distance from the root, value)."""
 
-_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
 AlongOrNone = Annotated[
     Along | None, BeforeValidator(read_along), WithJsonSchema({"anyOf": [_NUMBERS, {"const": "none"}]})
 ]
@@ -406,6 +441,8 @@ def body_volume(
 ) -> Values:
     """Volume of the body, m^3."""
     radius = 0.5 * diameter
+    if shape == "none":
+        return 0.0 * radius
     if shape in ("sphere", "spheroid"):
         return 4.0 / 3.0 * np.pi * radius**2 * (0.5 * length)
     straight = length - shortest_body(diameter, fillet, front, rear)

@@ -181,7 +181,7 @@ def _body_limits(b: RobotBatch) -> list[Limit]:
         "it is left free on both sides within coupling.length",
         "clearance-too-large",
     )
-    if b.shape == "spheroid":
+    if b.shape in ("spheroid", "profile", "none"):
         return [clearance]
     if b.shape == "sphere":
         why = "a sphere is as long as its diameter"

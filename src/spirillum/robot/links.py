@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Samples, Tensors, Vectors
+from spirillum.arrays import Tensors, Vectors
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
-from spirillum.robot.outline import Arc, Outline, Segment, body_outline, solid_outlines
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
 from spirillum.robot.tail_form import PLAIN, TailForm
 
@@ -40,6 +40,10 @@ class HomogeneousSolid(NamedTuple):
     """Centroid of the volume, m, (3,)."""
     inertia: Tensors
     """Inertia about the centroid at density 1, m^5, (3, 3)."""
+
+
+_NOTHING = HomogeneousSolid(0.0, np.zeros(3), np.zeros((3, 3)))
+"""A solid that is not there, at the origin."""
 
 
 class Link(NamedTuple):
@@ -73,9 +77,10 @@ def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None =
     is given, the body's mass is displaced there as a whole. The wire has `tail.density`.
     """
     solids = robot_solids(robot) if solids is None else solids
-    body, wire = solids["body"], solids["tail"]
+    body, wire = solids.get("body", _NOTHING), solids["tail"]
     main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)
     density = np.nan if robot.body.mass is None else robot.body.mass / main
+    density = density if main > 0 else 0.0
     wire_density = np.nan if robot.tail.density is None else robot.tail.density
     rotor = [(solids["coupling"], density)] if "coupling" in solids else []
     found = _link([(body, density)])
@@ -104,32 +109,24 @@ def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
 
 
 def outlines_of(robot: RobotTables) -> dict[str, Outline]:
-    """Outlines of `body` and, where there is one, `coupling`."""
+    """Outlines of `body` and `coupling`, where they are."""
     body, coupling = robot.body, robot.coupling
-    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    if not robot.has_body:
+        return solid_outlines(None, 0.0, coupling.diameter, coupling.length, coupling.clearance)
+    outline = body_outline(
+        body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end, body.profile or ()
+    )
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
 
 def revolution_solid(outline: Outline) -> HomogeneousSolid:
     """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding."""
-    t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
-    x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
+    x, square, dx = outline.sections()
     volume = float(np.pi * np.sum(square * dx))
     middle = float(np.pi * np.sum(square * x * dx)) / volume
     about_axis = 0.5 * np.pi * float(np.sum(square**2 * dx))
     across = 0.5 * about_axis + float(np.pi * np.sum(square * (x - middle) ** 2 * dx))
     return HomogeneousSolid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
-
-
-def _run(piece: Segment | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
-    """x, rho^2 and the weighted -dx (the outline runs from front to rear) at t from 0 to 1."""
-    x, rho = piece.points(t)
-    if isinstance(piece, Segment):
-        slope = np.full_like(t, piece.end[0] - piece.start[0])
-    else:
-        turn = piece.angles[1] - piece.angles[0]
-        slope = -piece.semi_axes[0] * np.sin(piece.angles[0] + turn * t) * turn
-    return x, rho**2, -slope * weight
 
 
 def wire_solid(
@@ -198,10 +195,10 @@ def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:
     masses = np.array([solid.volume * density for solid, density in parts])
     centroids = np.array([solid.centroid for solid, _ in parts])
     mass = float(np.sum(masses))
-    centre = masses @ centroids / mass
+    centre = masses @ centroids / mass if mass else centroids[0]
     inertia = np.zeros((3, 3))
     for (solid, density), own, centroid in zip(parts, masses, centroids, strict=True):
         arm = centroid - centre
         inertia += density * solid.inertia + own * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     volume = float(np.sum(volumes))
-    return Link(mass, centre, inertia, volume, volumes @ centroids / volume)
+    return Link(mass, centre, inertia, volume, volumes @ centroids / volume if volume else centroids[0])

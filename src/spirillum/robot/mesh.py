@@ -119,7 +119,7 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
     fineness = _checked_fineness(fineness)
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
     outlines = outlines_of(robot)
-    pieces = [_body(robot, outlines["body"], around)]
+    pieces = [_body(robot, outlines["body"], around)] if robot.has_body else []
     for name, surface in _rotor(robot, outlines.get("coupling"), around, sides, fineness):
         cos, sin = np.cos(phase), np.sin(phase)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
@@ -183,7 +183,7 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
 def _check_seal(robot: Robot, seal: Seal) -> None:
     """The seal ends behind the nose."""
     body = robot.body
-    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid") else body.rounding(body.front_end)
+    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
     longest = body.length - nose
     if seal.length > longest * (1.0 + 1e-12):
         raise InputError(
@@ -215,7 +215,8 @@ def _rotor(
         found.append(("shaft", rod(line[0], line[1], shaft, sides, round_start=False, round_end=False)))
         found.append(("coupling", revolved(profile_of(coupling, around), around)))
         before = back + min(2.0 * radius, 0.5 * (front - back))
-    found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
+    if before > root[0]:
+        found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
     wire = tail_line(robot, fineness=fineness)
     if np.linalg.norm(wire.points[0] - root) > 1e-9 * radius:
         bar = rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)

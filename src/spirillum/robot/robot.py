@@ -53,6 +53,8 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
 def _in_words(value: Any, unit: str | None) -> str:
     """A field's value with the unit in which people read it."""
+    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+        return f"{len(value)} points"
     if unit is not None and isinstance(value, tuple):
         return ", ".join(_in_words(item, unit) for item in value)
     if unit is None or not isinstance(value, float):
@@ -87,7 +89,8 @@ class Robot(RobotTables):
 
     def __repr__(self) -> str:
         """The robot in a line: name, body, tail and channel."""
-        parts = [f"body {show(self.body.diameter, 'mm')}", f"tail {self._tail_size} mm"]
+        body = show(self.body.diameter, "mm") if self.has_body else "none"
+        parts = [f"body {body}", f"tail {self._tail_size} mm"]
         parts += [f"channel {show(self.channel.diameter, 'mm')}"] if self.channel is not None else []
         return f"Robot({self.name}, {', '.join(parts)})"
 
@@ -133,12 +136,12 @@ class Robot(RobotTables):
             "robot_length": Derived(
                 self.body.length + self.coupling.length + tail.length, "m", "body, coupling and tail together"
             ),
-            "body_volume": Derived(solids["body"].volume, "m^3", "volume of the body"),
+            "body_volume": Derived(links.body.volume, "m^3", "volume of the body"),
             "coupling_volume": Derived(coupling, "m^3", "volume of the coupling's solid"),
             "wire_volume": Derived(solids["tail"].volume, "m^3", "volume of the wire, its bend at the root included"),
             "displaced_volume": Derived(volume, "m^3", "volume of body, coupling and wire"),
         }
-        if self.body.mass is None or tail.density is None:
+        if (self.body.mass is None and (self.has_body or coupling)) or tail.density is None:
             return found
         masses = np.array([link.mass for link in links])
         mass = float(np.sum(masses))

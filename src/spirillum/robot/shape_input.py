@@ -218,6 +218,37 @@ def _sizes_of(line: CentreLine) -> dict[str, str]:
     }
 
 
+def read_profile(table: dict[str, Any]) -> dict[str, Any]:
+    """A [body] table whose outline is given by points: the sizes that follow from them, as text with their unit."""
+    points = checked_points(table["profile"], ("x", "r"), "body.profile", 3)
+    _check_profile(points)
+    x, r = np.array(points).T
+    follows = {"length": f"{1e-3 * float(np.ptp(x))!r} m", "diameter": f"{2e-3 * float(np.max(r))!r} m"}
+    for name, value in follows.items():
+        if table.get(name) is not None and not _same_length(f"body.{name}", table[name], value):
+            raise refuse(
+                f"body.{name} = {table[name]} with body.profile, which makes it {value}; allowed: leave it out"
+            )
+    if table.get("shape", "profile") != "profile":
+        raise refuse(f"body.shape = {str(table['shape'])[:40]!r} with body.profile; allowed: leave it out")
+    return {**table, **follows, "shape": "profile", "profile": points}
+
+
+def _check_profile(points: tuple[tuple[float, ...], ...]) -> None:
+    """Refuse an outline that is open, folds back, or touches the axis between its ends."""
+    x, r = np.array(points).T
+    allowed = "points (x, r) from one pole to the other, r = 0 at both and above 0 between them, x in one direction"
+    for at, end in ((0, "first"), (-1, "last")):
+        if r[at] != 0.0:
+            raise refuse(f"body.profile is open: its {end} r = {r[at]:g} mm; allowed: {allowed}")
+    if np.any(r[1:-1] <= 0.0):
+        at = int(np.argmax(r[1:-1] <= 0.0)) + 1
+        raise refuse(f"body.profile: point {at + 1} has r = {r[at]:g} mm; allowed: {allowed}")
+    steps = np.diff(x) * np.sign(x[-1] - x[0])
+    if x[0] == x[-1] or np.any(steps < 0.0):
+        raise refuse(f"body.profile folds back at point {int(np.argmin(steps)) + 2}; allowed: {allowed}")
+
+
 def _same_length(field: str, own: Any, value: str) -> bool:
     length = parse_quantity(value, KINDS["length"])
     return abs(parse_or_refuse(field, own, "length") / length - 1.0) < 1e-9

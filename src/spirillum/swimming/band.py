@@ -112,7 +112,7 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     Returns:
         `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
     """
-    over = left_open(batch.placement, model)
+    over = left_open(batch.pose, model)
     if not over:
         return []
     g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
@@ -130,7 +130,7 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
 
 def _gaps(g: RobotGeometry, radius: float, pitch: float, yaw: float) -> list[float]:
     room = largest_gap(g.body, radius, pitch, yaw)
-    ends = [min(share * 0.5 * g.body_diameter, room) for share in GAP_BAND]
+    ends = [min(share * 0.5 * g.width, room) for share in GAP_BAND]
     return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
 
 
@@ -204,7 +204,7 @@ def band_of(
             left_out.append(Note("without-answer", f"the band leaves out {where}: {why}"))
     tell(model.name, len(places) + 1, len(places) + 1)
     return Band(
-        left_open(batch.placement, model),
+        left_open(batch.pose, model),
         np.array([place.gap for place in places], dtype=float),
         np.array([place.pitch for place in places], dtype=float),
         joined(found),

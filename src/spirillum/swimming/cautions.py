@@ -78,7 +78,7 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
 
 def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     """Limits of an answer at one pose of several, with the remedy; nothing where the pose is known."""
-    over = left_open(batch.placement, model)
+    over = left_open(batch.pose, model)
     if not over:
         return []
     are = "is" if len(over) == 1 else "are"

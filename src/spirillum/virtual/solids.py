@@ -170,6 +170,7 @@ def solids_of(
         edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
         covered: whether a glass cover, which is not one of them, stands before the seal.
     """
+    robot.check_body("the virtual camera")
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
     if edges is not None:
         pieces = tuple(

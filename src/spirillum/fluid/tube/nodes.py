@@ -69,7 +69,14 @@ class Places:
 
     @cached_property
     def rings(self) -> Samples:
-        """See `rings_of`."""
+        """See `rings_of`.
+
+        Raises:
+            InputError: for a robot without a table.
+        """
+        if (shape := self.geometry.shape) in ("none", "profile"):
+            said = "a bare tail (body = 'none')" if shape == "none" else "a body of any profile"
+            raise InputError(f"{said} has no table in its tube; allowed: single poses, model.tube.form = 'direct'")
         return rings_of(self.geometry.body)
 
     @cached_property

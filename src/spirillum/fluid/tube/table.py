@@ -288,9 +288,9 @@ def _checked(table: TubeTable) -> TubeTable:
 
 def key_of(geometry: RobotGeometry, radius: float) -> str:
     """A digest of robot and tube, numbers to ten digits."""
-    *numbers, form = geometry
+    *numbers, form, profile = geometry
     words = [*(f"{value:.10g}" if isinstance(value, float) else str(value) for value in numbers), f"{radius:.10g}"]
-    words += [] if form == PLAIN else [str(form)]
+    words += [str(part) for part, usual in ((form, PLAIN), (profile, ())) if part != usual]
     return hashlib.sha256(" ".join(words).encode()).hexdigest()[:24]
 
 

@@ -12,8 +12,8 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.costs import check_memory
 from spirillum.fluid.wire.stokeslets import Wire, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import End, Shape, amplitude_envelope, centreline
-from spirillum.robot.outline import Outline, body_outline, solid_outlines
+from spirillum.robot.geometry import End, ProfilePoints, Shape, amplitude_envelope, centreline
+from spirillum.robot.outline import Outline, body_outline, cylinder_outline, solid_outlines
 from spirillum.robot.tail_form import PLAIN, TailForm
 from spirillum.units import show
 
@@ -56,19 +56,20 @@ class RobotGeometry(NamedTuple):
     taper: float
     hand: float
     form: TailForm = PLAIN
+    profile: ProfilePoints = ()
 
     @classmethod
     def of(cls, batch: RobotBatch, index: int = 0) -> RobotGeometry:
         """Of robot number `index`."""
-        shared = {"shape": batch.shape, "front": batch.front, "rear": batch.rear, "form": batch.form}
+        shared = {name: getattr(batch, name) for name in ("shape", "front", "rear", "form", "profile")}
         numbers = {name: number_of(getattr(batch, name), index) for name in cls._fields if name not in shared}
         return cls(**shared, **numbers)  # type: ignore[arg-type]
 
     @classmethod
     def read(cls, table: dict[str, Any]) -> RobotGeometry:
         """From the JSON of its fields."""
-        form = table.pop("form", None)
-        return cls(**table, form=PLAIN if form is None else TailForm.read(form))
+        form, profile = table.pop("form", None), tuple(map(tuple, table.pop("profile", ())))
+        return cls(**table, form=PLAIN if form is None else TailForm.read(form), profile=profile)
 
     @property
     def without_tail(self) -> RobotGeometry:
@@ -77,14 +78,24 @@ class RobotGeometry(NamedTuple):
 
     @property
     def body(self) -> Outline:
-        """Outline of the body."""
-        return body_outline(self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear)
+        """Outline of the body; of a bare tail the cylinder that it sweeps, by which its pose in a tube is given."""
+        if self.shape == "none":
+            x, rho, _ = self.swept(_SWEPT_CURVE).T
+            return cylinder_outline(2.0 * float(rho.max()) + self.wire_diameter, float(x.max()), float(x.min()))
+        return body_outline(
+            self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear, self.profile
+        )
 
     @property
     def outlines(self) -> dict[str, Outline]:
         """Outlines of the solids of revolution by name: `body`, and `coupling` where there is one."""
         coupling = self.coupling_diameter, self.coupling_length, self.coupling_clearance
-        return solid_outlines(self.body, self.body_length, *coupling)
+        return solid_outlines(None if self.shape == "none" else self.body, self.body_length, *coupling)
+
+    @property
+    def width(self) -> float:
+        """Diameter of the body, or of what a bare tail sweeps."""
+        return self.body_diameter if self.shape != "none" else 2.0 * self.body.pieces[1].start[1]  # type: ignore[union-attr]
 
     def solids(self, part: str) -> list[tuple[Outline, int]]:
         """Outline and link (0 body, 1 rotor) of each solid of one of `PIECES`."""

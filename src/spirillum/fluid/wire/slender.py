@@ -158,10 +158,11 @@ class Slender(SwimmerModel):
         """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
         coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        behind = batch.coupling_length if batch.shape != "none" else np.full(1, np.inf)
         limits = [
             Limit.of(
                 "coupling.length",
-                batch.coupling_length,
+                behind,
                 "more than",
                 0.5 * batch.wire_diameter,
                 "mm",
@@ -170,7 +171,7 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "coupling.length",
-                batch.coupling_length,
+                behind,
                 "at least",
                 _SMALLEST_GAP * batch.amplitude,
                 "mm",
@@ -179,7 +180,7 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "coupling.clearance",
-                np.where(coupled, batch.coupling_clearance, np.inf),
+                np.where(coupled & (batch.shape != "none"), batch.coupling_clearance, np.inf),
                 "at least",
                 _SMALLEST_CLEARANCE * batch.coupling_diameter,
                 "mm",
