@@ -359,7 +359,8 @@ def validation_case(name: str) -> str:
         lines = [f"- {one.name}: {', '.join(one.values)}" for one in case.assumptions]
         parts.append("Assumed beyond the publication, each value tried alone:\n\n" + "\n".join(lines))
     if case.statements:
-        claims = [(one.claim, read, one.computed, one.verdict) for one, read in zip(result.statements, result.read)]
+        told = zip(result.statements, result.read, strict=True)
+        claims = [(one.claim, read, one.computed, one.verdict) for one, read in told]
         parts.append(table(("Statement", "Read", "Computed", "Verdict"), claims))
     elif result.statements:
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())

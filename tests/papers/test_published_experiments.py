@@ -32,6 +32,7 @@ ROWS = {
     "assumptions",
     "recorded",
     "as_recorded",
+    "computed",
 }
 CHEAP = [name for name in case_names() if load_case(name).cost == "seconds"]
 
@@ -50,11 +51,13 @@ def test_a_case_names_robots_references_and_quantities_that_are_there(name: str)
         assert set(point.uncertainty) <= set(point.published)
         assert {point.over, point.minus} - {""} <= set(labels)
     for assumption in case.assumptions:
-        assert assumption.set or assumption.scale
-        for values in (*assumption.set.values(), *assumption.scale.values()):
+        changes = (assumption.set, assumption.scale, assumption.placement)
+        assert any(changes)
+        for values in (values for change in changes for values in change.values()):
             assert len(values) == len(assumption.values)
-    first = case.points[0]
-    assert all(robot_of(case, first, trial) != robot_of(case, first) for trial in trials_of(case, first))
+    for point in case.points:
+        nominal = robot_of(case, point)
+        assert all(trial.placement or robot_of(case, point, trial) != nominal for trial in trials_of(case, point))
     assert {(point.label, quantity) for point, quantity in case.rows()} == {
         (label, quantity) for label, values in recorded_values(name).items() for quantity in values
     }
@@ -102,7 +105,7 @@ def test_a_row_that_leaves_its_recorded_range_is_exit_code_1(run: Any, monkeypat
 def test_an_unknown_case_is_a_sentence(run: Any) -> None:
     outcome = run("validate", "rodenborn2012")
     assert outcome.code == 2
-    assert "unknown case 'rodenborn2012'; did you mean 'rodenborn2013'?" in outcome.err
+    assert "unknown case 'rodenborn2012' (did you mean rodenborn2013?); allowed: bacteria" in outcome.err
 
 
 @pytest.mark.parametrize("name", sorted(set(shipped_robots()) - set(preset_names())))

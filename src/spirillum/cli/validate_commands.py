@@ -21,6 +21,9 @@ def validate(
         list[str] | None,
         typer.Argument(metavar="[NAME]...", autocompletion=complete_cases, help="Cases that ship; else all."),
     ] = None,
+    runs: Annotated[
+        bool, typer.Option("--runs", help="Run robots released in their tubes too; makes their tables first (an hour).")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for a report with figures.")
     ] = None,
@@ -34,7 +37,7 @@ def validate(
     from spirillum.results.validation import validate as answer
 
     with renderer.progress_bar(quiet=json) as progress:
-        found = answer(names or (), output=output, progress=progress)
+        found = answer(names or (), runs=runs, output=output, progress=progress)
     renderer.show(found.to_dict(), json=json)
     if found.outside:
         raise typer.Exit(1)

@@ -28,8 +28,8 @@ class CaseQuantity(Section):
     label: str
     """Name in words."""
     of: str
-    """`swimming.NAME` of `predict`; `tail.drag`, `tail.thrust` or `tail.torque` of the bare tail; `run.NAME` of a run
-    in the tube."""
+    """`swimming.NAME` of `predict`; `tail.drag`, `tail.thrust` or `tail.torque` of the bare tail; `run.NAME` of the
+    robot released in its tube."""
     unit: str = "1"
     """Unit of the published values."""
     si_unit: str = ""
@@ -59,6 +59,8 @@ class CasePoint(Section):
     set: dict[str, Any] = Field(default_factory=dict)
     """Fields of the robot; `unset` takes one out."""
     placement: dict[str, Any] = Field(default_factory=dict)
+    run: dict[str, Any] = Field(default_factory=dict)
+    """Start and length of a run of the released robot, which needs its table; else none is made."""
     over: str = ""
     """Label of the point by whose values this one's are divided."""
     minus: str = ""
@@ -79,6 +81,8 @@ class CaseAssumption(Section):
     """Fields of the robot and their value in each trial."""
     scale: dict[str, list[float]] = Field(default_factory=dict)
     """Fields of the robot and the factor on their nominal value in each trial."""
+    placement: dict[str, list[Any]] = Field(default_factory=dict)
+    """Fields of the placement and their value in each trial."""
     points: list[str] = Field(default_factory=list)
     """Labels of the points that it concerns; empty: all."""
 

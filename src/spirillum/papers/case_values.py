@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.fluid.resistance import resistance
+from spirillum.papers.caldag2019.released import released_motion
 from spirillum.papers.case import Case, CaseAssumption, CasePoint, CaseQuantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
@@ -37,6 +38,7 @@ class CaseTrial(NamedTuple):
     value: str
     set: Mapping[str, Any]
     scale: Mapping[str, float]
+    placement: Mapping[str, Any]
 
 
 def trials_of(case: Case, point: CasePoint) -> Iterator[CaseTrial]:
@@ -50,7 +52,8 @@ def _trials(assumption: CaseAssumption) -> Iterator[CaseTrial]:
     for number, value in enumerate(assumption.values):
         fields = {path: values[number] for path, values in assumption.set.items()}
         factors = {path: values[number] for path, values in assumption.scale.items()}
-        yield CaseTrial(assumption.name, value, fields, factors)
+        place = {name: values[number] for name, values in assumption.placement.items()}
+        yield CaseTrial(assumption.name, value, fields, factors, place)
 
 
 def values_at(
@@ -69,6 +72,8 @@ def values_at(
 
 def _own_values(case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None) -> dict[str, CaseValue]:
     robot, known = robot_of(case, point, trial), {}
+    if trial is not None:
+        point = point.model_copy(update={"placement": {**point.placement, **trial.placement}})
     quantities = {name: case.quantities[name] for name in names}
     for kind in dict.fromkeys(quantity.of.partition(".")[0] for quantity in quantities.values()):
         values = _KINDS[kind](robot, point.model or case.model, point, trial is None)
@@ -89,7 +94,7 @@ def robot_of(case: Case, point: CasePoint, trial: CaseTrial | None = None) -> Ro
 
 def _in_unit(found: CaseValue, quantity: CaseQuantity, robot: Robot) -> CaseValue:
     divisor = quantity.over * robot.fluid.viscosity**quantity.viscosity * robot.tail.amplitude**quantity.radius
-    return CaseValue(abs(found.value) / divisor / quantity.si_value, found.stated_error)
+    return CaseValue(found.value / divisor / quantity.si_value, found.stated_error)
 
 
 def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> dict[str, CaseValue]:  # noqa: FBT001
@@ -100,7 +105,7 @@ def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> d
         swum, error = found.swimming, found.error_estimate
     else:
         swum = swim(RobotBatch.of(robot, Placement.of(point.placement)), model)
-    values = {item.name: float(getattr(swum, item.name)[0]) for item in STEADY}
+    values = {item.name: abs(float(getattr(swum, item.name)[0])) for item in STEADY}
     stated = error if math.isfinite(error) else None
     return {name: CaseValue(value, stated if name in _OF_SPEED else None) for name, value in values.items()}
 
@@ -112,11 +117,17 @@ def _tail(robot: Robot, model: str, _point: CasePoint, _is_nominal: bool) -> dic
     """Entries of the bare tail along and about its axis, SI, with the model's errors on resolved tails."""
     matrix = resistance(robot, part="tail", model=model, about="tail-root").matrix
     errors = tail_error(RobotBatch.of(robot), CHECKED[model])._asdict()
-    return {name: CaseValue(float(matrix[place]), abs(errors[name]) / 100.0) for name, place in _ENTRIES.items()}
+    return {name: CaseValue(abs(float(matrix[place])), abs(errors[name]) / 100.0) for name, place in _ENTRIES.items()}
+
+
+def _run(robot: Robot, _model: str, point: CasePoint, _is_nominal: bool) -> dict[str, CaseValue]:  # noqa: FBT001
+    """Motion of the robot released in its tube, SI."""
+    return {name: CaseValue(value, None) for name, value in released_motion(robot, point.run).items()}
 
 
 _KINDS: Mapping[str, Callable[[Robot, str, CasePoint, bool], dict[str, CaseValue]]] = {
     "swimming": _swimming,
     "tail": _tail,
+    "run": _run,
 }
 """Kinds of quantities."""

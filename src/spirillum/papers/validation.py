@@ -58,6 +58,8 @@ class ValidationRow:
     stated_error: float | None
     """Relative error that the program states of its value; None where it states none."""
     effects: tuple[AssumptionEffect, ...]
+    computed: bool
+    """Whether ours was computed now; else it is the recorded value, of a run that needs a table."""
     recorded: float
     """The program's value when the case was written."""
     recorded_within: float
@@ -119,6 +121,7 @@ class ValidationRow:
             ],
             "recorded": {"low": si * (self.recorded - within), "high": si * (self.recorded + within)},
             "as_recorded": self.is_as_recorded,
+            "computed": self.computed,
         }
 
 
@@ -236,10 +239,10 @@ def case_lines(result: CaseResult) -> Iterable[str]:
         yield f"  statements: {', '.join(f'{count} {verdict}' for verdict, count in result.counted().items())}"
 
 
-def compute_case(name: str, progress: Progress | None = None) -> CaseResult:
-    """Compute all rows of a case and judge its statements."""
+def compute_case(name: str, progress: Progress | None = None, *, runs: bool = False) -> CaseResult:
+    """Compute all rows of a case and judge its statements; rows of runs in the tube only with `runs`."""
     case, recorded = load_case(name), recorded_values(name)
-    values = _values(name, case, progress)
+    values = _values(name, case, progress, runs=runs)
     rows = tuple(
         _row(name, case, point, quantity, values, recorded[point.label][quantity]) for point, quantity in case.rows()
     )
@@ -255,10 +258,12 @@ _Values = dict[tuple[str, str, str], dict[str, CaseValue]]
 """Quantities by point, assumption and its value; both empty for the case as it is."""
 
 
-def _values(name: str, case: Case, progress: Progress | None) -> _Values:
+def _values(name: str, case: Case, progress: Progress | None, *, runs: bool) -> _Values:
     """The quantities of all points, under all assumptions."""
     wanted: dict[str, list[str]] = {}
     for point, quantity in case.rows():
+        if point.run and not runs:
+            continue
         wanted.setdefault(point.label, []).append(quantity)
     work = [(case.point(label), trial) for label in wanted for trial in (None, *trials_of(case, case.point(label)))]
     values: _Values = {}
@@ -283,10 +288,11 @@ def _row(
     values: _Values,
     recorded: float,
 ) -> ValidationRow:
-    ours = values[point.label, "", ""][quantity]
+    computed = (point.label, "", "") in values
+    ours = values[point.label, "", ""][quantity] if computed else CaseValue(recorded, None)
     effects = tuple(
         AssumptionEffect(trial.assumption, trial.value, values[point.label, *_key(trial)][quantity].value)
-        for trial in trials_of(case, point)
+        for trial in (trials_of(case, point) if computed else ())
     )
     return ValidationRow(
         case=name,
@@ -300,6 +306,7 @@ def _row(
         ours=ours.value,
         stated_error=ours.stated_error,
         effects=effects,
+        computed=computed,
         recorded=recorded,
         recorded_within=case.recorded_within,
     )

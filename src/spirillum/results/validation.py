@@ -20,6 +20,7 @@ _RESULTS = ("validation.json", "figures", "report.html")
 def validate(
     names: Sequence[str] = (),
     *,
+    runs: bool = False,
     output: str | Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Validation:
@@ -27,6 +28,8 @@ def validate(
 
     Args:
         names: cases that ship, such as `rodenborn2013`; none: all of them, in some minutes.
+        runs: also run robots that are released in their tubes, after making the tables that they need (an hour); else
+            their rows are the recorded ones, and say so.
         output: folder for `validation.json`, `figures/` and `report.html`; None: nothing is written.
         progress: called with the name of a case, how much of it is done, and of how much.
 
@@ -42,11 +45,11 @@ def validate(
     for name in chosen:
         load_case(name)
     if output is None:
-        return Validation(tuple(compute_case(name, progress) for name in chosen))
+        return Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen))
     mark = {"schema": "spirillum.validation-folder/1"}
     claim = {"mark": "validated.json", "content": mark, "what": "validation", "results": _RESULTS}
     with results_folder(output, claim=claim) as folder:
-        found = Validation(tuple(compute_case(name, progress) for name in chosen), str(output))
+        found = Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen), str(output))
         _write_report(found, folder)
     return found
 
@@ -74,13 +77,14 @@ def table_of(case: CaseResult) -> list[tuple[str, ...]]:
         spread = "" if row.uncertainty is None else f" ± {row.uncertainty:.3g}"
         published = "a trend" if row.published is None else f"{row.published:.4g}{spread}{unit}"
         low, high = row.ends
+        ours = f"{row.ours:.4g}{unit}{'' if row.computed else ' (recorded)'}"
         cells = (
             "" if row.difference is None else _percent(row.difference),
             "" if row.stated_error is None else f"{100.0 * row.stated_error:.1f} %",
             f"{low:.3g} to {high:.3g}" if row.effects else "",
             row.covered_by or "",
         )
-        found.append((row.point, row.quantity.label, published, f"{row.ours:.4g}{unit}", *cells))
+        found.append((row.point, row.quantity.label, published, ours, *cells))
     return found
 
 
