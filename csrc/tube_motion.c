@@ -129,24 +129,29 @@ static double station_square(const Touch *t, const Station *station) {
     return d[0] * d[0] + d[1] * d[1];
 }
 
-/* Look for contacts of the wire where its stations are farthest from the axis. */
+/* Look for contacts of the wires, one after the other, where their stations are farthest from the axis. */
 static void touch_wire(Touch *t) {
     const TubeRobot *robot = t->robot;
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
     if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
     double before = 0.0, here = station_square(t, robot->stations);
+    bool first = true;
     for (int64_t k = 0; k <= last; k++) {
-        const double after = k < last ? station_square(t, robot->stations + k + 1) : 0.0;
-        if (here >= before && here > after && t->balance->count < MOST_CONTACTS) {
-            const Station *at = robot->stations + k;
-            const double bracket[3] = {at[k > 0 ? -1 : 0].xi, at->xi, at[k < last ? 1 : 0].xi};
-            const Nearest nearest = wire_nearest(robot->wire, t->y, t->rotation, tube->radius, bracket);
+        const Station *at = robot->stations + k;
+        const double next = k < last ? station_square(t, at + 1) : 0.0;
+        const bool tip = k == last || at[1].turn != at->turn;
+        if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
+            const double bracket[3] = {at[first ? 0 : -1].xi, at->xi, at[tip ? 0 : 1].xi};
+            State turned = *t->y;
+            turned.phase += at->turn;
+            const Nearest nearest = wire_nearest(robot->wire, &turned, t->rotation, tube->radius, bracket);
             t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
             add_contact(t, &nearest, 1.0);
         }
-        before = here;
-        here = after;
+        first = tip;
+        before = tip ? 0.0 : here;
+        here = next;
     }
 }
 

@@ -467,32 +467,6 @@ def _option(parameter: Any) -> Option:
     return Option(names, metavar, default, parameter.help or "")
 
 
-def file_listing(path: str) -> str:
-    """A file of the project as it is."""
-    kind = {".toml": "toml", ".py": "python"}[Path(path).suffix]
-    return f"```{kind}\n{(ROOT / path).read_text(encoding='utf-8').strip()}\n```\n"
-
-
-def function_listing(words: str) -> str:
-    """A function of a script: `PATH NAME`."""
-    import ast
-
-    path, name = words.split()
-    text = (ROOT / path).read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    found = next(item for item in tree.body if isinstance(item, ast.FunctionDef) and item.name == name)
-    return f"```python\n{ast.get_source_segment(text, found)}\n```\n"
-
-
-def part_listing(words: str) -> str:
-    """The lines of a script from one that starts with a word to the next that starts with another: `PATH FROM TO`."""
-    path, first, last = words.split()
-    lines = (ROOT / path).read_text(encoding="utf-8").splitlines()
-    start = next(n for n, line in enumerate(lines) if line.startswith(first))
-    end = next(n for n, line in enumerate(lines) if n >= start and line.startswith(last))
-    return "```toml\n" + "\n".join(lines[start : end + 1]) + "\n```\n"
-
-
 def notes(severity: str) -> str:
     """The codes of notes of one severity, each with what it means and an anchor of its own."""
     from spirillum.notes import KINDS
@@ -524,9 +498,6 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "reference-list": reference_list,
     "command-options": command_options,
     "shared-options": shared_options,
-    "file": file_listing,
-    "function": function_listing,
-    "part": part_listing,
     "notes": notes,
 }
 

@@ -43,6 +43,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
@@ -121,6 +122,9 @@ def fit_model(
         free_names(free, find_swimmer_model(model, AUTO).name)
     if prepare and not is_fitted_in_tube(model, free, method):
         raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
+    if method == "posterior":
+        for library in ("emcee", "arviz_base", "arviz_stats"):
+            import_optional(library, "method 'posterior'", "posterior")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")

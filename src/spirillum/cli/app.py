@@ -119,6 +119,10 @@ def compare_models(
     request: Request,
     *,
     output: Picture = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw why models differ, effect by effect: .png, .pdf or .svg."),
+    ] = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     all_of_it: All = False,
     json: Json = False,
@@ -130,9 +134,11 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
+    draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.effects:effects_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
-    renderer.show(renderer.with_files(result.to_dict(), file=draw(result)), json=json, all_of_it=all_of_it)
+    files = {"file": draw(result), "plot": draw_effects(result)}
+    renderer.show(renderer.with_files(result.to_dict(), **files), json=json, all_of_it=all_of_it)
 
 
 @from_function(
@@ -193,6 +199,23 @@ def study(
             show_default=False,
         ),
     ] = None,
+    trial: Annotated[
+        bool | None,
+        typer.Option(
+            "--trial/--no-trial",
+            help="A trial of each robot in its tube too, as predict has it (seconds a robot), or not; else as the "
+            "study says.",
+            show_default=False,
+        ),
+    ] = None,
+    interval: Annotated[
+        bool | None,
+        typer.Option(
+            "--interval/--no-interval",
+            help="Of each trial the 90 % interval too (half a minute a robot), or not; else as the study says.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute: tcp://HOST:8786.")
@@ -230,6 +253,8 @@ def study(
             band=band,
             predicted=predicted,
             settled=settled,
+            trial=trial,
+            interval=interval,
             workers=workers if cluster is None else cluster,
             store=store,
             calibration=calibration,

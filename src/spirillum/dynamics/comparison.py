@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.display import DisplayMixin
+from spirillum.dynamics.effects import Effect, effects_of
 from spirillum.dynamics.trial_request import TrialRequest
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
@@ -85,6 +86,16 @@ class ModelComparison(DisplayMixin):
         calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
         return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
 
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """What each effect does to the speed, from Lighthill's theory to the trial.
+
+        Empty without `sbt` and `slender`, or with calibration factors, which stand for several effects at once.
+        """
+        if any(answer.calibrated for answer in self.predictions.values()):
+            return ()
+        return effects_of(self.robot, self.predictions, self.friction)
+
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum compare-models --json`."""
         entries = {name: self._answered(name, answer) for name, answer in self.predictions.items()}
@@ -94,6 +105,7 @@ class ModelComparison(DisplayMixin):
             "friction": self.friction,
             "reference": self.reference,
             "models": [entries[name] for name in self.models],
+            "effects": [{"effect": one.name, "forward_velocity": quantity(one.speed, "m/s")} for one in self.effects],
         }
         return envelope("model-comparison", content, self.warnings)
 

@@ -61,7 +61,7 @@ class TubeRobot(FreeRobot):
     sites: Samples
     """Sites of body and coupling that can touch (n, 5), see `kernels.contacts`."""
     stations: Samples
-    """Stations along the wire (m, 4), see `kernels.contacts`."""
+    """Stations along the wires (m, 5), see `kernels.contacts`."""
     flow: Samples
     """Imposed mean flow (k, 2)."""
     names: tuple[str, ...]
@@ -126,6 +126,11 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")
+    if not robot.tail.form.is_helix:
+        raise InputError(
+            "motion in the tube finds contacts of tail and wall only on helices of one wavelength and amplitude; "
+            "allowed: such a tail, or a prediction at a given pose"
+        )
     heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(steady.batch)
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
@@ -199,4 +204,6 @@ def _stations(robot: Robot, wire: Samples) -> Samples:
     r = wire[contacts.AMPLITUDE] * (1.0 - np.exp(-taper * xi) if taper > 0 else np.ones_like(xi))
     x = wire[contacts.ROOT] - xi
     angle = wire[contacts.HAND_K] * x
-    return np.ascontiguousarray(np.stack([xi, x, r * np.cos(angle), r * np.sin(angle)], axis=1))
+    wires = [(angle + turn, turn) for turn in tail.form.turns]
+    rows = [np.stack([xi, x, r * np.cos(at), r * np.sin(at), np.full(xi.size, turn)], axis=1) for at, turn in wires]
+    return np.ascontiguousarray(np.concatenate(rows))

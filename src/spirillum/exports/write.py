@@ -27,6 +27,7 @@ from spirillum.exports.meshes import (
 )
 from spirillum.files import MARK, atomic_write_all, guard_inputs, output_folder, output_target
 from spirillum.notes import Note, notes_in_answer
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
@@ -51,6 +52,7 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
         pieces: at phase 0 of the tail.
         phase: phase of the tail, rad, to which the node of the rotor is turned.
     """
+    import_optional("trimesh", "a coloured scene")
     from trimesh import Scene, Trimesh
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial

@@ -32,3 +32,5 @@ LONGEST_PATH = 4096
 """A file's name with its folders, characters."""
 LONGEST_NAME = 255
 """A file or folder by itself, bytes: what the usual file systems hold."""
+MOST_POINTS = 2000
+"""Points of a tail's centre line or of a body's outline."""

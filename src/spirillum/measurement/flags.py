@@ -85,8 +85,8 @@ IMPORTED = "imported"
 """Name of the flag of a track from another program."""
 SYNTHETIC = "synthetic"
 """Word in the metadata of computed videos, and name of the flag."""
-_MANY_OUTLIERS = 0.02
-"""Share of outliers above which a flag is raised."""
+_MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
+"""Share and number of outliers above which a flag is raised: a good video may show one or two."""
 _FEWEST_FRAMES = 4
 """Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
@@ -168,10 +168,8 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
         if not rate.steady:
             sentence = f"the {words} changes along the video{_how(rate, name)}; given is its mean from end to end"
             flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
-        if rate.outliers > _MANY_OUTLIERS * (rate.frames + rate.outliers):
-            far = "1 frame lies far from its neighbours and was"
-            far = far if rate.outliers == 1 else f"{rate.outliers} frames lie far from their neighbours and were"
-            sentence = f"{far} left out of the {words}"
+        if rate.outliers > max(_FEW_OUTLIERS, _MANY_OUTLIERS * (rate.frames + rate.outliers)):
+            sentence = f"{rate.outliers} frames lie far from their neighbours and were left out of the {words}"
             flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
     stripes = stripes_of(track.setup, robot)
     turned = _range(track.body_angle)

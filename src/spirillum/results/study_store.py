@@ -56,7 +56,7 @@ def stored_study(
 ) -> xr.Dataset:
     """Compute what a store lacks of a study, and open it."""
     import_optional("zarr", "a store", "cluster")
-    option = next((name for name in ("band", "predicted", "settled") if getattr(loaded.study, name)), None)
+    option = next((name for name in ("band", "predicted", "settled", "trial") if getattr(loaded.study, name)), None)
     if option is not None:
         raise InputError(f"{option} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}

@@ -17,6 +17,7 @@ from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables
+from spirillum.robot.tail_form import TailForm
 
 
 class Column(NamedTuple):
@@ -137,6 +138,7 @@ class RobotBatch:
     shape: Shape
     front: End | None
     rear: End | None
+    form: TailForm
     options: ModelOptions
     drive: DriveKind | None
     joint: Literal["revolute", "fixed"]
@@ -174,6 +176,7 @@ class RobotBatch:
             shape=first.body.shape,
             front=first.body.front_end,
             rear=first.body.rear_end,
+            form=first.tail.form,
             options=first.model,
             drive=first.drive.kind if first.drive else None,
             joint=first.drive.joint if first.drive else "revolute",
@@ -226,6 +229,9 @@ class RobotBatch:
         unknown = [path for path in values if path not in known]
         if unknown:
             raise InputError(f"{unknown[0]} cannot vary in a batch; allowed: {', '.join(known)}")
+        derived = [path for path in values if self.form.curve and path in _OF_CURVE]
+        if derived:
+            raise InputError(f"{derived[0]} follows from tail.curve; allowed: fields that the curve leaves open")
         arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
@@ -269,8 +275,10 @@ class RobotBatch:
 
     @cached_property
     def arc_fraction(self) -> PerRobot:
-        """alpha, axial over arc length of the plain helix."""
-        return geometry.arc_fraction(self.wavelength, self.amplitude)
+        """alpha, axial over arc length of the helix without its root, or of the centre line."""
+        if self.form.is_helix:
+            return geometry.arc_fraction(self.wavelength, self.amplitude)
+        return self.tail_length / self.form.arc_length(self.amplitude, self.wavelength, self.tail_length)
 
     @cached_property
     def arc_length(self) -> PerRobot:
@@ -290,6 +298,8 @@ class RobotBatch:
         )
 
 
+_OF_CURVE = ("tail.wavelength", "tail.amplitude", "tail.length", "tail.taper")
+"""Fields that follow from a centre line through points."""
 _S = TypeVar("_S", RobotBatch, Electrics, CalibrationFactors)
 
 
@@ -363,6 +373,7 @@ def _shared(robot: RobotTables) -> tuple[object, ...]:
         robot.body.shape,
         robot.body.front_end,
         robot.body.rear_end,
+        robot.tail.form,
         robot.model.model_dump_json(exclude={"rft": {"axis_height"}}),
         drive and (drive.kind, drive.joint),
         robot.friction.reading,

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from spirillum.arrays import Values, Vectors
-from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
+from spirillum.robot.fields import NONE, AlsoReads, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
+from spirillum.robot.shape_input import read_along, read_tail
+from spirillum.robot.tail_form import PLAIN, Along, CurvePoints, TailForm
 
 
 def _read_taper(value: Any) -> float | None:
@@ -132,13 +134,41 @@ class Coupling(Section):
     """Axial clearance on both sides; its solid is `length - 2 clearance` long. Assumed: the paper does not say."""
 
 
-class Tail(Section):
-    """The rigid helical tail, a wire along eq. (10)."""
+_SIZE = {
+    "anyOf": [
+        {"type": "object", "properties": {"from": {"type": "string"}, "to": {"type": "string"}}},
+        {"type": "array"},
+    ]
+}
+_VARYING = AlsoReads(lambda _: _SIZE)
+"""A length from the root to the tip, or points (distance from the root, value)."""
 
-    wavelength: Length
-    """Wavelength lambda of the helix."""
-    amplitude: Length
-    """Amplitude B_o: radius of the helix's centreline."""
+_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+AlongOrNone = Annotated[
+    Along | None, BeforeValidator(read_along), WithJsonSchema({"anyOf": [_NUMBERS, {"const": "none"}]})
+]
+CurveOrNone = Annotated[CurvePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})]
+
+
+def _with_curve(schema: dict[str, Any]) -> None:
+    """A tail needs its sizes, or a centre line from which they follow."""
+    needed = schema.pop("required")
+    derived = ("wavelength", "amplitude", "length")
+    schema["required"] = [name for name in needed if name not in derived]
+    schema |= {"if": {"required": ["curve"]}, "else": {"required": list(derived)}}
+
+
+class Tail(Section):
+    """The rigid tail: wires along eq. (10), or along a centre line through points."""
+
+    model_config = ConfigDict(json_schema_extra=_with_curve)
+
+    starts: Annotated[int, Field(strict=True, ge=1, le=12)] = 1
+    """Number of identical wires, evenly spaced around the axis."""
+    wavelength: Annotated[Length, _VARYING]
+    """Wavelength lambda of the helix; `{ from = "20 mm", to = "30 mm" }` or a list of points where it varies."""
+    amplitude: Annotated[Length, _VARYING]
+    """Amplitude B_o: radius of the helix's centreline; `{ from = "1 mm", to = "3 mm" }` or points."""
     length: Length
     """Axial length L_t (Table I; the wire itself is longer)."""
     wire_diameter: Length
@@ -149,6 +179,25 @@ class Tail(Section):
     """Shape constant c of the amplitude's rise from the root in eq. (10); `none` (here None) for a plain helix."""
     density: Density | None = None
     """Density of the wire."""
+    amplitude_along: AlongOrNone = None
+    """Local over largest amplitude at shares of the length, written by an amplitude that varies."""
+    wavelength_along: AlongOrNone = None
+    """Local over mean wavelength at shares of the length, written by a wavelength that varies."""
+    curve: CurveOrNone = None
+    """A centre line in place of the helix: a CSV file beside this one, or points (x, y, z) in mm from the root on."""
+    curve_tolerance: LengthOrZero | None = None
+    """Root mean square distance by which smoothing may move the curve's points; unset: it passes through them."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, raw: Any) -> Any:
+        return read_tail(raw)
+
+    @property
+    def form(self) -> TailForm:
+        """What makes the tail of its sizes."""
+        along = self.amplitude_along or (), self.wavelength_along or ()
+        return TailForm(self.starts, *along, self.curve or (), self.curve_tolerance or 0.0)
 
 
 class Channel(Section):
@@ -238,15 +287,26 @@ def centreline(
     taper: Values,
     hand: Values,
     phase: Values,
+    form: TailForm = PLAIN,
 ) -> Centreline:
     """The wire of eq. (10): x = -x_r - xi, y = r cos(h k x + phi), z = r sin(h k x + phi).
 
-    All arguments broadcast; `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left).
+    All arguments broadcast; `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left). Where the wavelength
+    varies, k x is an integral from the root; on a centre line through points xi/L_t is its parameter, from 0 to 1.
     """
+    if form.curve:
+        return _through_points(xi / length, root, length, hand, phase, form)
     wavenumber = 2.0 * np.pi / wavelength
     x = -root - xi
     r, slope = amplitude_envelope(xi, amplitude, length, taper)
     angle = hand * wavenumber * x + phase
+    if form.amplitude:
+        factor, change = form.amplitude_at(xi / length)
+        r, slope = r * factor, slope * factor + r * change / length
+    if form.wavelength:
+        factor, turned = form.wavenumber_at(xi / length)
+        angle = -hand * wavenumber * (root + length * turned) + phase
+        wavenumber = wavenumber * factor
     cos, sin = np.cos(angle), np.sin(angle)
     turning = -hand * wavenumber * r  # r d(angle)/dxi
     stretch = np.sqrt(1.0 + slope**2 + turning**2)
@@ -255,6 +315,20 @@ def centreline(
         np.broadcast_arrays(-np.ones_like(x), slope * cos - turning * sin, slope * sin + turning * cos), axis=-1
     )
     return Centreline(position, direction / stretch[..., None], stretch)
+
+
+def _through_points(
+    share: Values, root: Values, length: Values, hand: Values, phase: Values, form: TailForm
+) -> Centreline:
+    """A centre line in the tail's frame, half a turn about y from the body's axes; mirrored for the other hand."""
+    point, rate = form.centre.at(share)
+    cos, sin, side = np.cos(phase), np.sin(phase), -hand * np.sign(form.centre.winding or 1.0)
+    y, z = point[..., 1], side * point[..., 2]
+    dy, dz = rate[..., 1], side * rate[..., 2]
+    speed = np.linalg.norm(rate, axis=-1)
+    position = np.stack(np.broadcast_arrays(-root - point[..., 0], y * cos - z * sin, y * sin + z * cos), axis=-1)
+    direction = np.stack(np.broadcast_arrays(-rate[..., 0], dy * cos - dz * sin, dy * sin + dz * cos), axis=-1)
+    return Centreline(position, direction / speed[..., None], speed / length)
 
 
 def coil_spacing(wavelength: Values, amplitude: Values) -> Values:

@@ -23,6 +23,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, Segment, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
+from spirillum.robot.tail_form import PLAIN, TailForm
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4
@@ -92,6 +93,7 @@ def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
         wire_diameter=robot.tail.wire_diameter,
         taper=float(batch.taper[0]),
         hand=robot.hand,
+        form=batch.form,
     )
     return found
 
@@ -134,8 +136,9 @@ def wire_solid(
     wire_diameter: float,
     taper: float,
     hand: float,
+    form: TailForm = PLAIN,
 ) -> HomogeneousSolid:
-    """A round wire along eq. (10) at phase 0, its ends cut square.
+    """Round wires along eq. (10) at phase 0, their ends cut square.
 
     Args:
         root: x_r, distance of the root behind the origin, m.
@@ -145,8 +148,10 @@ def wire_solid(
         wire_diameter: D_t, m.
         taper: c; infinite for a plain helix.
         hand: h, +1 (right) or -1 (left).
+        form: of the tail.
     """
-    panels = np.linspace(0.0, length, 1 + int(np.ceil(_PANELS_PER_TURN * length / wavelength)))
+    pieces = max(_PANELS_PER_TURN * length / wavelength, len(form.curve), 8 * len(form.amplitude + form.wavelength))
+    panels = np.linspace(0.0, length, 1 + int(np.ceil(pieces)))
     if np.isfinite(taper):
         rise = np.arange(0.0, min(_ROOT_LENGTHS, taper)) * length / taper
         panels = np.unique(np.concatenate([panels, rise]))
@@ -155,8 +160,8 @@ def wire_solid(
     numbers = {"wavelength": wavelength, "amplitude": amplitude, "length": length, "taper": taper, "hand": hand}
     columns = {name: np.full(1, value) for name, value in numbers.items()}
     # Relative to the root, so that a short tail far behind the origin loses no digits.
-    phase = np.full(1, -hand * 2.0 * np.pi * root / wavelength)
-    line = centreline(xi, root=np.zeros(1), phase=phase, **columns)
+    phase = np.full(1, 0.0 if form.curve else -hand * 2.0 * np.pi * root / wavelength)
+    line = centreline(xi, root=np.zeros(1), phase=phase, form=form, **columns)
     p, t = line.position, line.tangent
     ds = (half[:, None] * _WEIGHTS).ravel() * line.stretch[1:-1]
     square = 0.25 * wire_diameter**2  # a^2
@@ -168,7 +173,18 @@ def wire_solid(
     second = (inner * ds[:, None]).T @ inner
     second += 0.25 * square * (arc * np.eye(3) + (along * ds[:, None]).T @ along - (ends[1] - ends[0]))
     inertia = np.pi * square * (np.trace(second) * np.eye(3) - second)
-    return HomogeneousSolid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+    one = HomogeneousSolid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+    return _around(one, form.rotations) if form.starts > 1 else one
+
+
+def _around(one: HomogeneousSolid, copies: Tensors) -> HomogeneousSolid:
+    """Copies of a solid, turned about the x axis."""
+    centroids = copies @ one.centroid
+    centre = np.mean(centroids, axis=0)
+    arms = centroids - centre
+    shifted = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    inertia = np.sum(copies @ one.inertia @ np.swapaxes(copies, -1, -2), axis=0) + one.volume * shifted
+    return HomogeneousSolid(one.volume * len(copies), centre, inertia)
 
 
 def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:

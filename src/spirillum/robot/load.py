@@ -18,6 +18,7 @@ from spirillum.notes import Note
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Derived, Robot
+from spirillum.robot.shape_input import DISPLACED, with_points_of_files
 from spirillum.units import show
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -91,9 +92,12 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
     table, source = raw_table(robot)
-    table, changes = _extended(table, source, _folder_of(robot))
+    folder = _folder_of(robot)
+    table, changes = _extended(with_points_of_files(table, folder), source, folder)
     for path, value in overrides.items():
+        _displace(table, _touched(_nested(path, value)))
         _put(table, path.split("."), value, path)
+    table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
     return _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
 
@@ -219,7 +223,8 @@ def _extended(
             f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
-    below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, _resolved(path, source)))
+    under = with_points_of_files(read_toml(path, _WHAT), path.parent)
+    below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
     return _laid_over(below, base, table), [*layers, changed]
 
 
@@ -228,7 +233,17 @@ def _laid_over(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[
     changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
     if changed:
         below = {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
+    _displace(below, changed)
     return _merged(below, table)
+
+
+def _displace(table: dict[str, Any], changed: set[str]) -> None:
+    """Take out what fields of the layer above replace."""
+    for field in changed:
+        inner = table.get(field.partition(".")[0])
+        for name in DISPLACED.get(field, ()):
+            if isinstance(inner, dict):
+                inner.pop(name, None)
 
 
 def _resolved(path: Path, source: str) -> Path:

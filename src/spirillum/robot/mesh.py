@@ -218,11 +218,20 @@ def _rotor(
     found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
     wire = tail_line(robot, fineness=fineness)
     if np.linalg.norm(wire.points[0] - root) > 1e-9 * radius:
-        found.append(("arm", rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)))
+        bar = rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)
+        found += [("arm", copy) for copy in _around(bar, robot)]
     turns = robot.tail.length / robot.tail.wavelength
-    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", len(wire.points), sides)
-    found.append(("tail", swept(wire.points, wire.tangents, radius, sides)))
+    rings = robot.tail.starts * len(wire.points)
+    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", rings, sides)
+    found += [("tail", copy) for copy in _around(swept(wire.points, wire.tangents, radius, sides), robot)]
     return found
+
+
+def _around(one: Surface, robot: Robot) -> list[Surface]:
+    """Copies of a surface, one for each start of the tail."""
+    if robot.tail.starts == 1:
+        return [one]
+    return [one._replace(vertices=one.vertices @ turn.T) for turn in robot.tail.form.rotations]
 
 
 def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
@@ -233,7 +242,9 @@ def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
     """
     tail = robot.tail
     wavenumber = 2.0 * np.pi / tail.wavelength
-    xi = np.linspace(0.0, tail.length, 2 + int(np.ceil(_PER_TURN * tail.length / tail.wavelength)))
+    form = tail.form
+    pieces = max(_PER_TURN * tail.length / tail.wavelength, 12 * len(form.curve))
+    xi = np.linspace(0.0, tail.length, 2 + int(np.ceil(pieces)))
     if tail.taper is not None:
         rise = np.arange(0.0, min(40.0, tail.taper), 0.05) * tail.length / tail.taper
         xi = np.unique(np.concatenate([xi, rise]))
@@ -266,4 +277,4 @@ def _along(robot: Robot, xi: Samples) -> Centreline:
         "hand": robot.hand,
         "phase": 0.0,
     }
-    return centreline(xi, **{name: np.full(1, value) for name, value in numbers.items()})
+    return centreline(xi, form=tail.form, **{name: np.full(1, value) for name, value in numbers.items()})

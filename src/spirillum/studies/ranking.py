@@ -51,15 +51,21 @@ class QuantityRanking(NamedTuple):
 
 LET_GO = "forward_velocity_settled"
 """The speed in steady motion, of robots that were let go."""
+HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
+"""The speed by `tube` where no model of the study computes walls, and that of a trial."""
+_BESIDE = (HELD, TRIAL, LET_GO)
+"""Speeds that stand beside that of a model, where the study has them."""
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
-    LET_GO: QuantityRanking("settled", "fastest once settled", 1.0),
+    HELD: QuantityRanking("tube", "fastest held by tube", 1.0),
+    TRIAL: QuantityRanking("trial", "fastest in a trial", 1.0),
+    LET_GO: QuantityRanking("steady", "fastest once settled", 1.0),
     "hydrodynamic_efficiency": QuantityRanking("efficiency", "most efficient", 1.0),
     "motor_current": QuantityRanking("current", "least current", -1.0),
     "shaft_power": QuantityRanking("power", "least power", -1.0),
 }
 """Quantities that rank robots, in the order in which they are shown."""
-SETTLED_BASIS = "settled: by model tube, let go, in steady motion; all else: by the model above, not let go"
+SETTLED_BASIS = "steady: by model tube, let go, in steady motion; all else: by the model above, not let go"
 """What the speed of robots that were let go rests on, and the other quantities do not."""
 ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
@@ -67,7 +73,7 @@ ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % 
 
 def unit_of_ranked(name: str) -> str:
     """SI unit of a quantity that ranks robots."""
-    return unit_of("forward_velocity" if name == LET_GO else name)
+    return unit_of("forward_velocity" if name in _BESIDE else name)
 
 
 class RankedRobot(NamedTuple):
@@ -198,7 +204,7 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
     chosen, indexes = ("model", "friction"), dataset.indexes
     named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
     over = {*chosen, *robot_dims(dataset)}
-    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED if name != LET_GO)
+    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED if name not in _BESIDE)
 
 
 def robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -217,7 +223,9 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     chosen = dataset.sel(model=model, friction=reading)
     names = list(_names(dataset))
     known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
-    if LET_GO in chosen and bool(np.isfinite(chosen[LET_GO].values).any()):
+    beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
+    known[1:1] = [name for name in beside if name != LET_GO]
+    if LET_GO in beside:
         known.insert(0, LET_GO)
     values = {name: _flat(chosen, name, names) for name in known}
     values[known[-1]] = np.abs(values[known[-1]])  # a motor that turns the other way draws no less
@@ -231,7 +239,8 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
         )
         for index in order
     }
-    best = tuple(_best(chosen, name, values[name], ranked) for name in known if np.isfinite(values[name][order]).any())
+    judged = sorted(known, key=(HELD, TRIAL).__contains__)  # the columns beside the model's own last
+    best = tuple(_best(chosen, name, values[name], ranked) for name in judged if np.isfinite(values[name][order]).any())
     left_out = walled and not SWIMMER_MODELS[model].placed
     return StudyRanking(model, reading, left_out, kind if ranked else "", tuple(ranked.values()), best)
 

@@ -88,8 +88,8 @@ class Contact(Section):
     """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
 
 
-_READ_BY = {"laid_down": "predicted", "contact": "settled"}
-"""Tables of a study and the switch without which nothing reads them."""
+_READ_BY = {"laid_down": ("predicted",), "contact": ("settled", "trial")}
+"""Tables of a study and the switches without which nothing reads them."""
 _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 
 
@@ -126,8 +126,12 @@ class Study(Section):
     """Between what they are laid down."""
     settled: Annotated[bool, Field(strict=True)] = False
     """Let the robots go in their tubes, and follow each of them to its steady motion too: some seconds a robot."""
+    trial: Annotated[bool, Field(strict=True)] = False
+    """Make a trial of each robot in its tube too, as `spirillum predict` has it: some seconds a robot."""
+    interval: Annotated[bool, Field(strict=True)] = False
+    """Of each trial the 90 % interval over what nobody states, too: half a minute a robot; a rerun resumes."""
     contact: Contact = Contact()
-    """What these robots rest on."""
+    """What settled robots and those in trials rest on."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -164,10 +168,13 @@ class Study(Section):
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         problems += [
-            f"{table} without {switch}, which reads it; allowed: {switch} = true or false beside it, or no [{table}]"
-            for table, switch in _READ_BY.items()
-            if table in self.model_fields_set and switch not in self.model_fields_set
+            f"{table} without {' or '.join(by)}, which reads it; allowed: {by[0]} = true or false beside it, or no "
+            f"[{table}]"
+            for table, by in _READ_BY.items()
+            if table in self.model_fields_set and not self.model_fields_set.intersection(by)
         ]
+        if self.interval and not self.trial:
+            problems.append("interval without trial, of which it is; allowed: trial = true beside it")
         problems += self._problems_of_the_band()
         varied = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
         if self.vary and varied > _MOST_ROBOTS:

@@ -72,6 +72,9 @@ REASONS = (
     "gap-too-thin",
     "beyond-stokes",
     "other",
+    "several-starts",
+    "no-plain-helix",
+    "no-body",
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 

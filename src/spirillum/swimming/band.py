@@ -27,7 +27,6 @@ from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
@@ -140,13 +139,10 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: flo
 
     The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
     """
-    xi = g.tail_length * np.linspace(0.0, 1.0, _SWEPT)
-    reach, _ = amplitude_envelope(xi, *(np.full(1, value) for value in (g.amplitude, g.tail_length, g.taper)))
-    behind = -0.5 * g.body_length - g.coupling_length - xi
     wire = 0.5 * g.wire_diameter
     found = contact_pitch(
         g.body,
-        np.stack([behind, reach, np.zeros(_SWEPT)], axis=1),
+        g.swept(_SWEPT),
         wire,
         radius,
         gap,

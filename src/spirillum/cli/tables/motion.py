@@ -101,7 +101,7 @@ def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
             yield Detail(_own_error(item))
         else:
             yield f"no answer by {item['model']}: {item['reason']}"
-    yield from files_of(answer, file="picture")
+    yield from files_of(answer, file="picture", plot="why models differ")
 
 
 def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
