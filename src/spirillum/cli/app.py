@@ -42,6 +42,7 @@ from spirillum.cli.shared_options import (
 )
 from spirillum.cli.show_commands import film, show
 from spirillum.cli.track_commands import track
+from spirillum.cli.validate_commands import validate
 from spirillum.cli.virtual_commands import render, virtual_experiment
 
 _ROWS = 10
@@ -314,7 +315,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),
     "Design": (design,),
-    "Files": (export, schema, citation, report),
+    "Files": (export, schema, citation, validate, report),
 }
 """The commands by what one wants to do, with their panels of the help."""
 

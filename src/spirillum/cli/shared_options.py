@@ -25,9 +25,10 @@ def starting(words: Iterable[str], incomplete: str) -> list[str]:
 
 
 def complete_presets(incomplete: str) -> list[str]:
-    """Names of presets."""
-    folder = Path(__file__).parent.parent / "robot" / "presets"
-    return starting(sorted(path.stem for path in folder.glob("*.toml")), incomplete)
+    """Names of the robots that come with the package."""
+    package = Path(__file__).parent.parent
+    presets = sorted(path.stem for path in package.glob("robot/presets/*.toml"))
+    return starting([*presets, *sorted(path.stem for path in package.glob("papers/*/robots/*.toml"))], incomplete)
 
 
 def complete_robots(incomplete: str) -> list[str]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from copy import deepcopy
 from functools import cache, lru_cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -50,14 +51,25 @@ def is_preset(robot: Robot) -> bool:
 
 @lru_cache(maxsize=1)
 def preset_names() -> tuple[str, ...]:
-    """Names of the robots that come with the package."""
-    folder = files("spirillum.robot") / "presets"
-    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+    """Names of the presets."""
+    return tuple(sorted(_robots_in(files("spirillum.robot") / "presets")))
+
+
+@lru_cache(maxsize=1)
+def shipped_robots() -> Mapping[str, Traversable]:
+    """Robot files that come with the package, by name: the presets and the robots of `papers/NAME/robots`."""
+    folders = [paper / "robots" for paper in (files("spirillum") / "papers").iterdir() if (paper / "robots").is_dir()]
+    found = [_robots_in(folder) for folder in (files("spirillum.robot") / "presets", *folders)]
+    return {name: robots[name] for robots in found for name in sorted(robots)}
+
+
+def _robots_in(folder: Traversable) -> dict[str, Traversable]:
+    return {item.name.removesuffix(".toml"): item for item in folder.iterdir() if item.name.endswith(".toml")}
 
 
 def preset_text(name: str) -> str:
-    """Unmodified text of the preset's robot file."""
-    return (files("spirillum.robot") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    """Unmodified text of a robot file that comes with the package."""
+    return shipped_robots()[name].read_text(encoding="utf-8")
 
 
 def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> Robot:
@@ -97,7 +109,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
             return deepcopy(dict(robot)), "the robot"
         except RecursionError as error:
             raise InputError(f"the robot's tables are nested without end; allowed: {_WHAT}") from error
-    if isinstance(robot, str) and robot in preset_names():
+    if isinstance(robot, str) and robot in shipped_robots():
         return deepcopy(_preset_table(robot)), f"preset {robot}"
     try:
         path = Path(robot)
@@ -107,7 +119,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         raise InputError(f"robot = ''; allowed: {_WHAT}")
     if _looks_like_a_name(robot) and not path.exists():
         presets = ", ".join(preset_names())
-        hint = did_you_mean(str(robot), preset_names())
+        hint = did_you_mean(str(robot), shipped_robots())
         raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
     return read_toml(path, _WHAT), str(path)
 
@@ -120,9 +132,9 @@ def _preset_table(preset: str) -> dict[str, Any]:
 
 def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) -> None:
     """Write a robot file to edit: a preset's own text, whole."""
-    if preset not in preset_names():
+    if preset not in shipped_robots():
         raise InputError(
-            f"preset {preset!r}{did_you_mean(preset, preset_names())}; allowed: {', '.join(preset_names())}"
+            f"preset {preset!r}{did_you_mean(preset, shipped_robots())}; allowed: {', '.join(shipped_robots())}"
         )
     path = Path(path)
     name = re.sub(r"[^\w-]+", "-", path.stem)[:100] or "robot"
@@ -197,8 +209,8 @@ def _extended(
     if base is None:
         return table, []
     own = isinstance(base, str) and base.endswith(".toml")
-    if not own and (not isinstance(base, str) or base not in preset_names()):
-        hint = did_you_mean(str(base), preset_names())
+    if not own and (not isinstance(base, str) or base not in shipped_robots()):
+        hint = did_you_mean(str(base), shipped_robots())
         allowed = f"{', '.join(preset_names())}, or a robot file (.toml) beside this one"
         raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {allowed}")
     changed = _touched(table)

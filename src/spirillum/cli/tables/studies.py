@@ -225,3 +225,27 @@ def _front(front: Mapping[str, Answer]) -> Table:
         cells = zip(row, front, strict=True)
         rows.add_row(*(in_unit(value, front[name]["unit"], units[name]) for value, name in cells))
     return rows
+
+
+def validation(answer: Answer) -> Blocks:
+    """A line for each case, then a row for each quantity of `validate`: published, ours, difference, error, covered."""
+    left = [row for row in answer["rows"] if not row["as_recorded"]]
+    count = sum(row["covered"] is True for row in answer["rows"])
+    published = sum(row["published"] is not None for row in answer["rows"])
+    cases = counted(len(answer["cases"]), "case")
+    yield f"{cases}, nothing fitted: {count} of {published} published numbers covered by stated errors and assumptions"
+    for row in left:
+        ends = " to ".join(f"{row['recorded'][end]:.4g}" for end in ("low", "high"))
+        where = f"{row['case']}, {row['point']}, {row['quantity']}"
+        yield f"left its recorded range: {where}: {row['ours']:.4g}, not {ends}"
+    table = grid("", "case", "quantity", "ours/published", "sd", "rows", "covered")
+    for case in answer["cases"]:
+        for one in case["ratios"]:
+            cells = f"{one['mean']:.2f}", f"{one['deviation']:.2f}" if one["count"] > 1 else "", str(one["count"])
+            table.add_row(case["case"], escape(one["quantity"]), *cells, str(one["covered"]))
+        for verdict in dict.fromkeys(claim["verdict"] for claim in case["statements"]):
+            number = sum(claim["verdict"] == verdict for claim in case["statements"])
+            table.add_row(case["case"], f"statements: {verdict}", "", "", str(number), "")
+    yield table
+    yield from files_of(answer, folder="report")
+    yield from (Detail(f"{case['case']}: {' '.join(case['explanation'].split())}") for case in answer["cases"])
