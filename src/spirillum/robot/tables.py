@@ -35,7 +35,7 @@ from spirillum.robot.fields import (
     Voltage,
     quantity_schema,
 )
-from spirillum.robot.geometry import BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.units import KINDS, show
 
