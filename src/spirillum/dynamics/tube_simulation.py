@@ -337,7 +337,9 @@ def held_against_check(
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
     held = range_of(table)
-    doubtful = (np.abs(yaw) > checked) | (pitch > held.up.min()) | (-pitch > held.down.min())
+    doubtful = (
+        (np.abs(yaw) > checked) | (pitch > held.up.min(initial=np.inf)) | (-pitch > held.down.min(initial=np.inf))
+    )
     outside = np.zeros(pitch.size, dtype=bool)
     for row in np.flatnonzero(doubtful):
         outside[row] = resistance_at(table, offset[row], pitch[row], yaw[row], 0.0, np.empty((MOTIONS, MOTIONS)))

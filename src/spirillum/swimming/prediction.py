@@ -348,7 +348,7 @@ def free_in_tube(fitted_by: str) -> str:
     """What a free motion in the tube rests on."""
     computed = f"walls, weight and contact are computed, {what_is_fitted(fitted_by)}"
     where = " where it has none" if fitted_by else ""
-    return f"{computed}; roughness and dry friction are assumed{where}"
+    return f"{computed}; roughness and dry friction are assumed{where}; contact is not validated against an experiment"
 
 
 def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
