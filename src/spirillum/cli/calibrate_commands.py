@@ -15,6 +15,7 @@ from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
     Settings,
+    complete_answers,
     complete_auto_models,
     complete_models,
     complete_robots,
@@ -22,11 +23,20 @@ from spirillum.cli.shared_options import (
 )
 from spirillum.errors import InputError
 from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.swimming.released_motion import HELD
 
 if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
     from spirillum.calibration.suggest import Suggestion
 
+_FittedAs = Annotated[
+    str,
+    typer.Option(
+        "--as",
+        autocompletion=complete_answers,
+        help="What model tube is fitted as: held at a pose, or a trial, released in its tube as predict has it.",
+    ),
+]
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str],
@@ -62,6 +72,7 @@ def calibrate(
         str,
         typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
     ] = "posterior",
+    fitted_as: _FittedAs = HELD,
     friction: Annotated[
         str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
     ] = "rotor",
@@ -116,6 +127,7 @@ def calibrate(
             assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(seed=seed, doublings=doublings),
             prepare=prepare,
+            answer=fitted_as,
             figures=not no_figures,
             progress=progress,
         )
@@ -167,6 +179,7 @@ def rank_models(
         bool,
         typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
     ] = False,
+    fitted_as: _FittedAs = HELD,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
@@ -184,7 +197,7 @@ def rank_models(
     from spirillum.robot.load import PAPER_ROBOTS
 
     fields = set_fields(overrides_from(settings))
-    for name, fitted in free_by_model(model, free).items():
+    for name, fitted in free_by_model(model, free, fitted_as).items():
         check_not_set(fields, fitted, name)
     names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
@@ -195,6 +208,7 @@ def rank_models(
             free=free,
             sampling=Sampling(seed=seed),
             prepare=prepare,
+            answer=fitted_as,
             progress=progress,
         )
     renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)
