@@ -23,7 +23,6 @@ from spirillum.cli.shared_options import (
 )
 from spirillum.errors import InputError
 from spirillum.fluid.tube.progress_messages import TABLE_TAKES
-from spirillum.swimming.released_motion import HELD
 
 if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
@@ -72,7 +71,7 @@ def calibrate(
         str,
         typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
     ] = "posterior",
-    fitted_as: _FittedAs = HELD,
+    fitted_as: _FittedAs = "held",
     friction: Annotated[
         str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
     ] = "rotor",
@@ -179,7 +178,7 @@ def rank_models(
         bool,
         typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
     ] = False,
-    fitted_as: _FittedAs = HELD,
+    fitted_as: _FittedAs = "held",
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
