@@ -15,6 +15,7 @@ from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
     Settings,
+    complete_answers,
     complete_auto_models,
     complete_models,
     complete_robots,
@@ -27,6 +28,14 @@ if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
     from spirillum.calibration.suggest import Suggestion
 
+_FittedAs = Annotated[
+    str,
+    typer.Option(
+        "--as",
+        autocompletion=complete_answers,
+        help="What model tube is fitted as: held at a pose, or a trial, released in its tube as predict has it.",
+    ),
+]
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str],
@@ -62,6 +71,7 @@ def calibrate(
         str,
         typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
     ] = "posterior",
+    fitted_as: _FittedAs = "held",
     friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
     assume_uncertainty: Annotated[
         list[str] | None,
@@ -114,6 +124,7 @@ def calibrate(
             assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(seed=seed, doublings=doublings),
             prepare=prepare,
+            answer=fitted_as,
             figures=not no_figures,
             progress=progress,
         )
@@ -165,6 +176,7 @@ def rank_models(
         bool,
         typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
     ] = False,
+    fitted_as: _FittedAs = "held",
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
@@ -182,7 +194,7 @@ def rank_models(
     from spirillum.robot.load import PAPER_ROBOTS
 
     fields = set_fields(overrides_from(settings))
-    for name, fitted in free_by_model(model, free).items():
+    for name, fitted in free_by_model(model, free, fitted_as).items():
         check_not_set(fields, fitted, name)
     names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
@@ -193,6 +205,7 @@ def rank_models(
             free=free,
             sampling=Sampling(seed=seed),
             prepare=prepare,
+            answer=fitted_as,
             progress=progress,
         )
     renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)

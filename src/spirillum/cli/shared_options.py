@@ -101,13 +101,13 @@ def _complete_friction(incomplete: str) -> list[str]:
     return starting(("body", "none", "paper", "rotor"), incomplete)
 
 
-def _complete_answers(incomplete: str) -> list[str]:
+def complete_answers(incomplete: str) -> list[str]:
+    """What a robot in its tube may be fitted as."""
     return starting(("held", "trial"), incomplete)
 
 
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "accuracy": _complete_accuracies,
-    "answer": _complete_answers,
     "ends": _complete_ends,
     "friction": _complete_friction,
     "model": complete_auto_models,
@@ -119,7 +119,6 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
 }
 """Completions of the shell, by argument or field of a table."""
 NAMES = {
-    "answer": "--as",
     "calibrated": "--no-calibration",
     "degradation.glare_moves": "--glare-fixed",
     "field.pitch": "--field-pitch",

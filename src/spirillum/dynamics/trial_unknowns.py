@@ -113,11 +113,21 @@ def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> 
     return tuple(one for one in UNKNOWNS if one.name in free)
 
 
-def samples_of(robot: Robot, weight: float, unknowns: Sequence[TrialUnknown]) -> list[TrialSample]:
-    """Return the runs over the unknowns of a robot with that weight in the fluid, N."""
-    values = {one.name: one.at(column) for one, column in zip(unknowns, _shares(unknowns).T, strict=True)}
+def samples_of(
+    robot: Robot, weight: float, unknowns: Sequence[TrialUnknown], shares: Samples | None = None
+) -> list[TrialSample]:
+    """Return the runs over the unknowns of a robot with that weight in the fluid, N.
+
+    Args:
+        robot: the robot.
+        weight: its weight in the fluid, N.
+        unknowns: what is open.
+        shares: of the distributions, (runs, unknowns), 0 to 1; None: the space-filling sample that serves all robots.
+    """
+    points = _shares(unknowns) if shares is None else shares
+    values = {one.name: one.at(column) for one, column in zip(unknowns, points.T, strict=True)}
     found = []
-    for number in range(RUNS):
+    for number in range(len(points)):
         own = {name: float(column[number]) for name, column in values.items()}
         fields = {name: value for name, value in own.items() if name == "fluid.cavitation_pressure"}
         if "weight" in own and robot.body.mass is not None:

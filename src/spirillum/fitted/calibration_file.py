@@ -126,6 +126,8 @@ class Provenance(Section):
     """Method of the fit."""
     free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
     """Parameters that were free."""
+    answer: Literal["held", "trial"] = "held"
+    """What was fitted."""
     friction_reading: Literal["", "rotor", "paper"] = ""
     """Reading of the friction under which B_eff was inferred."""
     synthetic: Annotated[bool, Field(strict=True)] = False

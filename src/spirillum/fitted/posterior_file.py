@@ -312,6 +312,11 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0; "
             "`spirillum calibrate` with more --doublings samples for longer"
         )
+    if attributes.get("answer") == "trial":
+        raise InputError(
+            f"{path} is of trials, whose draws no held motion follows; allowed: the calibration.toml beside it, as "
+            "--calibration"
+        )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)
         raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")

@@ -83,7 +83,8 @@ class TrialTask(OneRobot):
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute every quantity, (1,); NaN for a robot without a trial."""
-        part: Part = {name: np.full(1, np.nan) for name in self.needed} | {"state": np.zeros(1)}
+        part: Part = {name: np.full(1, np.nan) for name in self.needed}
+        part["state"] = np.zeros(1)
         stated = self.contact.model_fields_set  # what nobody states is open in the interval
         contact = {name: getattr(self.contact, name) for name in stated}
         roughness = contact.pop("roughness", None)
