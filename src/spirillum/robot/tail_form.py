@@ -40,8 +40,8 @@ class TailForm(NamedTuple):
     def read(cls, values: Sequence[Any]) -> TailForm:
         """From JSON, which has lists."""
         starts, amplitude, wavelength, curve, tolerance = values
-        points = (tuple(map(tuple, part)) for part in (amplitude, wavelength, curve))
-        return cls(starts, *points, tolerance)
+        points: list[Any] = [tuple(map(tuple, part)) for part in (amplitude, wavelength, curve)]
+        return cls(starts, points[0], points[1], points[2], tolerance)
 
     @property
     def is_helix(self) -> bool:

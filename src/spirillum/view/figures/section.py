@@ -6,6 +6,8 @@ matplotlib looks for the extent of every segment: half a second for a tube.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch, Polygon
@@ -54,7 +56,13 @@ def draw_section(
     if plane != "yz":
         # The tail's silhouette, in true thickness; it does not hide the flow.
         width = robot.tail.wire_diameter / unit * points
-        look = {"color": "white", "linewidth": width, "alpha": 0.35, "solid_capstyle": "round", "zorder": 4}
+        look: dict[str, Any] = {
+            "color": "white",
+            "linewidth": width,
+            "alpha": 0.35,
+            "solid_capstyle": "round",
+            "zorder": 4,
+        }
         for line in lines:
             axes.plot(*line[:, along].T / unit, **look)
     for outline in outlines_of(robot).values():
