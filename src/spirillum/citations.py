@@ -106,7 +106,7 @@ REFERENCES: dict[str, str] = {
         "flagellum. Proceedings of the National Academy of Sciences 110:E338-E347, 2013."
     ),
     "lisevich2024": (
-        "I. Lisevich, R. Colin, H. Y. Yang, B. Ni and V. Sourjik. Physics of swimming and its fitness cost determine "
+        "I. Lisevich and others. Physics of swimming and its fitness cost determine "
         "strategies of bacterial investment in flagellar motility. bioRxiv, doi:10.1101/2024.03.30.587422, 2024."
     ),
     "djutanta2023": (
@@ -118,8 +118,7 @@ REFERENCES: dict[str, str] = {
         "Proceedings of the National Academy of Sciences 94:11307-11311, 1997."
     ),
     "das2018": (
-        "D. Das and E. Lauga. Computing the motor torque of Escherichia coli. Soft Matter 14:5955-5967, 2018 "
-        "(arXiv:1806.09694)."
+        "D. Das and E. Lauga. Computing the motor torque of Escherichia coli. Soft Matter, 2018 (arXiv:1806.09694)."
     ),
     "magariyama1995": (
         "Y. Magariyama and others. Simultaneous measurement of bacterial flagellar rotation rate and swimming speed. "
@@ -138,8 +137,8 @@ REFERENCES: dict[str, str] = {
         "Physics of Fluids 26:011701, 2014."
     ),
     "temel2013": (
-        "F. Z. Temel and S. Yesilyurt. Microfluidics and Nanofluidics, 2013: confined swimming of bio-inspired "
-        "microrobots in rectangular channels."
+        "F. Z. Temel and S. Yesilyurt. Simulation-based analysis of micro-robots swimming at the center and near the "
+        "wall of circular mini-channels. Microfluidics and Nanofluidics 14:287-298, 2013."
     ),
     "tirado1979": (
         "M. M. Tirado and J. Garcia de la Torre. Translational friction coefficients of rigid, symmetric top "

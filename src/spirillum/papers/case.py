@@ -61,6 +61,8 @@ class CasePoint(Section):
     placement: dict[str, Any] = Field(default_factory=dict)
     run: dict[str, Any] = Field(default_factory=dict)
     """Start and length of a run of the released robot, which needs its table; else none is made."""
+    assumed: bool = True
+    """Whether the case's assumptions are tried on it."""
     over: str = ""
     """Label of the point by whose values this one's are divided."""
     minus: str = ""

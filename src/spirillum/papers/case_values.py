@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from spirillum.errors import InputError
 from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.fluid.resistance import resistance
 from spirillum.papers.caldag2019.released import released_motion
@@ -44,7 +45,7 @@ class CaseTrial(NamedTuple):
 def trials_of(case: Case, point: CasePoint) -> Iterator[CaseTrial]:
     """The trials of all assumptions that concern a point."""
     for assumption in case.assumptions:
-        if not assumption.points or point.label in assumption.points:
+        if point.assumed and (not assumption.points or point.label in assumption.points):
             yield from _trials(assumption)
 
 
@@ -100,11 +101,13 @@ def _in_unit(found: CaseValue, quantity: CaseQuantity, robot: Robot) -> CaseValu
 def _swimming(robot: Robot, model: str, point: CasePoint, is_nominal: bool) -> dict[str, CaseValue]:  # noqa: FBT001
     """All quantities of steady swimming, SI; the program states an error of the speed alone."""
     error = math.nan
-    if is_nominal:
+    if is_nominal or model == "tube":  # which takes the robot's table where there is one
         found = predict(robot, model=model, placement=point.placement, band=False)
         swum, error = found.swimming, found.error_estimate
     else:
         swum = swim(RobotBatch.of(robot, Placement.of(point.placement)), model)
+        if not swum.valid[0]:
+            raise InputError(f"{robot.name}: model {model!r} has no answer under an assumption of its case")
     values = {item.name: abs(float(getattr(swum, item.name)[0])) for item in STEADY}
     stated = error if math.isfinite(error) else None
     return {name: CaseValue(value, stated if name in _OF_SPEED else None) for name, value in values.items()}

@@ -96,10 +96,10 @@ def _forest(axes: Axes, result: CaseResult, rows: Sequence[ValidationRow]) -> No
     axes.axvline(1.0, color="#444444", linewidth=0.8)
     _scale_ratios(axes)
     axes.set_xlabel("ours over published")
-    _name_rows(axes, [row.point for row in ordered])
+    _name_rows(axes, [row.point if row.computed else f"{row.point} (recorded)" for row in ordered])
 
 
-_TICKS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
 def _scale_ratios(axes: Axes) -> None:
