@@ -119,6 +119,7 @@ NAMES = {
     "field.yaw": "--field-yaw",
     "in_tube.continued": "--continue",
     "models": "--model",
+    "overwrite": "--force",
     "posterior_for": "--for",
     "rates": "--rate",
 }
@@ -135,9 +136,12 @@ PANELS = {
     "setup_errors.": "Errors of the setup file",
 }
 """Panels of the help by argument, or by table (with a point)."""
+LISTED = "NAME,..."
+"""What stands for names with commas between them."""
 METAVARS = {
     "camera.size": "WIDTHxHEIGHT",
     "size": "WIDTHxHEIGHT",
+    "udp": "[HOST:]PORT",
     "judged.statistic": "mean|quantile",
     "maximise": "QUANTITY",
     "minimise": "QUANTITY",

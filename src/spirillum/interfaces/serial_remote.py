@@ -321,8 +321,8 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
 
     Args:
         port: such as ``/dev/ttyUSB0`` or ``COM3``.
-        duty: 0 to 1.
-        duration: how long, with its unit or a float in s.
+        duty: duty of the motor, 0 to 1.
+        duration: how long it is on, with its unit or a float in s.
         baud: symbols a second.
 
     Raises:
