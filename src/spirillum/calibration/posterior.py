@@ -33,6 +33,7 @@ class Sampling:
     """How the sampler runs."""
 
     ensembles: int = ENSEMBLES
+    """Independent ensembles."""
     walkers: int = 0
     """Walkers of each ensemble; 0: four times the number of coordinates, at least 24."""
     warm_up: int = 400
@@ -42,8 +43,9 @@ class Sampling:
     kept: int = 100
     """Draws of each walker that stay in the answer."""
     seed: int = 1
+    """Seed of the sampler."""
     doublings: int = 3
-    """How often sampling goes on for twice as long, as long as the chains have not mixed."""
+    """How often sampling may go on for twice as long, until the chains have mixed."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -128,9 +128,9 @@ def suggest(
         posterior: file of a calibration's posterior.
         robots: a robot for each channel that might be used; None: the paper's two, if the posterior is of their
             channels and body.
-        candidates: file of channels and tails (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm amplitude
-            in every robot's channel.
-        trials: of each candidate.
+        candidates: channels and tails to choose from (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm
+            amplitude in every robot's channel.
+        trials: trials of each candidate.
 
     Raises:
         InputError: for wrong input.

@@ -48,6 +48,8 @@ _EXAMPLES = {
     "camera.field_of_view": "5mm",
     "until": "0.1mm",
     "roughness": "20um",
+    "feasibility.speed": "1mm/s",
+    "feasibility.view_width": "5mm",
     "spacing": "2mm",
 }
 """Of quantities, by kind or argument."""
@@ -132,6 +134,11 @@ class Request:
             else:
                 found[argument] = value
         return found
+
+    def take(self, argument: str) -> dict[str, Any]:
+        """Fields of a table, which then are no argument of the function."""
+        prefix = f"{argument}."
+        return {path.removeprefix(prefix): self.typed.pop(path) for path in [*self.typed] if path.startswith(prefix)}
 
     @cached_property
     def robot(self) -> Any:
@@ -310,7 +317,12 @@ def _help(item: Declaration, metavar: str | None) -> str:
     if item.path in TEXTS:
         return TEXTS[item.path]
     text = re.sub(r",?( each)? with (its|their) units? (\([^)]*\) )?or (a float|floats) in [\w/]+", "", item.text)
-    text = text.replace("; None: ", "; else ").replace(" None: ", " Else: ").replace("``", "`")
+    text = (
+        text.replace("; None: ", "; else ")
+        .replace("; unset: ", "; else ")
+        .replace(" None: ", " Else: ")
+        .replace("``", "`")
+    )
     text = f"do not {text}" if item.is_switch and item.default else text
     text = f"{text[:1].upper()}{text[1:]}"
     if metavar is None or "such as" in text:
@@ -324,7 +336,7 @@ def _help(item: Declaration, metavar: str | None) -> str:
 def declarations(target: str) -> tuple[Declaration, ...]:
     """Arguments of a function and fields of its tables, without robot and progress; fields of a class."""
     module, _, name = target.partition(":")
-    return tuple(_class_fields(module, name) if name[0].isupper() else _declared(module, name))
+    return tuple(_class_fields(module, name) if name.lstrip("_")[0].isupper() else _declared(module, name))
 
 
 def _declared(module: str, name: str) -> Iterator[Declaration]:

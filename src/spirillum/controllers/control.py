@@ -228,14 +228,14 @@ def control(
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
         task: `kind` and its fields, as ``{"kind": "stop-at", "at": "80 mm"}``, see `docs/control.md`.
-        lab: `camera`, `meter`, `remote`, `pulse`, `unknown`: tables by name, or a TOML file with them.
-        controller: `feedback`, or what it is judged against: `nothing`, `open-loop`, `knowing`.
+        lab: TOML file (or tables) with camera, meter, remote, pulse and unknown; None: the usual ones.
+        controller: `feedback`, or a baseline: `nothing`, `open-loop`, `knowing`.
         seed: of the run: what is unknown of the robot, the flow, and all errors of sensors and remote.
-        seeds: score all controllers over so many seeds, from `seed` on, too; 0: none.
+        seeds: also score all controllers over so many seeds, from `seed` on; 0: none.
         plant: further arguments of `spirillum.Plant`: `model`, `placement`, `roughness`, ...
-        learn: estimate friction and gap beside the controller, from camera and meter, by a bank of robots.
+        learn: estimate friction and gap in parallel, from camera and meter, by a bank of robots.
         workers: processes for the scores.
-        live: run at the pace of the clock on the wall.
+        live: run in real time.
         bench: makes camera, meter and remote of the run from plant, lab and seed in place of the modelled ones, such as
             `spirillum.Bench`: pictures, tracker and a remote at a port. Scores are of the modelled ones.
         progress: told what is being computed, how much is done, and of how much.

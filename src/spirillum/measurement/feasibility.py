@@ -147,14 +147,14 @@ def feasibility(
 
     Args:
         setup: the setup file.
-        tail_rate: expected rate of the tail; unset: predicted by the model that `predict` answers with, where
-            it is ready at once; so are those that follow.
-        body_rate: expected rate of the body.
-        speed: expected forward velocity.
-        duration: length of a trial; unset: 20 s.
-        frames_per_second: of the camera; unset: the setup's, else 30.
-        view_width: width of the field of view at the height of the axis; replaces the scale of the setup.
-        picture_width: width of the picture, pixels; unset: 640, or the video's.
+        tail_rate: expected rate of the tail, with its unit or a float in rad/s; None: predicted by the model of
+            `predict`, where it answers at once.
+        body_rate: expected rate of the body, with its unit or a float in rad/s; None: predicted.
+        speed: expected forward velocity, with its unit or a float in m/s; None: predicted.
+        duration: length of a trial, with its unit or a float in s; None: 20 s.
+        frames_per_second: frames a second; None: the setup's, or 30.
+        view_width: width of the view at the robot's axis, with its unit or a float in m; None: from the setup's scale.
+        picture_width: width of the picture, pixels; None: the video's, or 640.
         video: a video or folder of images from whose ruler the scale is fitted, in place of `view_width`.
         overrides: dotted fields of the robot, as for `spirillum.load`.
 
