@@ -159,10 +159,9 @@ def control(
 
 def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
     """Factory of camera and remote of a run; None: the modelled ones."""
-    from spirillum.errors import InputError
+    from spirillum.errors import check_choice
 
-    if seen_by not in _EYES:
-        raise InputError(f"seen-by = {seen_by[:40]!r}; allowed: {', '.join(_EYES)}")
+    check_choice("seen-by", seen_by, _EYES)
     if seen_by == "model" and port is None:
         return None
     from spirillum.interfaces.bench import Bench

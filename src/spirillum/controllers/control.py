@@ -29,7 +29,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import InputError, check_choice, check_range, did_you_mean
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
 from spirillum.processes import imap_unordered
@@ -57,8 +57,7 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
             f"task = {str(value)[:60]!r}; allowed: kind ({', '.join(TASKS)}) and the task's fields, by name"
         )
     kind = str(value["kind"])
-    if kind not in TASKS:
-        raise InputError(f"task = {kind[:60]!r}{did_you_mean(kind, TASKS)}; allowed: {', '.join(TASKS)}")
+    check_choice("task", kind, TASKS)
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
@@ -359,12 +358,9 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
     if controller not in CONTROLLERS:
         hint = did_you_mean(controller, CONTROLLERS)
         raise InputError(f"controller = {controller[:60]!r}{hint}; allowed: {', '.join(CONTROLLERS)}")
-    if not 0 <= seeds <= _MOST_SEEDS:
-        raise InputError(f"seeds = {clipped(seeds)}; allowed: 0 to {_MOST_SEEDS}")
-    if not 0 <= seed <= _LAST_SEED - seeds:
-        raise InputError(f"seed = {clipped(seed)}; allowed: 0 to {_LAST_SEED - seeds}")
-    if not 1 <= workers <= 256:
-        raise InputError(f"workers = {clipped(workers)}; allowed: 1 to 256")
+    check_range("seeds", seeds, 0, _MOST_SEEDS)
+    check_range("seed", seed, 0, _LAST_SEED - seeds)
+    check_range("workers", workers, 1, 256)
     if workers > 1 and not seeds:
         raise InputError(f"workers = {workers} without seeds, whose runs they share; allowed: 1, or seeds from 1")
     for name in arguments:

@@ -22,7 +22,7 @@ from typing import Any, Self
 from spirillum.argument_validation import as_number, validate_arguments
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, parse_option
 
@@ -131,8 +131,7 @@ class SerialRemote:
             InputError: for wrong input, if pyserial is missing, the port is not there or is in use, or nobody answers.
         """
         serial = import_optional("serial", "a remote at a serial port", "control")
-        if not 1 <= baud <= _FASTEST:
-            raise InputError(f"baud = {clipped(baud)}; allowed: 1 to {_FASTEST}")
+        check_range("baud", baud, 1, _FASTEST)
         self.port = str(port)
         """The port."""
         self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)

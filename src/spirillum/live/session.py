@@ -13,7 +13,7 @@ from threading import Condition, Event, Thread
 from typing import Any
 
 from spirillum.envelope import quantity, with_notes_last
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.live.observation import Observation
 from spirillum.live.sending import Datagrams, line_of
 from spirillum.live.sources import Arrived, Source, source_of
@@ -118,8 +118,7 @@ def track(
     Raises:
         InputError: for wrong input, or a source that is not there.
     """
-    if pace not in PACES:
-        raise InputError(f"pace = {str(pace)[:40]!r}; allowed: {', '.join(PACES)}")
+    check_choice("pace", pace, PACES)
     length = None if duration is None else seconds("duration", duration, most=1e7)
     chosen, _ = load_setup(setup)
     between = chosen.start, chosen.end

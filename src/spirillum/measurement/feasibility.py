@@ -10,7 +10,7 @@ from typing import Any
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.measurement.depth import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.notes import Note
@@ -172,14 +172,12 @@ def feasibility(
         rate, source_of_rate = frames_per_second, "given"
     elif chosen.camera.frames_per_second:
         source_of_rate = "setup"
-    if not 0.01 <= rate <= 1e5:
-        raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
+    check_range("fps", rate, 0.01, 1e5)
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
     if not 0.0 < span <= _LONGEST:
         raise InputError(f"duration = {span:g} s; allowed: more than 0 s, at most {_LONGEST:g} s (a day)")
     width = _WIDTH if picture_width is None else picture_width
-    if not 32 <= width <= 100_000:
-        raise InputError(f"width = {width}; allowed: 32 to 100000 pixels")
+    check_range("width", width, 32, 100_000, " pixels")
     pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, video)
     expected |= {
         "duration": (span, "assumed" if duration is None else "given"),
