@@ -62,12 +62,15 @@ RULES: dict[str, tuple[Rule, ...]] = {
     "measure": (
         Rule(
             "feasibility",
-            ("output", "marks", "no_tracking", "track", "no_annotated", "no_figures", "start", "end"),
+            ("output", "marks", "tracking", "track", "annotated", "figures", "start", "end"),
             "with --feasibility, which measures nothing; allowed: without it",
         ),
         Rule(
             "no feasibility",
-            ("expect_tail_rate", "expect_body_rate", "expect_speed", "duration", "fps", "view_width", "width"),
+            (
+                *("feasibility_tail_rate", "feasibility_body_rate", "feasibility_speed", "duration"),
+                *("feasibility_frames_per_second", "view_width", "feasibility_picture_width"),
+            ),
             "without --feasibility; allowed: with it",
         ),
     ),

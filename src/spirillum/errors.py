@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 _LONGEST = 800
@@ -40,6 +40,24 @@ def failure_sentence(error: BaseException) -> str:
     return _one_line(
         f"a fault of the program ended this request ({type(error).__name__}: {error}); allowed: another one"
     )
+
+
+def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Refuse a number that is not from `low` to `high`, or not a number."""
+    if not low <= value <= high:
+        shown = float(value) if isinstance(value, float) else clipped(int(value))
+        raise InputError(f"{name} = {shown}; allowed: {_plain(low)} to {_plain(high)}{unit}")
+
+
+def _plain(bound: float) -> str:
+    return f"{bound:g}" if isinstance(bound, float) else str(bound)
+
+
+def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
+    """Refuse what is none of the allowed words, with the nearest of them."""
+    if value not in tuple(allowed):
+        word = str(value)[:40]
+        raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed)}; allowed: {', '.join(allowed)}")
 
 
 def clipped(value: object, longest: int = 60) -> str:

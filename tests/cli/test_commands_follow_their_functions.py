@@ -6,12 +6,13 @@ import inspect
 import pytest
 
 from spirillum.cli.app import app, command_line
-from spirillum.cli.function_command import FunctionSource, declarations
+from spirillum.cli.function_command import GIVEN_OTHERWISE, FunctionSource, declarations
+from spirillum.cli.setup_commands import setup_app
 from spirillum.robot.arguments import Options
 
 SOURCES: dict[str, FunctionSource] = {
     str(info.callback.__name__).replace("_", "-"): info.callback.source  # type: ignore[union-attr]
-    for info in app.registered_commands
+    for info in (*app.registered_commands, *setup_app.registered_commands)
     if hasattr(info.callback, "source")
 }
 
@@ -25,7 +26,7 @@ def excepted(source: FunctionSource) -> set[str]:
     """Arguments and fields that the exceptions of a command name, by a path or by a whole table."""
     return {
         item.path
-        for item in declarations(source.target)
+        for item in source.declarations
         if item.path in source.without or (item.table and item.table in source.without)
     }
 
@@ -33,15 +34,16 @@ def excepted(source: FunctionSource) -> set[str]:
 @pytest.mark.parametrize("name", SOURCES)
 def test_every_argument_is_an_option_or_has_a_reason(name: str) -> None:
     source = SOURCES[name]
-    offered = {parameter.name for parameter in command_line().commands[name].params}
-    silent = {item.path for item in declarations(source.target) if item.name not in offered}
+    tree = command_line().commands
+    offered = {parameter.name for parameter in (tree | tree["setup"].commands)[name].params}
+    silent = {item.path for item in source.declarations if item.name not in offered}
     assert not silent - excepted(source)
     assert all(source.without.values())
 
 
 @pytest.mark.parametrize("name", SOURCES)
 def test_exceptions_name_arguments_that_are_there(name: str) -> None:
-    there = {word for item in declarations(SOURCES[name].target) for word in (item.path, item.table)}
+    there = {word for item in SOURCES[name].declarations for word in (item.path, item.table)}
     assert not SOURCES[name].without.keys() - there
 
 
@@ -52,7 +54,7 @@ def test_source_text_tells_what_the_imported_function_has(name: str) -> None:
     parameters = inspect.signature(function).parameters  # type: ignore[arg-type]
     read = declarations(SOURCES[name].target)
     assert list(dict.fromkeys(item.path.partition(".")[0] for item in read)) == [
-        argument for argument in parameters if argument not in ("robot", "progress")
+        argument for argument in parameters if argument not in GIVEN_OTHERWISE
     ]
     for item in read:
         argument, point, field = item.path.partition(".")
@@ -74,7 +76,7 @@ def table_of(function: object, argument: str) -> type[Options]:
 def test_the_tables_of_names_hold_nothing_unused() -> None:
     from spirillum.cli.shared_options import COMPLETIONS, METAVARS, NAMES, TEXTS
 
-    paths = {item.path for source in SOURCES.values() for item in declarations(source.target)}
+    paths = {item.path for source in SOURCES.values() for item in source.declarations}
     assert not {*NAMES, *METAVARS, *TEXTS} - paths
     assert not set(COMPLETIONS) - {path.rpartition(".")[2] for path in paths}
 

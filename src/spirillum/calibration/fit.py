@@ -40,7 +40,7 @@ from spirillum.calibration.paper_method import paper_fit
 from spirillum.calibration.parameters import UNWALLED, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
@@ -115,8 +115,7 @@ def fit_model(
     progress: Progress | None = None,
 ) -> Calibrated:
     """Fit parameters of a model to observed speeds and rates."""
-    if method not in METHODS:
-        raise InputError(f"method = {method!r}{did_you_mean(method, METHODS)}; allowed: {', '.join(METHODS)}")
+    check_choice("method", method, METHODS)
     if friction not in _READINGS:
         raise InputError(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"

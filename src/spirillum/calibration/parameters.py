@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.model_options import CALIBRATED
 from spirillum.swimming.model_choice import AUTO, WALLED
@@ -298,8 +298,7 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
         return DEFAULT_FREE[model]
     names = listed_names(free)
     for name in names:
-        if name not in PARAMETERS:
-            raise InputError(f"free = '{name[:40]}'{did_you_mean(name, PARAMETERS)}; allowed: {', '.join(PARAMETERS)}")
+        check_choice("free", name, PARAMETERS)
         if names.count(name) > 1:
             raise InputError(f"free = '{name}' stands twice; allowed: once")
         if model not in PARAMETERS[name].models:

@@ -199,11 +199,10 @@ def rank_models(
     Args:
         observations: observations file.
         robots: a robot for each channel; None: the paper's two.
-        models: hydrodynamic models; None: `sbt` and `rft`, the paper's own question.
-        free: free parameters of every model; None: two for each channel, body drag and rotation, or gap and pitch for
-            `tube`.
+        models: `sbt`, `rft`, `slender` or `tube`; None: `sbt` and `rft`, the paper's own question.
+        free: free parameters of every model; None: body_drag,body_rotation, for `tube` gap,pitch.
         sampling: how the posteriors are sampled.
-        prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
+        prepare: compute missing tables of the model `tube`, minutes for each.
         answer: what `tube` is fitted as: `held`, or `trial` (two numbers: friction coefficient and roughness).
         progress: told what is being done.
 

@@ -31,7 +31,7 @@ from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube, tabled
@@ -128,15 +128,14 @@ def suggest(
         posterior: file of a calibration's posterior.
         robots: a robot for each channel that might be used; None: the paper's two, if the posterior is of their
             channels and body.
-        candidates: file of channels and tails (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm amplitude
-            in every robot's channel.
-        trials: of each candidate.
+        candidates: channels and tails to choose from (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm
+            amplitude in every robot's channel.
+        trials: trials of each candidate.
 
     Raises:
         InputError: for wrong input.
     """
-    if not 1 <= trials <= 10**6:
-        raise InputError(f"trials = {trials}; allowed: 1 to 1000000")
+    check_range("trials", trials, 1, 10**6)
     known = read_posterior(posterior)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)

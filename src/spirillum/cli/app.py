@@ -30,10 +30,8 @@ from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
     All,
-    Calibration,
     Json,
     Picture,
-    Posterior,
     Settings,
     add_notes_option,
     complete_auto_models,
@@ -163,59 +161,20 @@ def resistance(request: Request, *, json: Json = False) -> None:
     renderer.show(result.to_dict(), json=json)
 
 
+@from_function(
+    "spirillum.results.study:study",
+    without={"overrides": "--set"},
+    complete={"models": complete_auto_models},
+    robot=None,
+)
 def study(
+    request: Request,
+    *,
     context: typer.Context,
     source: Annotated[Path | None, typer.Argument(help="A study file, or a paper's name; else biorob2012.")] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study."),
-    ] = None,
-    observations: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Observed rates and speeds (CSV): B_eff is inferred from them.")
-    ] = None,
-    model: Annotated[
-        list[str] | None,
-        typer.Option(autocompletion=complete_auto_models, help="A model instead of the study's, or auto; repeatable."),
-    ] = None,
-    band: Annotated[
-        bool | None,
-        typer.Option(
-            "--band/--no-band",
-            help="Also the band over gap and pitch (model tube); default: as in the study.",
-            show_default=False,
-        ),
-    ] = None,
-    predicted: Annotated[
-        bool | None,
-        typer.Option(
-            "--predicted/--no-predicted",
-            help="Also simulate release from rest in the tubes (minutes); default: as in the study.",
-            show_default=False,
-        ),
-    ] = None,
-    settled: Annotated[
-        bool | None,
-        typer.Option(
-            "--settled/--no-settled",
-            help="Also find the steady state of each robot after release (seconds a robot); default: as in the study.",
-            show_default=False,
-        ),
-    ] = None,
-    trial: Annotated[
-        bool | None,
-        typer.Option(
-            "--trial/--no-trial",
-            help="Also a trial of each robot in its tube (seconds a robot); default: as in the study.",
-            show_default=False,
-        ),
-    ] = None,
-    interval: Annotated[
-        bool | None,
-        typer.Option(
-            "--interval/--no-interval",
-            help="Also the 90 % interval of each trial (half a minute a robot); default: as in the study.",
-            show_default=False,
-        ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
     cluster: Annotated[
@@ -225,8 +184,6 @@ def study(
         Path | None,
         typer.Option(metavar="FOLDER.zarr", help="Write a Zarr store, piece by piece; no folder of results."),
     ] = None,
-    calibration: Calibration = None,
-    posterior: Posterior = None,
     rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = _ROWS,
     settings: Settings = None,
     json: Json = False,
@@ -240,26 +197,16 @@ def study(
     if store is not None:
         refuse_conflicts(context, "store", rows=rows)
     with renderer.progress_bar(quiet=json) as progress:
-        from spirillum.results.study import study as answer
         from spirillum.results.study import study_answer
         from spirillum.results.study_store import store_answer
 
         folder = output or (Path("spirillum-study") if store is None else None)
-        dataset = answer(
+        dataset = request(
             source,
-            observations=observations,
             output=folder,
             overrides=overrides_from(settings),
-            models=model,
-            band=band,
-            predicted=predicted,
-            settled=settled,
-            trial=trial,
-            interval=interval,
             workers=workers if cluster is None else cluster,
             store=store,
-            calibration=calibration,
-            posterior=posterior,
             progress=progress,
         )
     if folder is None:

@@ -10,32 +10,15 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from spirillum.calibration.methods import METHODS
+from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
-from spirillum.cli.shared_options import (
-    MODEL_PANEL,
-    Json,
-    Settings,
-    complete_answers,
-    complete_auto_models,
-    complete_models,
-    complete_robots,
-    starting,
-)
+from spirillum.cli.shared_options import Json, Settings, complete_robots, starting
 from spirillum.errors import InputError
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 
 if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
     from spirillum.calibration.suggest import Suggestion
 
-_FittedAs = Annotated[
-    str,
-    typer.Option(
-        "--as",
-        autocompletion=complete_answers,
-        help="What model tube is fitted as: held at a pose, or a trial, released in its tube as predict has it.",
-    ),
-]
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str],
@@ -47,31 +30,25 @@ def _complete_methods(incomplete: str) -> list[str]:
     return starting(METHODS, incomplete)
 
 
+_SAMPLER = dict.fromkeys(
+    (f"sampling.{name}" for name in ("ensembles", "walkers", "warm_up", "steps", "kept")), "of the sampler, in Python"
+)
+_SAMPLING = {"sampling": ("spirillum.calibration.posterior:Sampling",)}
+
+
+@from_function(
+    "spirillum.results.calibration:calibrate",
+    without={**_SAMPLER, "robots": "the argument"},
+    complete={"method": _complete_methods},
+    robot=None,
+    tables=_SAMPLING,
+)
 def calibrate(
+    request: Request,
+    *,
     context: typer.Context,
     observations: _Observations,
     robot: _Robots,
-    model: Annotated[
-        str,
-        typer.Option(
-            autocompletion=complete_auto_models,
-            help="Hydrodynamic model: sbt, rft, slender, tube; or auto: tube in a channel (--prepare makes missing "
-            "tables), else sbt.",
-            rich_help_panel=MODEL_PANEL,
-        ),
-    ] = "auto",
-    free: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...",
-            help="Free parameters; else those that the paper fitted with this model, with tube gap,friction.",
-        ),
-    ] = None,
-    method: Annotated[
-        str,
-        typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
-    ] = "posterior",
-    fitted_as: _FittedAs = "held",
     friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
     assume_uncertainty: Annotated[
         list[str] | None,
@@ -81,20 +58,9 @@ def calibrate(
             "relative 95 % interval, such as fluid.viscosity=5%; repeatable. Else taken as exact.",
         ),
     ] = None,
-    prepare: Annotated[
-        bool,
-        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
-    ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
     ] = "spirillum-calibration",
-    no_figures: Annotated[
-        bool, typer.Option("--no-figures", help="Draw no figures, which takes some seconds.")
-    ] = False,
-    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
-    doublings: Annotated[
-        int, typer.Option(help="How often the length of the chains may be doubled, until they have mixed.")
-    ] = 3,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -106,26 +72,21 @@ def calibrate(
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import renderer
     from spirillum.fitted.replaced import set_fields
-    from spirillum.results.calibration import calibrate as answer
+    from spirillum.swimming.model_choice import AUTO
 
+    typed = request.typed
     robots = [loaded_robot(name, settings) for name in robot]
-    check_not_set(set_fields(overrides_from(settings)), free, model)
-    if method in METHODS and method != "posterior":
+    check_not_set(set_fields(overrides_from(settings)), typed.get("free"), typed.get("model", AUTO))
+    if (method := typed.get("method", "posterior")) in METHODS and method != "posterior":
         refuse_conflicts(context, "no posterior", method=method)
     with renderer.progress_bar(quiet=json) as progress:
-        found = answer(
+        found = request(
             observations,
             robots,
             output,
-            model=model,
-            free=free,
-            method=method,
             friction=friction,
             assume_uncertainty=_stated(assume_uncertainty or ()),
-            sampling=Sampling(seed=seed, doublings=doublings),
-            prepare=prepare,
-            answer=fitted_as,
-            figures=not no_figures,
+            sampling=Sampling(**request.take("sampling")),
             progress=progress,
         )
     renderer.show(found.to_dict(), json=json)
@@ -154,30 +115,20 @@ def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str
     return found if robot or not settings else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
 
 
+@from_function(
+    "spirillum.calibration.ranking:rank_models",
+    without={**_SAMPLER, "sampling.doublings": "as in calibrate", "robots": "the argument"},
+    robot=None,
+    tables=_SAMPLING,
+)
 def rank_models(
+    request: Request,
+    *,
     observations: _Observations,
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
     ] = None,
-    model: Annotated[
-        list[str] | None,
-        typer.Option(
-            autocompletion=complete_models, help="sbt, rft, slender or tube; repeatable. Without it, sbt and rft."
-        ),
-    ] = None,
-    free: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,...", help="Free parameters of all; else body_drag,body_rotation, for tube gap,pitch."
-        ),
-    ] = None,
-    prepare: Annotated[
-        bool,
-        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
-    ] = False,
-    fitted_as: _FittedAs = "held",
-    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -188,41 +139,33 @@ def rank_models(
     from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import free_by_model
-    from spirillum.calibration.ranking import rank_models as answer
     from spirillum.cli import renderer
     from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
     fields = set_fields(overrides_from(settings))
-    for name, fitted in free_by_model(model, free, fitted_as).items():
+    for name, fitted in free_by_model(
+        request.typed.get("models"), request.typed.get("free"), request.typed.get("answer", "held")
+    ).items():
         check_not_set(fields, fitted, name)
     names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
-        found = answer(
-            observations,
-            [loaded_robot(name, settings) for name in names] or None,
-            models=model,
-            free=free,
-            sampling=Sampling(seed=seed),
-            prepare=prepare,
-            answer=fitted_as,
-            progress=progress,
-        )
+        robots = [loaded_robot(name, settings) for name in names] or None
+        found = request(observations, robots, sampling=Sampling(**request.take("sampling")), progress=progress)
     renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)
     if not all(item.fit.converged for item in found.ranked):
         raise typer.Exit(1)
 
 
+@from_function("spirillum.calibration.suggest:suggest", without={"robots": "the argument"}, robot=None)
 def suggest(
+    request: Request,
+    *,
     posterior: Annotated[Path, typer.Argument(help="Posterior of a calibration (posterior.nc).")],
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
     ] = None,
-    candidates: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Channels and tails to choose from (CSV); else a grid of tails.")
-    ] = None,
-    trials: Annotated[int, typer.Option(help="Trials of each candidate.")] = 5,
     rows: Annotated[int, typer.Option(help="Candidates in the table.")] = 10,
     settings: Settings = None,
     json: Json = False,
@@ -232,7 +175,6 @@ def suggest(
     Example: `spirillum suggest my-calibration/posterior.nc --candidates tails.csv`
     """
     from spirillum.calibration.parameters import OBSERVED
-    from spirillum.calibration.suggest import suggest as answer
     from spirillum.cli import renderer
     from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
@@ -243,5 +185,5 @@ def suggest(
         raise InputError(f"{own[0]} is set, and every candidate has its own; allowed: other fields, or --candidates")
     names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
-    found = _saying_whose(answer(posterior, robots, candidates=candidates, trials=trials), robot, settings)
+    found = _saying_whose(request(posterior, robots), robot, settings)
     renderer.show(found.to_dict(), json=json, rows=rows)

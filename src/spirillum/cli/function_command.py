@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperCommand
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.shared_options import COMPLETIONS, METAVARS, NAMES, PANELS, TEXTS, RobotArgument, Settings
+from spirillum.cli.shared_options import COMPLETIONS, LISTED, METAVARS, NAMES, PANELS, TEXTS, RobotArgument, Settings
 from spirillum.errors import InputError
 
 _SOURCE = Path(__file__).parents[2]
@@ -48,9 +48,12 @@ _EXAMPLES = {
     "camera.field_of_view": "5mm",
     "until": "0.1mm",
     "roughness": "20um",
+    "feasibility.speed": "1mm/s",
+    "feasibility.view_width": "5mm",
+    "spacing": "2mm",
 }
 """Of quantities, by kind or argument."""
-_GIVEN_OTHERWISE = ("robot", "progress")
+GIVEN_OTHERWISE = ("robot", "progress", "tell")
 """Arguments of functions that every command gives in its own way."""
 
 
@@ -96,6 +99,18 @@ class FunctionSource(NamedTuple):
     completions: Mapping[str, Any]
     robot: Any
     """Annotation of the argument that names the robot; None for a function without one."""
+    tables: Mapping[str, Sequence[str]] = {}
+    """Arguments that are mappings, with the functions or classes (`module:name`) that declare their fields."""
+
+    @property
+    def declarations(self) -> tuple[Declaration, ...]:
+        """Arguments of the function and fields of its tables; the first of those of one path."""
+        found = {item.path: item for item in declarations(self.target) if item.path not in self.tables}
+        for argument, targets in self.tables.items():
+            for item in (item for target in targets for item in declarations(target)):
+                path = f"{argument}.{item.path}"
+                found.setdefault(path, item._replace(path=path))
+        return tuple(found.values())
 
 
 @dataclass
@@ -119,6 +134,11 @@ class Request:
             else:
                 found[argument] = value
         return found
+
+    def take(self, argument: str) -> dict[str, Any]:
+        """Fields of a table, which then are no argument of the function."""
+        prefix = f"{argument}."
+        return {path.removeprefix(prefix): self.typed.pop(path) for path in [*self.typed] if path.startswith(prefix)}
 
     @cached_property
     def robot(self) -> Any:
@@ -145,6 +165,7 @@ def from_function(
     without: Mapping[str, str] | None = None,
     complete: Mapping[str, Any] | None = None,
     robot: Any = RobotArgument,
+    tables: Mapping[str, Sequence[str]] | None = None,
 ) -> Callable[[Callable[..., None]], Any]:
     """Decorator that gives a command the arguments of a public function as options.
 
@@ -155,13 +176,15 @@ def from_function(
         without: arguments and fields that are no option of the command, with the reason.
         complete: what the shell completes by argument, where it is not as in other commands.
         robot: annotation of the argument that names the robot; None for a function without one.
+        tables: arguments that are mappings, with the functions or classes that declare their fields.
     """
 
     def decorate(body: Callable[..., None]) -> Callable[[], None]:
         def stub() -> None: ...
 
         stub.__name__, stub.__doc__ = body.__name__, body.__doc__
-        stub.source = FunctionSource(body, target, without or {}, {**COMPLETIONS, **(complete or {})}, robot)  # type: ignore[attr-defined]
+        completions = {**COMPLETIONS, **(complete or {})}
+        stub.source = FunctionSource(body, target, without or {}, completions, robot, tables or {})  # type: ignore[attr-defined]
         return stub
 
     return decorate
@@ -201,7 +224,7 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
     hints = get_type_hints(source.body, include_extras=True)
     made = {
         item.name: (item, *_option(item, source.completions))
-        for item in declarations(source.target)
+        for item in source.declarations
         if item.name not in own and not {item.path, item.table} & source.without.keys()
     }
     parameters = []
@@ -213,13 +236,14 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
     if source.robot is not None:
         parameters.insert(-1, _parameter("settings", Settings, None))
 
-    def run(robot: str | None = None, settings: list[str] | None = None, **given: Any) -> None:
+    def run(**given: Any) -> None:
         typed = {
             item.path: _as_argument(item, given[name])
             for name, (item, _, default) in made.items()
             if given[name] is not None and given[name] != default
         }
-        source.body(Request(source, typed, robot, settings), **{name: given[name] for name in own})
+        robot = () if source.robot is None else (given["robot"], given["settings"])
+        source.body(Request(source, typed, *robot), **{name: given[name] for name in own})
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {item.name: item.annotation for item in parameters}
@@ -249,22 +273,30 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
     if "bool" in words:
         return _switch(item, option, about)
     default = item.default if item.default != () and metavar is None and "." not in item.path else None
-    kind: Any = str
-    if "Path" in words:
-        kind, metavar = Path, "FILE"
-    elif words & {"Sequence", "PerRobot", "Samples"}:
-        kind = list[str]
-    elif metavar is None and "tuple" not in words and words & {"int", "float"}:
-        kind = int if "int" in words else float
+    kind, metavar = _value_kind(item, metavar)
     if kind == list[str]:
         about["help"] = f"{str(about['help']).rstrip('.')}; repeatable."
     if default is None:
         kind |= None
     elif isinstance(default, tuple):
         default = _shown(default)
+    if unit is not None and metavar is not None and item.default:
+        default = f"{item.default:g}{unit[1]}"
     if "." in item.path and metavar is None and item.default not in (None, ()):
         about["show_default"] = _shown(item.default)
     return Annotated[kind, typer.Option(option, metavar=METAVARS.get(item.path, metavar), **about)], default
+
+
+def _value_kind(item: Declaration, metavar: str | None) -> tuple[Any, str | None]:
+    """Type of an option's value, and what stands for it in the help."""
+    words = item.words
+    if "Path" in words:
+        return Path, "FILE"
+    if words & {"Sequence", "PerRobot", "Samples"} and METAVARS.get(item.path) != LISTED:
+        return list[str], metavar
+    if metavar is None and "tuple" not in words and words & {"int", "float"}:
+        return int if "int" in words else float, metavar
+    return str, metavar
 
 
 def _shown(value: Any) -> str:
@@ -285,7 +317,12 @@ def _help(item: Declaration, metavar: str | None) -> str:
     if item.path in TEXTS:
         return TEXTS[item.path]
     text = re.sub(r",?( each)? with (its|their) units? (\([^)]*\) )?or (a float|floats) in [\w/]+", "", item.text)
-    text = text.replace("; None: ", "; else ").replace(" None: ", " Else: ").replace("``", "`")
+    text = (
+        text.replace("; None: ", "; else ")
+        .replace("; unset: ", "; else ")
+        .replace(" None: ", " Else: ")
+        .replace("``", "`")
+    )
     text = f"do not {text}" if item.is_switch and item.default else text
     text = f"{text[:1].upper()}{text[1:]}"
     if metavar is None or "such as" in text:
@@ -297,9 +334,9 @@ def _help(item: Declaration, metavar: str | None) -> str:
 
 @cache
 def declarations(target: str) -> tuple[Declaration, ...]:
-    """Arguments of a function and fields of its tables, without robot and progress."""
+    """Arguments of a function and fields of its tables, without robot and progress; fields of a class."""
     module, _, name = target.partition(":")
-    return tuple(_declared(module, name))
+    return tuple(_class_fields(module, name) if name.lstrip("_")[0].isupper() else _declared(module, name))
 
 
 def _declared(module: str, name: str) -> Iterator[Declaration]:
@@ -308,18 +345,18 @@ def _declared(module: str, name: str) -> Iterator[Declaration]:
     positional = [*names.posonlyargs, *names.args]
     defaults = [None] * (len(positional) - len(names.defaults)) + list(names.defaults)
     for item, default in zip([*positional, *names.kwonlyargs], [*defaults, *names.kw_defaults], strict=True):
-        if item.arg in _GIVEN_OTHERWISE:
+        if item.arg in GIVEN_OTHERWISE:
             continue
         annotation = ast.unparse(item.annotation) if item.annotation is not None else ""
         tables = [part for part in annotation.split(" | ") if "Mapping[str, Any]" in annotation and part.isidentifier()]
         if table := next((part for part in tables if _is_table(module, part)), None):
-            yield from _fields(module, table, item.arg)
+            yield from (field._replace(path=f"{item.arg}.{field.path}") for field in _class_fields(module, table))
         else:
             yield Declaration(item.arg, annotation, _value(module, default), said.get(item.arg, ""))
 
 
-def _fields(module: str, table: str, argument: str) -> Iterator[Declaration]:
-    """Fields of an options table with the docstrings under them."""
+def _class_fields(module: str, table: str) -> Iterator[Declaration]:
+    """Fields of an options table or dataclass with the docstrings under them."""
     home = _home(module, table)
     found = _found(home, table, ast.ClassDef)
     for item, behind in zip(found.body, found.body[1:], strict=False):
@@ -327,7 +364,7 @@ def _fields(module: str, table: str, argument: str) -> Iterator[Declaration]:
             continue
         text = behind.value.value if isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant) else ""
         name, annotation = ast.unparse(item.target), ast.unparse(item.annotation)
-        yield Declaration(f"{argument}.{name}", annotation, _value(home, item.value), " ".join(str(text).split()))
+        yield Declaration(name, annotation, _value(home, item.value), " ".join(str(text).split()))
 
 
 def _is_table(module: str, name: str) -> bool:

@@ -28,14 +28,13 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
         parameters: names of the command's parameters that are asked about.
 
     Returns:
-        The options as they are typed, such as ``--volume-resolution``, in the order of the command's help.
+        The options as they are typed, such as ``--volume-resolution``, in the order of `parameters`.
     """
+    options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
     return [
-        max(parameter.opts, key=len)
-        for parameter in context.command.params
-        if parameter.name in parameters
-        and (source := context.get_parameter_source(parameter.name)) is not None
-        and source.name != "DEFAULT"
+        options[name]
+        for name in parameters
+        if (source := context.get_parameter_source(name)) is not None and source.name != "DEFAULT"
     ]
 
 

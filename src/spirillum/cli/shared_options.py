@@ -107,6 +107,7 @@ def complete_answers(incomplete: str) -> list[str]:
 
 
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
+    "answer": complete_answers,
     "accuracy": _complete_accuracies,
     "ends": _complete_ends,
     "friction": _complete_friction,
@@ -119,12 +120,19 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
 }
 """Completions of the shell, by argument or field of a table."""
 NAMES = {
+    "answer": "--as",
     "calibrated": "--no-calibration",
     "degradation.glare_moves": "--glare-fixed",
     "field.pitch": "--field-pitch",
+    "feasibility.body_rate": "--expect-body-rate",
+    "feasibility.frames_per_second": "--fps",
+    "feasibility.picture_width": "--width",
+    "feasibility.speed": "--expect-speed",
+    "feasibility.tail_rate": "--expect-tail-rate",
     "field.yaw": "--field-yaw",
     "in_tube.continued": "--continue",
     "models": "--model",
+    "overwrite": "--force",
     "posterior_for": "--for",
     "rates": "--rate",
 }
@@ -136,14 +144,23 @@ PANELS = {
     **dict.fromkeys(("weight", "roughness", "in_tube.", "field."), START_PANEL),
     "timing.": TIMING_PANEL,
     "camera.": "Camera",
+    **dict.fromkeys(("marks", "tracking", "track"), "Instead of the tracker"),
+    "feasibility.": "Before an experiment",
+    **dict.fromkeys(("task.", "controller"), "Task"),
+    **dict.fromkeys(("lab", "live"), "Laboratory"),
+    "seeds": "Seeds and scores",
     "degradation.": DISTURBANCES_PANEL,
     **dict.fromkeys(("motion.", "trial."), "Motion"),
     "setup_errors.": "Errors of the setup file",
 }
 """Panels of the help by argument, or by table (with a point)."""
+LISTED = "NAME,..."
+"""What stands for names with commas between them."""
 METAVARS = {
     "camera.size": "WIDTHxHEIGHT",
+    "free": LISTED,
     "size": "WIDTHxHEIGHT",
+    "udp": "[HOST:]PORT",
     "judged.statistic": "mean|quantile",
     "maximise": "QUANTITY",
     "minimise": "QUANTITY",
@@ -160,6 +177,12 @@ TEXTS = {
     "motion.friction": _FRICTION,
     "degradation.glare_moves": "The glare stands still instead of moving with the body.",
     "seed": "Seed of all random numbers.",
+    "task.at": "stop-at: x of the body's mid-length at which to stop, such as 5mm.",
+    "task.law": "keep-axis: `position` (feedback of the place) or `aim` (at a point of the axis ahead).",
+    "task.rate": "keep-axis: rate of the field, such as 1Hz; else the robot's.",
+    "task.speed": "Tasks of speed: along the robot's path, such as 0.1mm/s.",
+    "task.tolerance": "Allowed distance from goal or course, such as 1mm.",
+    "tracking": "Use readings by hand alone; the video gives scale and times.",
 }
 """Helps of arguments that docstrings explain elsewhere."""
 NO_FORM = {"resolution.form": "an option of the robot, model.tube.form"}
@@ -173,20 +196,6 @@ def optional_robot(text: str) -> Any:
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
-Calibration = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="Calibration file whose factors replace the robot's.", rich_help_panel=MODEL_PANEL
-    ),
-]
-Posterior = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Posterior of a calibration: its median replaces the robot's values; intervals.",
-        rich_help_panel=MODEL_PANEL,
-    ),
-]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -198,37 +207,6 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
-]
-Gap = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LENGTH",
-        help="Model tube: smallest distance of body and glass, such as 0.5mm.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-Eccentricity = Annotated[
-    float | None,
-    typer.Option(
-        help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-Pitch = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ANGLE",
-        help="Model tube: angle by which the nose is raised, such as 2deg; below 0 lowered.",
-        rich_help_panel=PLACE_PANEL,
-    ),
-]
-Ends = Annotated[
-    str | None,
-    typer.Option(
-        autocompletion=_complete_ends,
-        help="Model tube: open or closed ends of the channel; else open if it has a length.",
-        rich_help_panel=PLACE_PANEL,
-    ),
 ]
 
 

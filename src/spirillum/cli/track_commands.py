@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import overrides_from
 from spirillum.cli.shared_options import Json, Settings, starting
 
@@ -19,33 +20,20 @@ def _complete_paces(incomplete: str) -> list[str]:
     return starting(("fast", "real"), incomplete)
 
 
+@from_function(
+    "spirillum.live.session:track",
+    without={"overrides": "--set", "on_observation": "the terminal or --udp"},
+    complete={"pace": _complete_paces},
+    robot=None,
+)
 def track(
+    request: Request,
+    *,
     source: Annotated[
         str,
         typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...)."),
     ],
     setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
-    pace: Annotated[
-        str,
-        typer.Option(autocompletion=_complete_paces, help="real: as pictures come; fast: a film, as fast as it goes."),
-    ] = "real",
-    size: Annotated[str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels that a camera is asked for.")] = None,
-    fps: Annotated[float | None, typer.Option(help="Frames a second that a camera is asked for.")] = None,
-    learn: Annotated[str, typer.Option(metavar="TIME", help="Time from which the robot's look is learnt.")] = "3s",
-    window: Annotated[str, typer.Option(metavar="TIME", help="Time over which each frame's rates are taken.")] = "2s",
-    learn_from: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILM", help="Learn from this video of the same robot and camera, then track from the first frame."
-        ),
-    ] = None,
-    udp: Annotated[
-        str | None,
-        typer.Option(metavar="[HOST:]PORT", help="Send the lines as datagrams; without a host, to this computer."),
-    ] = None,
-    duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="End after this time; else with the source.")
-    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -59,7 +47,6 @@ def track(
     from spirillum.errors import InputError
     from spirillum.live.sending import line_of
     from spirillum.live.session import observation_line
-    from spirillum.live.session import track as answer
 
     if setup is None:
         raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
@@ -67,21 +54,12 @@ def track(
     def say(said: Observation, latency: float | None) -> None:
         typer.echo(line_of(observation_line(said, latency)))
 
-    result = answer(
-        source,
-        setup,
-        pace=pace,
-        size=None if size is None else _size(size),
-        fps=fps,
-        learn=learn,
-        window=window,
-        learn_from=learn_from,
-        udp=udp,
-        duration=duration,
-        overrides=overrides_from(settings),
-        on_observation=say if udp is None else None,
-    )
-    if udp is None:
+    typed = request.typed
+    if "size" in typed:
+        typed["size"] = _size(typed["size"])
+    lines = "udp" not in typed
+    result = request(source, setup, overrides=overrides_from(settings), on_observation=say if lines else None)
+    if lines:
         typer.echo(line_of(result.to_dict()))
     else:
         renderer.show(result.to_dict(), json=json)

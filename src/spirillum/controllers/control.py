@@ -29,7 +29,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import InputError, check_choice, check_range, did_you_mean
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
 from spirillum.processes import imap_unordered
@@ -57,8 +57,7 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
             f"task = {str(value)[:60]!r}; allowed: kind ({', '.join(TASKS)}) and the task's fields, by name"
         )
     kind = str(value["kind"])
-    if kind not in TASKS:
-        raise InputError(f"task = {kind[:60]!r}{did_you_mean(kind, TASKS)}; allowed: {', '.join(TASKS)}")
+    check_choice("task", kind, TASKS)
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
@@ -231,14 +230,14 @@ def control(
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
         task: `kind` and its fields, as ``{"kind": "stop-at", "at": "80 mm"}``, see `docs/control.md`.
-        lab: `camera`, `meter`, `remote`, `pulse`, `unknown`: tables by name, or a TOML file with them.
-        controller: `feedback`, or what it is judged against: `nothing`, `open-loop`, `knowing`.
+        lab: TOML file (or tables) with camera, meter, remote, pulse and unknown; None: the usual ones.
+        controller: `feedback`, or a baseline: `nothing`, `open-loop`, `knowing`.
         seed: of the run: what is unknown of the robot, the flow, and all errors of sensors and remote.
-        seeds: score all controllers over so many seeds, from `seed` on, too; 0: none.
+        seeds: also score all controllers over so many seeds, from `seed` on; 0: none.
         plant: further arguments of `spirillum.Plant`: `model`, `placement`, `roughness`, ...
-        learn: estimate friction and gap beside the controller, from camera and meter, by a bank of robots.
+        learn: estimate friction and gap in parallel, from camera and meter, by a bank of robots.
         workers: processes for the scores.
-        live: run at the pace of the clock on the wall.
+        live: run in real time.
         bench: makes camera, meter and remote of the run from plant, lab and seed in place of the modelled ones, such as
             `spirillum.Bench`: pictures, tracker and a remote at a port. Scores are of the modelled ones.
         progress: told what is being computed, how much is done, and of how much.
@@ -362,12 +361,9 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
     if controller not in CONTROLLERS:
         hint = did_you_mean(controller, CONTROLLERS)
         raise InputError(f"controller = {controller[:60]!r}{hint}; allowed: {', '.join(CONTROLLERS)}")
-    if not 0 <= seeds <= _MOST_SEEDS:
-        raise InputError(f"seeds = {clipped(seeds)}; allowed: 0 to {_MOST_SEEDS}")
-    if not 0 <= seed <= _LAST_SEED - seeds:
-        raise InputError(f"seed = {clipped(seed)}; allowed: 0 to {_LAST_SEED - seeds}")
-    if not 1 <= workers <= 256:
-        raise InputError(f"workers = {clipped(workers)}; allowed: 1 to 256")
+    check_range("seeds", seeds, 0, _MOST_SEEDS)
+    check_range("seed", seed, 0, _LAST_SEED - seeds)
+    check_range("workers", workers, 1, 256)
     if workers > 1 and not seeds:
         raise InputError(f"workers = {workers} without seeds, whose runs they share; allowed: 1, or seeds from 1")
     for name in arguments:

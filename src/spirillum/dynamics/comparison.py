@@ -14,7 +14,7 @@ from spirillum.dynamics.effects import Effect, effects_of
 from spirillum.dynamics.trial_request import TrialRequest
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.fitted.fit import read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.notes import Note
@@ -67,8 +67,7 @@ class ModelComparison(DisplayMixin):
         """
         if model not in self.predictions:
             raise InputError(f"model = {model!r} has no answer here; allowed: {', '.join(self.predictions)}")
-        if name not in _UNITS:
-            raise InputError(f"quantity = {name!r}; allowed: {', '.join(_UNITS)}")
+        check_choice("quantity", name, _UNITS)
         value, base = (getattr(self.predictions[key], name) for key in (model, self.reference))
         return float(value / base - 1.0) if base != 0 else math.nan
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.dynamics.poses import attitudes_of, rotation_matrix
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.progress_messages import OF_A_RUN
@@ -96,8 +96,7 @@ def flow_of_run(
     Raises:
         InputError: for another run, a moment outside it, or a place that cannot be resolved.
     """
-    if frame not in get_args(Frame):
-        raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    check_choice("frame", frame, get_args(Frame))
     at = moment_of_run(run, time, resolution)
     if progress is not None:
         progress(OF_A_RUN, 0, 1)

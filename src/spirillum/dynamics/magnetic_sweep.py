@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.free_robot import TwoLinks, two_links
 from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.timing import Switch
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import rigid_links
 from spirillum.notes import Note, note_attributes
@@ -130,8 +130,7 @@ def magnetic_sweep(
     held = replace(predict(without_reynolds_bound(own), model=model, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
-    if not 4 <= turns <= 1e4:
-        raise InputError(f"turns = {turns}; allowed: 4 to 10000")
+    check_range("turns", turns, 4, 10_000)
     asked = _rates(rates, held)
     _check_work(asked, turns, held.step_out_rate)
     batch = replace(held.batch, options=own.model)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.formats.tables import read_series
 from spirillum.notes import Note
 from spirillum.robot.arguments import Options
@@ -101,8 +101,7 @@ _ROUNDING = 1e-9
 
 def stated_duration(turns: float, duration: str | float | None) -> float | None:
     """Length of a run as far as it is known without a rate: s, or None where it is in turns."""
-    if not _SHORTEST <= turns <= 1e5:
-        raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
+    check_range("turns", turns, _SHORTEST, 1e5)
     return None if duration is None else parse_option("duration", duration, KINDS["time"])
 
 
@@ -118,8 +117,7 @@ def duration_of(turns: float, turn: float, duration: str | float | None) -> floa
 
 def check_samples(samples_per_turn: int) -> None:
     """Refuse a number of samples a turn that is none."""
-    if not 1 <= samples_per_turn <= _MOST_A_TURN:
-        raise InputError(f"samples-per-turn = {samples_per_turn}; allowed: 1 to {_MOST_A_TURN} a turn")
+    check_range("samples-per-turn", samples_per_turn, 1, _MOST_A_TURN, " a turn")
 
 
 def sample_times(end: float, turn: float, samples_per_turn: int, switches: Sequence[float] = ()) -> Samples:

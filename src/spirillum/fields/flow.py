@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, flow_field
 from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fields.in_tube import tube_flow_field
@@ -252,8 +252,7 @@ def flow(
         InputError: for wrong input, or a robot outside the model's domain.
     """
     angle = parse_option("phase", phase, KINDS["angle"])
-    if frame not in get_args(Frame):
-        raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    check_choice("frame", frame, get_args(Frame))
     robot = load(robot)
     choice = _choice(model, robot, placement)
     wanted = Resolution.of(resolution)
@@ -334,8 +333,7 @@ def plane_around(
 ) -> PointGrid:
     """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     plane = "".join(sorted(str(plane)))
-    if plane not in PLANES:
-        raise InputError(f"plane = {plane!r}{did_you_mean(str(plane), PLANES)}; allowed: {', '.join(PLANES)}")
+    check_choice("plane", plane, PLANES)
     at = parse_option("offset", offset, _OFFSET)
     return plane_grid(robot, plane, at, _margin(extent), resolution, seat)
 

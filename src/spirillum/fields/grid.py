@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import Seat
 from spirillum.units import show
@@ -135,10 +135,7 @@ def _glass(ends: tuple[float, float], seat: Seat, reach: float) -> dict[str, tup
 
 
 def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> PointGrid:
-    if not 2 <= resolution <= _LARGEST_RESOLUTION:
-        raise InputError(
-            f"{name} = {resolution}; allowed: 2 to {_LARGEST_RESOLUTION} points along the grid's longest side"
-        )
+    check_range(name, resolution, 2, _LARGEST_RESOLUTION, " points along the grid's longest side")
     spacing, counts, size = _sizes(box, resolution)
     if size > _MOST_POINTS:
         most = resolution

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.closed.perrin import Perrin
 from spirillum.fluid.closed.rft import Rft
 from spirillum.fluid.closed.sbt import Sbt
@@ -21,8 +21,7 @@ MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
 
 def find_model(name: str) -> ResistanceModel:
     """The model of that name."""
-    if str(name) not in MODELS:
-        raise InputError(f"model = {name!r}{did_you_mean(str(name), MODELS)}; allowed: {', '.join(MODELS)}")
+    check_choice("model", str(name), MODELS)
     return MODELS[name]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
 from spirillum.fluid.registry import check_placement, find_model
@@ -134,8 +134,7 @@ def resistance(
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(known)}")
     if part == "body" and not ready.has_body:
         raise InputError("part = 'body': this robot has none (body = 'none'); allowed: tail or robot")
-    if about not in ("body", "tail-root"):
-        raise InputError(f"about = {about!r}; allowed: body, tail-root")
+    check_choice("about", about, ("body", "tail-root"))
     angle = parse_option("phase", phase, KINDS["angle"])
     batch = RobotBatch.of(ready, Placement.of(placement))
     check_placement(batch.placement, chosen)

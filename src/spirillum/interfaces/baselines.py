@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import check_choice, check_range
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, TaskEnvironment
 
 _LEAD = 0.17
@@ -62,13 +62,10 @@ class Scored(NamedTuple):
 
 def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **options: Any) -> Scored:
     """What a rule scores, over robots, goals, flow and errors that a seed draws, alike for every rule."""
-    if task not in TASKS:
-        raise InputError(f"task = {task[:60]!r}{did_you_mean(task, TASKS)}; allowed: {', '.join(TASKS)}")
+    check_choice("task", task, TASKS)
     rules = RULES[TASKS[task]]
-    if rule not in rules:
-        raise InputError(f"rule = {rule[:60]!r}{did_you_mean(rule, rules)}; allowed: {', '.join(rules)}")
-    if not 2 <= episodes <= 1_000_000:
-        raise InputError(f"episodes = {episodes}; allowed: 2 to 1000000")
+    check_choice("rule", rule, rules)
+    check_range("episodes", episodes, 2, 1_000_000)
     rng, robots = np.random.default_rng(seed), TASKS[task](episodes, **options)
     robots.reset(np.ones(episodes, dtype=bool), rng)
     total, seen = np.zeros(episodes), robots.observe(rng)

@@ -13,7 +13,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError, check_choice, clipped
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, TaskEnvironment
 from spirillum.scalars import is_whole
 
@@ -131,8 +131,7 @@ def _check_seed(seed: Any) -> None:
 
 
 def _task(name: str, count: int, options: dict[str, Any]) -> TaskEnvironment:
-    if name not in TASKS:
-        raise InputError(f"task = {clipped(name)}; allowed: {', '.join(TASKS)}")
+    check_choice("task", name, TASKS)
     try:
         return TASKS[name](count, **options)
     except TypeError as error:  # an option that no task has

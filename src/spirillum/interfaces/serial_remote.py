@@ -22,7 +22,7 @@ from typing import Any, Self
 from spirillum.argument_validation import as_number, validate_arguments
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, parse_option
 
@@ -131,8 +131,7 @@ class SerialRemote:
             InputError: for wrong input, if pyserial is missing, the port is not there or is in use, or nobody answers.
         """
         serial = import_optional("serial", "a remote at a serial port", "control")
-        if not 1 <= baud <= _FASTEST:
-            raise InputError(f"baud = {clipped(baud)}; allowed: 1 to {_FASTEST}")
+        check_range("baud", baud, 1, _FASTEST)
         self.port = str(port)
         """The port."""
         self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
@@ -321,8 +320,8 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
 
     Args:
         port: such as ``/dev/ttyUSB0`` or ``COM3``.
-        duty: 0 to 1.
-        duration: how long, with its unit or a float in s.
+        duty: duty of the motor, 0 to 1.
+        duration: how long it is on, with its unit or a float in s.
         baud: symbols a second.
 
     Raises:

@@ -13,7 +13,7 @@ from threading import Condition, Event, Thread
 from typing import Any
 
 from spirillum.envelope import quantity, with_notes_last
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.live.observation import Observation
 from spirillum.live.sending import Datagrams, line_of
 from spirillum.live.sources import Arrived, Source, source_of
@@ -101,16 +101,14 @@ def track(
     Args:
         source: a video or folder of images, `camera:0`, or the address of a stream.
         setup: the setup file.
-        pace: `real`: pictures that come while the tracker is busy are dropped; `fast`: all pictures of a video, as fast
-            as it goes.
-        size: width and height that a camera is asked for, pixels.
-        fps: frames a second that it is asked for.
+        pace: `real`: pictures that come while the tracker is busy are dropped; `fast`: all pictures of a video.
+        size: width and height requested of a camera, pixels.
+        fps: frames a second requested of a camera.
         learn: time from which the robot's appearance is learnt, with its unit or a float in s.
-        window: time over which the rates of each frame are taken.
+        window: time over which each frame's rates are taken, with its unit or a float in s.
         learn_from: a video of the same robot before the same camera, instead of the first seconds.
-        udp: `PORT` or `HOST:PORT` to which each observation is sent as JSON in a datagram; without a host, to this
-            computer.
-        duration: time after which it ends; None: with the source, or an interrupt.
+        udp: `PORT` or `HOST:PORT` to which each observation is sent as a JSON datagram; without a host, this computer.
+        duration: time after which it ends, with its unit or a float in s; None: with the source, or an interrupt.
         overrides: dotted fields of the robot, as for `spirillum.load`.
         on_observation: called with every observation and its latency, s (None with the pace `fast`).
 
@@ -120,8 +118,7 @@ def track(
     Raises:
         InputError: for wrong input, or a source that is not there.
     """
-    if pace not in PACES:
-        raise InputError(f"pace = {str(pace)[:40]!r}; allowed: {', '.join(PACES)}")
+    check_choice("pace", pace, PACES)
     length = None if duration is None else seconds("duration", duration, most=1e7)
     chosen, _ = load_setup(setup)
     between = chosen.start, chosen.end

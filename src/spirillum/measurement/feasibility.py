@@ -10,7 +10,7 @@ from typing import Any
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 from spirillum.measurement.depth import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.notes import Note
@@ -147,14 +147,14 @@ def feasibility(
 
     Args:
         setup: the setup file.
-        tail_rate: expected rate of the tail; unset: predicted by the model that `predict` answers with, where
-            it is ready at once; so are those that follow.
-        body_rate: expected rate of the body.
-        speed: expected forward velocity.
-        duration: length of a trial; unset: 20 s.
-        frames_per_second: of the camera; unset: the setup's, else 30.
-        view_width: width of the field of view at the height of the axis; replaces the scale of the setup.
-        picture_width: width of the picture, pixels; unset: 640, or the video's.
+        tail_rate: expected rate of the tail, with its unit or a float in rad/s; None: predicted by the model of
+            `predict`, where it answers at once.
+        body_rate: expected rate of the body, with its unit or a float in rad/s; None: predicted.
+        speed: expected forward velocity, with its unit or a float in m/s; None: predicted.
+        duration: length of a trial, with its unit or a float in s; None: 20 s.
+        frames_per_second: frames a second; None: the setup's, or 30.
+        view_width: width of the view at the robot's axis, with its unit or a float in m; None: from the setup's scale.
+        picture_width: width of the picture, pixels; None: the video's, or 640.
         video: a video or folder of images from whose ruler the scale is fitted, in place of `view_width`.
         overrides: dotted fields of the robot, as for `spirillum.load`.
 
@@ -172,14 +172,12 @@ def feasibility(
         rate, source_of_rate = frames_per_second, "given"
     elif chosen.camera.frames_per_second:
         source_of_rate = "setup"
-    if not 0.01 <= rate <= 1e5:
-        raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
+    check_range("fps", rate, 0.01, 1e5)
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
     if not 0.0 < span <= _LONGEST:
         raise InputError(f"duration = {span:g} s; allowed: more than 0 s, at most {_LONGEST:g} s (a day)")
     width = _WIDTH if picture_width is None else picture_width
-    if not 32 <= width <= 100_000:
-        raise InputError(f"width = {width}; allowed: 32 to 100000 pixels")
+    check_range("width", width, 32, 100_000, " pixels")
     pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, video)
     expected |= {
         "duration": (span, "assumed" if duration is None else "given"),

@@ -32,6 +32,7 @@ from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_option
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.follow import Watcher, follow
@@ -231,8 +232,8 @@ def check_request(
     marks: str | Path | None = None,
     track: str | Path | None = None,
     tracking: bool = True,
-    start: float | None = None,
-    end: float | None = None,
+    start: str | float | None = None,
+    end: str | float | None = None,
     overrides: Mapping[str, Any] | None = None,
 ) -> MeasurementRequest:
     """Check what is to be measured, before any video is opened.
@@ -253,7 +254,9 @@ def check_request(
         if word is not None:
             checked_path(word, f"the name of a {what}")
     paths = [Path(video) for video in given]
-    chosen, robot = _loaded(setup, overrides, start, end)
+    bounds = {name: value for name, value in (("start", start), ("end", end)) if value is not None}
+    limits = {name: parse_option(name, value, KINDS["time"]) for name, value in bounds.items()}
+    chosen, robot = _loaded(setup, overrides, limits.get("start"), limits.get("end"))
     readings = _readings(paths, marks, track, tracking=tracking)
     table = None if track is None else Path(track)
     return MeasurementRequest(

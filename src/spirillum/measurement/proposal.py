@@ -121,9 +121,9 @@ def propose_setup(
         film: the video, or a folder of images.
         robot: a preset's name or a robot file; None: the paper's robot, in the channel that the walls look like.
         output: setup file to write (`.toml`); None: none is written.
-        spacing: from each line of the ruler to the next, with its unit or a float in m; None: left to be filled in.
+        spacing: distance of the ruler's lines, with its unit or a float in m; None: left to be filled in.
         fps: frames a second of a folder of images, or in place of a video's own times.
-        overwrite: replace a file that is there.
+        overwrite: overwrite a file that is there.
         progress: told what is looked for, how many looks are done, and how many there are at most.
 
     Returns:

@@ -124,7 +124,12 @@ def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: 
 
 
 def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
-    """Write a setup file to fill in."""
+    """Write a setup file to fill in.
+
+    Args:
+        path: of the file (`.toml`).
+        overwrite: overwrite a file that is there.
+    """
     new_file(
         output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), setup_text(), overwrite=overwrite
     )

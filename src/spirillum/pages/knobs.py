@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from spirillum.errors import InputError, clipped
+from spirillum.errors import InputError, check_choice, clipped
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -171,8 +171,7 @@ class Settings:
             raise InputError(f"a value of {len(value)} characters; allowed: at most {_LONGEST}")
         value = value.strip()
         if name == "run.model":
-            if value not in MODELS:
-                raise InputError(f"model = {value[:40]!r}; allowed: {', '.join(MODELS)}")
+            check_choice("model", value, MODELS)
             return replace(self, model=value)
         knob = _BY_FIELD.get(name)
         if knob is None:

@@ -42,10 +42,9 @@ def page(
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot; None: that of the run, else the preset
             biorob2012-wide.
-        run: a run of `spirillum.simulate`, or the file with it, to replay.
-        host: address to listen on. Any other than the loopback lets whoever is on the network and has the printed
-            address turn the knobs.
-        port: of that address; 0: a free one.
+        run: a run of `spirillum.simulate` to replay, or the file with it.
+        host: address to listen on; any other than the loopback lets others on the network in.
+        port: port to listen on; 0: a free one.
         browser: open the page in the browser.
         tell: what is told the page's address; it holds the key.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.calibration.methods import METHODS
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.files import scratch_folder
 from spirillum.pages.job import BackgroundJob
 from spirillum.pages.setup_form import FORM, form_fields, form_list
@@ -321,8 +321,7 @@ class MeasurementSession:
     def calibrate(self, model: str, method: str) -> None:
         """Begin to calibrate with what was measured."""
         for word, value, allowed in (("model", model, _MODELS), ("method", method, METHODS)):
-            if value not in allowed:
-                raise InputError(f"{word} = {value[:40]!r}; allowed: {', '.join(allowed)}")
+            check_choice(word, value, allowed)
         with self._lock:
             table = self._folders.get("measure", self._folder) / "observations.csv"
             if not table.is_file():

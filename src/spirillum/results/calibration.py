@@ -249,20 +249,19 @@ def calibrate(  # noqa: PLR0913 - the options of the command
         robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
         output: folder for `calibration.toml`, `predictions.csv`, figures and, for a posterior, `posterior.nc`; None:
             nothing is written.
-        model: hydrodynamic model; or `auto`: `tube` where every robot has the table of its tube, or `prepare` makes it,
-            and what is free is of that model; else `sbt`.
-        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted, or
-            with `tube` the gap.
-        method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
+        model: `sbt`, `rft`, `slender`, `tube`; or `auto`: `tube` where every robot has the table of its tube, or
+            `prepare` makes it, and what is free is of that model; else `sbt`.
+        free: free parameters; None: those that the paper fitted with this model, with `tube` gap,friction.
+        method: `posterior`, `least-squares`, or `paper` (its inversion of (15) and (18)).
         friction: reading under which B_eff follows from (18): `rotor` or `paper`.
         assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
             `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
             taken as exact.
         sampling: how the posterior is sampled.
-        prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
+        prepare: compute missing tables of the model `tube`, minutes for each.
         answer: what is fitted: `held`, or `trial`, released in the tube as `predict` has it (free:
             `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
-        figures: draw figures too, which takes some seconds.
+        figures: draw figures, which takes some seconds.
         progress: told what is being done.
 
     Raises:

@@ -151,8 +151,8 @@ def measure(
     tracking: bool = True,
     annotated: bool = True,
     figures: bool = True,
-    start: float | None = None,
-    end: float | None = None,
+    start: str | float | None = None,
+    end: str | float | None = None,
     overrides: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> Measurement:
@@ -164,14 +164,13 @@ def measure(
         videos: films or folders of images, each once; all of them with the same setup and robot.
         setup: the setup file.
         output: folder for the results; None writes nothing.
-        marks: table of readings by hand, which replace what is seen on their frames.
-        track: table of trackpy, DeepLabCut or Tracker with the positions of one video in pixels, instead of our own
-            tracking.
+        marks: readings by hand (CSV), which replace the tracker's on their frames.
+        track: positions of one video in pixels from trackpy, DeepLabCut or Tracker (CSV), instead of the tracker's.
         tracking: look for the robot in the videos; if not, the readings by hand are all there is.
         annotated: write an annotated video of each trial.
         figures: draw figures and write the report.
-        start: time in the video from which on to measure, s, instead of the setup's.
-        end: time until which to measure, s.
+        start: time in the video from which to measure, with its unit or a float in s; None: the setup's.
+        end: time until which to measure, with its unit or a float in s; None: the setup's.
         overrides: dotted fields of the robot, as for `spirillum.load`.
         progress: called with what is being done, steps done and steps in all.
 

@@ -158,22 +158,21 @@ def study(  # noqa: PLR0913 - the options of the command
     Args:
         source: study file (see `spirillum schema study`) or its tables, or a paper's name; None: the study of
             `biorob2012`.
-        observations: observations file; the study then also runs at the observed rates and infers B_eff.
+        observations: observed rates and speeds (CSV); the study then also runs at the rates and infers B_eff.
         output: folder for `dataset.nc`, `figures/`, `report.html`, `claims.json` and `ranking.csv`; a rerun resumes
             there.
             None: nothing is written.
         overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
-        models: hydrodynamic models instead of the study's; None: the study's.
-        band: compute models that compute the channel's walls over the places that the placement leaves open too
-            (seconds with tables, else many minutes), or not; None: what the study says.
-        predicted: lay the robots down in their tubes and let them go too, over a design of gap, pitch, waiting time,
-            roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
-        settled: let the robots go in their tubes and follow each to its steady motion too (some seconds a robot), or
-            not; None: what the study says.
-        trial: make a trial of each robot in its tube too, as `spirillum.predict` has it (some seconds a robot), or
-            not; None: what the study says.
-        interval: of each trial the 90 % interval over what nobody states too (half a minute a robot; a rerun resumes),
-            or not; None: what the study says.
+        models: hydrodynamic models, or `auto`; None: the study's.
+        band: in models with walls, also the band over gap and pitch left open (seconds with tables, else many minutes);
+            None: what the study says.
+        predicted: also simulate release from rest over a design of gap, pitch, waiting time, roughness and friction,
+            with nothing fitted (minutes); None: what the study says.
+        settled: also find each robot's steady state after release (seconds a robot); None: what the study says.
+        trial: also simulate a trial of each robot in its tube, as `predict` (seconds a robot); None: what the study
+            says.
+        interval: also the 90 % interval of each trial over unknown parameters (half a minute a robot; a rerun
+            resumes); None: what the study says.
         workers: number of processes, or the address of a Dask scheduler, as `tcp://192.168.1.5:8786`. The results do
             not depend on it.
         store: instead of `output`, a Zarr store (`study.zarr`), written a region after the other: for more robots than

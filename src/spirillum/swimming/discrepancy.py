@@ -14,7 +14,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.robot import Robot
 
@@ -30,8 +30,7 @@ def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -
         posterior: the posterior; None without one.
         robot: the robot.
     """
-    if name not in get_args(PosteriorFor):
-        raise InputError(f"for = {name!r}; allowed: {', '.join(get_args(PosteriorFor))}")
+    check_choice("for", name, get_args(PosteriorFor))
     if name == "measured":
         if posterior is None:
             raise InputError("for = 'measured' without a posterior; allowed: with --posterior FILE")

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, cast, get_args
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.fluid.model import SwimmerModel
 
 Motion = Literal["held", "free"]
@@ -59,8 +59,7 @@ class Screw(NamedTuple):
 
 def motion_of(name: str) -> Motion:
     """The motion of that name."""
-    if name not in get_args(Motion):
-        raise InputError(f"motion = {name!r}; allowed: {', '.join(get_args(Motion))}")
+    check_choice("motion", name, get_args(Motion))
     return cast("Motion", name)
 
 

@@ -10,7 +10,8 @@ from spirillum.envelope import quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.quantities import QUANTITIES
 
-HELD, RELEASED = "held", "trial"
+HELD = "held"
+RELEASED = "trial"
 """What a robot in its tube may be asked for, where one of both answers."""
 
 

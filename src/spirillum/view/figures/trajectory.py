@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.run_file import check_increasing, robot_of
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
@@ -198,8 +198,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
 
 def check_column(column: str) -> None:
     """Refuse a width that no page has."""
-    if column not in COLUMNS:
-        raise InputError(f"column = {str(column)[:40]!r}; allowed: {', '.join(COLUMNS)}")
+    check_choice("column", column, COLUMNS)
 
 
 def _tube_robot(dataset: xr.Dataset, path: Samples | None) -> Robot | None:

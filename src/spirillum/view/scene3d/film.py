@@ -15,7 +15,7 @@ from spirillum.display import DisplayMixin
 from spirillum.dynamics.poses import Poses, RobotPose, poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
@@ -174,8 +174,7 @@ def film(
     target = output_target(path, FILMS, "run.mp4")
     seen_from, pixels = checked_view(view), _even(checked_size(size))
     _check_pace(fps, 1.0 if speed is None else speed, target.suffix)
-    if camera not in CAMERAS:
-        raise InputError(f"camera = {str(camera)[:40]!r}; allowed: {', '.join(CAMERAS)}")
+    check_choice("camera", camera, CAMERAS)
     if isinstance(dataset, (str, Path)):
         dataset = open_run(dataset)
     robot = robot_of(dataset)
@@ -295,10 +294,7 @@ def _check_pace(fps: int, speed: float, suffix: str) -> None:
     most = 50 if suffix == ".gif" else 120
     if isinstance(fps, bool) or int(fps) != fps or not 1 <= fps <= most:
         raise InputError(f"fps = {fps}; allowed: a whole number of frames a second from 1 to {most} for {suffix}")
-    if not _SLOWEST <= speed <= _FASTEST:
-        raise InputError(
-            f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run per second of video"
-        )
+    check_range("speed", speed, _SLOWEST, _FASTEST, " seconds of the run per second of video")
 
 
 def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
