@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from typing import Any
 
 _LONGEST = 800
 TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
@@ -42,14 +43,14 @@ def failure_sentence(error: BaseException) -> str:
     )
 
 
-def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+def check_range(name: str, value: Any, low: Any, high: Any, unit: str = "") -> None:
     """Refuse a number that is not from `low` to `high`, or not a number."""
     if not low <= value <= high:
         shown = float(value) if isinstance(value, float) else clipped(int(value))
         raise InputError(f"{name} = {shown}; allowed: {_plain(low)} to {_plain(high)}{unit}")
 
 
-def _plain(bound: float) -> str:
+def _plain(bound: Any) -> str:
     return f"{bound:g}" if isinstance(bound, float) else str(bound)
 
 

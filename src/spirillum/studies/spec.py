@@ -41,14 +41,14 @@ _Coefficient = Annotated[float, BeforeValidator(in_range(0.0, 10.0)), Field(ge=0
 
 
 class LaidDown(Section):
-    """Between what robots are laid down and let go, each factor from its low to its high level; all of it assumed."""
+    """Ranges of the placement and contact of robots that are released from rest, low and high; all of it assumed."""
 
     gap: tuple[Length, Length] = (1e-4, 1e-3)
-    """Smallest distance of body and glass where it is laid down, low and high."""
+    """Smallest distance of body and glass at release, low and high."""
     pitch: tuple[_Share, _Share] = (0.0, 0.5)
     """Nose up, over the steepest pitch that gap and tail allow, at which the tail is at the glass."""
     wait: tuple[Time, Time] = (0.0, 60.0)
-    """Time for which it lies there before its motor is switched on."""
+    """Waiting time from release until the motor is switched on."""
     roughness: tuple[Length, Length] = (1e-6, 3e-5)
     """Height of the asperities: of a smooth hull, and of glued and printed stripes."""
     friction_coefficient: tuple[_Coefficient, _Coefficient] = (0.0, 0.3)
@@ -121,15 +121,15 @@ class Study(Section):
     band: Annotated[bool, Field(strict=True)] = False
     """Compute such models over the places that `placement` leaves open too: seconds with tables, else many minutes."""
     predicted: Annotated[bool, Field(strict=True)] = False
-    """Lay the robots down in their tubes and let them go too, with nothing fitted: minutes."""
+    """Also simulate release from rest in the tube, with nothing fitted: minutes."""
     laid_down: LaidDown = LaidDown()
-    """Between what they are laid down."""
+    """Ranges of that release."""
     settled: Annotated[bool, Field(strict=True)] = False
-    """Let the robots go in their tubes, and follow each of them to its steady motion too: some seconds a robot."""
+    """Also find each robot's steady state after release: some seconds a robot."""
     trial: Annotated[bool, Field(strict=True)] = False
-    """Make a trial of each robot in its tube too, as `spirillum predict` has it: some seconds a robot."""
+    """Also simulate a trial of each robot in its tube, as `spirillum predict`: some seconds a robot."""
     interval: Annotated[bool, Field(strict=True)] = False
-    """Of each trial the 90 % interval over what nobody states, too: half a minute a robot; a rerun resumes."""
+    """Also the 90 % interval of each trial over unknown parameters: half a minute a robot; a rerun resumes."""
     contact: Contact = Contact()
     """What settled robots and those in trials rest on."""
 
