@@ -58,7 +58,7 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Refuse what is none of the allowed words, with the nearest of them."""
     if value not in tuple(allowed):
         word = str(value)[:40]
-        raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed)}; allowed: {', '.join(allowed)}")
+        raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed, 0.6)}; allowed: {', '.join(allowed)}")
 
 
 def clipped(value: object, longest: int = 60) -> str:
@@ -70,7 +70,7 @@ def clipped(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:
     """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
-    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=0.5)
+    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=likeness)
     return f" (did you mean {near[0]}?)" if near else ""
