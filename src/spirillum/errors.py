@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from typing import Any
 
 _LONGEST = 800
 TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
@@ -42,14 +43,14 @@ def failure_sentence(error: BaseException) -> str:
     )
 
 
-def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+def check_range(name: str, value: Any, low: Any, high: Any, unit: str = "") -> None:
     """Refuse a number that is not from `low` to `high`, or not a number."""
     if not low <= value <= high:
         shown = float(value) if isinstance(value, float) else clipped(int(value))
         raise InputError(f"{name} = {shown}; allowed: {_plain(low)} to {_plain(high)}{unit}")
 
 
-def _plain(bound: float) -> str:
+def _plain(bound: Any) -> str:
     return f"{bound:g}" if isinstance(bound, float) else str(bound)
 
 
@@ -57,7 +58,7 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Refuse what is none of the allowed words, with the nearest of them."""
     if value not in tuple(allowed):
         word = str(value)[:40]
-        raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed)}; allowed: {', '.join(allowed)}")
+        raise InputError(f"{name} = {word!r}{did_you_mean(word, allowed, 0.6)}; allowed: {', '.join(allowed)}")
 
 
 def clipped(value: object, longest: int = 60) -> str:
@@ -69,7 +70,7 @@ def clipped(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:
     """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
-    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=0.5)
+    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=likeness)
     return f" (did you mean {near[0]}?)" if near else ""

@@ -76,7 +76,7 @@ def control(
         ),
     ] = "stop-at",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the run too: NetCDF (.nc).")
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
     ] = None,
     with_: Annotated[
         list[str] | None,
@@ -109,11 +109,11 @@ def control(
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
+        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
     ] = None,
     movie: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`).", rich_help_panel=_PICTURES),
+        typer.Option(metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`).", rich_help_panel=_PICTURES),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -72,7 +72,7 @@ def simulate(
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
+        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
     ] = None,
     column: Annotated[
         str | None,
@@ -84,7 +84,7 @@ def simulate(
     movie: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
+            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
         ),
     ] = None,
     json: Json = False,
@@ -182,7 +182,7 @@ def magnetic_sweep(
     request: Request,
     *,
     output: Output,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it too: .png, .pdf or .svg.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Also plot it: .png, .pdf or .svg.")] = None,
     json: Json = False,
 ) -> None:
     """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.

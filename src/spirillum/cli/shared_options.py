@@ -173,6 +173,8 @@ _FRICTION = (
     "the body; paper: as eq. (19) is printed, on the tail from outside."
 )
 TEXTS = {
+    "calibration": "Calibration file whose factors replace the robot's.",
+    "posterior": "Posterior of a calibration: its median replaces the robot's values, and the answer has intervals.",
     "friction": _FRICTION,
     "motion.friction": _FRICTION,
     "degradation.glare_moves": "The glare stands still instead of moving with the body.",
@@ -206,7 +208,7 @@ All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg.")
 ]
 
 
@@ -218,7 +220,7 @@ def add_notes_option(command: Any) -> Any:
     if json is not None:
         notes = copy(json)
         notes.name, notes.opts, notes.secondary_opts, notes.expose_value = "notes", ["--notes"], [], False
-        notes.help = "Print all notes with their codes, and how the answer came about."
+        notes.help = "Print all notes with their codes, and the methods used."
         notes.callback = lambda _context, _parameter, value: every_note.set(bool(value))
         command.params.insert(command.params.index(json) + 1, notes)
     return command

@@ -127,7 +127,7 @@ class Study(Section):
     settled: Annotated[bool, Field(strict=True)] = False
     """Also find the steady state of each robot after release in its tube: some seconds a robot."""
     trial: Annotated[bool, Field(strict=True)] = False
-    """Make a trial of each robot in its tube too, as `spirillum predict` has it: some seconds a robot."""
+    """Also simulate a trial of each robot in its tube, as `spirillum predict`: some seconds a robot."""
     interval: Annotated[bool, Field(strict=True)] = False
     """Also give the 90 % interval of each trial over its unknowns: half a minute a robot; a rerun resumes."""
     contact: Contact = Contact()
