@@ -84,13 +84,17 @@ def _own_values(case: Case, point: CasePoint, names: Iterable[str], trial: CaseT
 
 def robot_of(case: Case, point: CasePoint, trial: CaseTrial | None = None) -> Robot:
     """Return the robot of a point, with what a trial changes."""
-    given = {**case.settings, **point.set}
-    name, fields = point.robot or case.robot, {path: None if at == "unset" else at for path, at in given.items()}
+    name, given = point.robot or case.robot, {**case.settings, **point.set}
     if trial is None:
-        return load(name, **fields)
-    nominal = {item.path: item for item in field_values(load(name, **fields))}
+        return load(name, **_unset(given))
+    nominal = {item.path: item for item in field_values(load(name, **_unset(given)))}
     scaled = {path: f"{factor * nominal[path].value!r} {nominal[path].unit}" for path, factor in trial.scale.items()}
-    return load(name, **{**fields, **trial.set, **scaled})
+    return load(name, **_unset({**given, **trial.set, **scaled}))
+
+
+def _unset(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a robot; None takes one out."""
+    return {path: None if value == "unset" else value for path, value in fields.items()}
 
 
 def _in_unit(found: CaseValue, quantity: CaseQuantity, robot: Robot) -> CaseValue:

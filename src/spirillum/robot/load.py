@@ -59,8 +59,9 @@ def preset_names() -> tuple[str, ...]:
 def shipped_robots() -> Mapping[str, Traversable]:
     """Robot files that come with the package, by name: the presets and the robots of `papers/NAME/robots`."""
     folders = [paper / "robots" for paper in (files("spirillum") / "papers").iterdir() if (paper / "robots").is_dir()]
-    found = [_robots_in(folder) for folder in (files("spirillum.robot") / "presets", *folders)]
-    return {name: robots[name] for robots in found for name in sorted(robots)}
+    found = dict(item for folder in folders for item in _robots_in(folder).items())
+    presets = _robots_in(files("spirillum.robot") / "presets")
+    return {**dict(sorted(presets.items())), **dict(sorted(found.items()))}
 
 
 def _robots_in(folder: Traversable) -> dict[str, Traversable]:
