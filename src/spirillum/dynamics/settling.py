@@ -130,7 +130,7 @@ class Settling(DisplayMixin):
     @property
     def weight_uncertainty(self) -> float | None:
         """Uncertainty of that weight where mass and volume are each known to 1 %, N; None without masses."""
-        found = self.robot.derived().get("submerged_weight_uncertainty")
+        found = self.robot.derived().get("weight_uncertainty")
         return None if found is None or not self.weight else found.value
 
     @property

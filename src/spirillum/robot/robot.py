@@ -156,7 +156,7 @@ class Robot(RobotTables):
             "submerged_weight": Derived(
                 (mass - self.fluid.density * volume) * STANDARD_GRAVITY, "N", "weight less buoyancy"
             ),
-            "submerged_weight_uncertainty": Derived(
+            "weight_uncertainty": Derived(
                 0.01 * float(np.hypot(mass, self.fluid.density * volume)) * STANDARD_GRAVITY,
                 "N",
                 "of submerged_weight, a small difference, where mass and volume are each known to 1 %",
