@@ -1,5 +1,6 @@
 """Tails of several starts, cones, tables and centre lines: what their files mean, what is refused, and their solids."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,14 @@ def test_a_written_robot_is_read_back_the_same(form: str, tmp_path: Path) -> Non
     robot = load("biorob2012-wide", tail=FORMS[form])
     (tmp_path / "robot.toml").write_text(robot_text(robot))
     assert load(tmp_path / "robot.toml") == robot
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_tail_from_json_has_the_same_form(form: str) -> None:
+    tail = load("biorob2012-wide", tail=FORMS[form]).tail
+    again = type(tail).model_construct(**json.loads(tail.model_dump_json()))
+    assert again.form == tail.form
+    assert hash(again.form) == hash(tail.form)
 
 
 def test_a_curve_is_found_beside_its_robot_file(tmp_path: Path) -> None:

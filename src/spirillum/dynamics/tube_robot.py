@@ -127,11 +127,6 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")
-    if not robot.tail.form.is_helix:
-        raise InputError(
-            "motion in the tube finds contacts of tail and wall only on helices of one wavelength and amplitude; "
-            "allowed: such a tail, or a prediction at a given pose"
-        )
     heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(steady.batch)
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])

@@ -37,6 +37,7 @@ def shape_of(robot: Robot) -> dict[str, Any]:
     `body` and `rotor` hold `vertices` (base64 of float32: place, normal, linear colour, metal; ten numbers each) and
     `triangles` (base64 of uint32). The rotor is at phase 0 and turns about the body's x axis.
     """
+    robot.check_body("the page")
     pieces = robot_mesh(robot, fineness=_FINENESS)
     channel, tail = robot.channel, robot.tail
     half = 0.5 * robot.body.length

@@ -136,6 +136,11 @@ class Body(Section):
         return read_profile(dict(raw))
 
     @property
+    def points(self) -> ProfilePoints:
+        """Points of its profile, also of a table that JSON has made lists of; empty for another shape."""
+        return tuple((x, r) for x, r in self.profile or ())
+
+    @property
     def front_end(self) -> End | None:
         """Front end in force; None for a sphere or spheroid, which have no ends of their own."""
         return self.front or _DEFAULT_END.get(self.shape)
@@ -259,8 +264,8 @@ class Tail(Section):
     @property
     def form(self) -> TailForm:
         """What makes the tail of its sizes."""
-        along = self.amplitude_along or (), self.wavelength_along or ()
-        return TailForm(self.starts, *along, self.curve or (), self.curve_tolerance or 0.0)
+        points = self.amplitude_along or (), self.wavelength_along or (), self.curve or ()
+        return TailForm.read((self.starts, *points, self.curve_tolerance or 0.0))
 
 
 class Channel(Section):

@@ -114,7 +114,7 @@ def outlines_of(robot: RobotTables) -> dict[str, Outline]:
     if not robot.has_body:
         return solid_outlines(None, 0.0, coupling.diameter, coupling.length, coupling.clearance)
     outline = body_outline(
-        body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end, body.profile or ()
+        body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end, body.points
     )
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
