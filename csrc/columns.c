@@ -95,6 +95,7 @@ static const struct {
     AT(STATION_X, Station, x),
     AT(STATION_Y, Station, y),
     AT(STATION_Z, Station, z),
+    AT(STATION_TURN, Station, turn),
     SIZE(STATION, Station),
     {"two_links", -1},
     AT(RADIUS, Wall, radius),

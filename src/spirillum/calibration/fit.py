@@ -43,6 +43,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
@@ -52,7 +53,7 @@ from spirillum.swimming.steady import requirements
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
-    """Return whether a fit may be one with walls: so it is asked for, or with `auto` its free numbers allow it.
+    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters.
 
     Args:
         asked: name of a model, or `auto`.
@@ -121,6 +122,9 @@ def fit_model(
         free_names(free, find_swimmer_model(model, AUTO).name)
     if prepare and not is_fitted_in_tube(model, free, method):
         raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
+    if method == "posterior":
+        for library in ("emcee", "arviz_base", "arviz_stats"):
+            import_optional(library, "method 'posterior'", "posterior")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")

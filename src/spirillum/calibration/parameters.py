@@ -252,7 +252,7 @@ DEFAULT_FREE = {
     "rft": ("body_drag", "friction"),
     "tube": ("gap", "friction"),
 }
-"""What is free if nothing is said: what the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
+"""Free parameters by default: those that the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
 
 
 ASSUMABLE = {
@@ -270,7 +270,7 @@ class Coordinate:
 
     parameter: FitParameter
     channel: int | None
-    """Place of its channel; None for all."""
+    """Index of its channel; None for all."""
     label: str
     """Name, with the channel where there are several."""
     prior: Prior
@@ -282,7 +282,7 @@ def listed_names(free: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def is_free_in(model: str, free: str | Sequence[str] | None) -> bool:
-    """Return whether a model has all these parameters; it has those of its own that are free where none is named."""
+    """Return whether a model has all these parameters; by default it has its own."""
     return free is None or all(name in PARAMETERS and model in PARAMETERS[name].models for name in listed_names(free))
 
 
@@ -331,7 +331,7 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
 
 
 OBSERVED = ("tail.wavelength", "tail.amplitude")
-"""Fields whose values stand in the observations."""
+"""Fields whose values are given by the observations."""
 _IN_PLACE_OF = {
     "body_drag": "calibration.{model}.body_drag",
     "body_rotation": "calibration.{model}.body_rotation",

@@ -110,7 +110,7 @@ class Problem:
         return found
 
     def _all_values(self, z: Samples) -> Samples:
-        """Every free number, (draws, free numbers); log-normal ones at once, for that is asked thousands of times."""
+        """Every free parameter, (draws, parameters); log-normal ones at once, for speed."""
         medians, spreads = self._log_normal
         found: Samples = medians * np.exp(spreads * np.clip(z[:, : medians.size], -30.0, 30.0))
         for place, item in enumerate(self.coordinates):
@@ -150,11 +150,11 @@ class Problem:
         return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
 
     def values_at(self, z: Samples) -> dict[str, float]:
-        """Free numbers by label at one place of the coordinates, (free numbers,)."""
+        """Free parameters by label at one point of the coordinates, (parameters,)."""
         return {label: float(values[0]) for label, values in self.values(z[None]).items()}
 
     def predicted_at(self, z: Samples) -> dict[Quantity, Samples]:
-        """What is compared, (robots,), at one place of the coordinates, (free numbers,)."""
+        """Compared quantities, (robots,), at one point of the coordinates, (parameters,)."""
         return {name: values[0] for name, values in self.predicted(z[None]).items()}
 
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:

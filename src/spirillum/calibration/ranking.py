@@ -30,6 +30,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 
 _CLEAR = 4.0
@@ -62,7 +63,7 @@ def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ModelRank:
-    """One model's place."""
+    """The rank of one model."""
 
     model: str
     elpd: float
@@ -263,6 +264,7 @@ def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
 
 def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
     """Rank models whose posteriors are of the same observations."""
+    import_optional("arviz_stats", "a ranking of models", "posterior")
     from arviz_stats import compare, loo
 
     found = {}

@@ -62,9 +62,7 @@ def calibrate(
         str,
         typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
     ] = "posterior",
-    friction: Annotated[
-        str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
-    ] = "rotor",
+    friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
     assume_uncertainty: Annotated[
         list[str] | None,
         typer.Option(
@@ -75,7 +73,7 @@ def calibrate(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
+        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
     ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
@@ -85,7 +83,7 @@ def calibrate(
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     doublings: Annotated[
-        int, typer.Option(help="How often sampling may go on for twice as long, until the chains have mixed.")
+        int, typer.Option(help="How often the length of the chains may be doubled, until they have mixed.")
     ] = 3,
     settings: Settings = None,
     json: Json = False,
@@ -139,7 +137,7 @@ _A = TypeVar("_A", "Ranking", "Suggestion")
 
 
 def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
-    """An answer that says whose robots were taken, where fields were set and none was named."""
+    """Refuse settings without a named robot, where the robots come from another file."""
     from spirillum.robot.load import PAPER_ROBOTS_TAKEN
 
     return found if robot or not settings else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
@@ -165,13 +163,13 @@ def rank_models(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
+        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Rank models by how well they predict tails that they were not fitted to, and say where each fails.
+    """Rank models by cross-validation over the tails, with the tails where each fails.
 
     Example: `spirillum rank-models observations.csv --model sbt --model rft --model slender`
     """

@@ -104,7 +104,7 @@ class FreeRobot(ABC):
         return found
 
     def at_duty(self: _Robot, duty: float) -> _Robot:
-        """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
+        """The robot at the duty of the remote; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
         drive[rigid_links.DUTY] = duty
         return replace(self, drive=drive)

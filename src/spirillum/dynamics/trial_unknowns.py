@@ -1,4 +1,4 @@
-"""What nobody knows of a trial, and the interval of its values over that: docs/unknowns.md.
+"""Unknowns of a trial, and the interval of its values over them: docs/unknowns.md.
 
 The same space-filling sample (Sobol' points with a fixed seed) serves all robots, so that differences between robots
 are not those of their samples. What a robot, a calibration or a request states is not varied.
@@ -27,7 +27,7 @@ _FEWEST = 0.5
 
 
 class TrialUnknown(NamedTuple):
-    """A number that nobody states, with an assumed distribution between two ends."""
+    """An unknown of a trial, with an assumed distribution between two bounds."""
 
     name: str
     """`wait`, or the field that it replaces."""
@@ -90,7 +90,7 @@ UNKNOWNS = (
 
 
 class TrialSample(NamedTuple):
-    """One run: what it takes in place of what nobody states; None where that is stated."""
+    """Settings of one run in place of unknown ones; None where the request states them."""
 
     robot: Robot
     wait: float | None

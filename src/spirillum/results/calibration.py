@@ -206,7 +206,7 @@ _HEADER = ",".join(_COLUMNS)
 
 
 def earlier_results(folder: Path) -> list[Path]:
-    """Files of an earlier calibration in a folder, which a new one takes the place of."""
+    """Files of an earlier calibration in a folder, which a new one replaces."""
     named = [folder / name for name in _RESULTS if (folder / name).is_file()]
     return named + [
         path

@@ -43,7 +43,9 @@ def _quantity(item: Mapping[str, Any]) -> tuple[str, str]:
 def _word(value: Any) -> str:
     if value is None:
         return "-"
-    if isinstance(value, tuple):
+    if isinstance(value, (tuple, list)):
+        if value and isinstance(value[0], (tuple, list)):
+            return f"{len(value)} points"
         return escape(", ".join(str(item) for item in value)) or "-"
     return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
 

@@ -125,7 +125,8 @@ def wire_error(geometry: RobotGeometry, radius: float) -> float:
     def of(length: float) -> float:
         return round(1e3 * length, 9)
 
-    like = math.isclose(of(geometry.tail_length), _LENGTH) and math.isclose(of(geometry.wire_diameter), _WIRE)
+    like = geometry.form.is_plain and math.isclose(of(geometry.tail_length), _LENGTH)
+    like = like and math.isclose(of(geometry.wire_diameter), _WIRE)
     known = _MEASURED.get(of(2.0 * radius), {}) if like else {}
     found = known.get((of(geometry.wavelength), of(geometry.amplitude)))
     return LARGEST_WIRE_ERROR if found is None else at_any_place(0.01 * found)
