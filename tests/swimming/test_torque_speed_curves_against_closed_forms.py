@@ -86,6 +86,13 @@ def test_a_file_gives_the_curve_back() -> None:
     assert sp.load(tomllib.loads(text)) == robot
 
 
+def test_a_curve_is_shown_in_the_units_of_people(run: Any, tmp_path: Any) -> None:
+    (tmp_path / "r.toml").write_text(robot_text(with_curve()))
+    shown = run("robot", "show", str(tmp_path / "r.toml")).out
+    assert "0, 2, 5" in shown
+    assert "0.2, 0.18, 0" in shown
+
+
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [

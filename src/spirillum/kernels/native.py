@@ -118,10 +118,14 @@ def rows_in_one_thread() -> Iterator[None]:
         _alone.reset(token)
 
 
+_byref: Callable[[Any], Any] = ctypes.byref
+_first_byte: Callable[[Any], Any] = ctypes.c_char.from_buffer
+
+
 def _pointer(array: np.ndarray[Any, Any]) -> Any:
     """Return what ctypes takes as a pointer to the first element; three times as fast where the array is writable."""
     try:
-        return ctypes.byref(ctypes.c_char.from_buffer(cast("bytearray", array)))
+        return _byref(_first_byte(array))
     except (TypeError, ValueError):  # of a read-only or an empty one
         return array.ctypes.data
 
@@ -176,16 +180,20 @@ class _Call:
         self._function.restype = _SCALARS.get(returned)
         passed: list[Any] = [_SCALARS.get(hint, ctypes.c_void_p) for hint in hints.values()]
         self._function.argtypes = passed + [ctypes.c_int64] * len(self._names)
-        self._passed: list[Callable[[Any], Any]] = [_PASSED.get(hint, _pointer) for hint in hints.values()]
+        self._places = [(n, argument) for n, argument in enumerate(self._arguments) if argument]
+        self._numbers = [(n, _PASSED[hint]) for n, hint in enumerate(hints.values()) if hint in _PASSED]
         self._is_truth = returned is bool
         self._last: tuple[list[tuple[int, ...]], _Sizes] | None = None
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
-        values = [
-            value if expected is None else expected.accepted(value)
-            for value, expected in zip(arguments, self._arguments, strict=True)
-        ]
-        sizes = self._sizes([value.shape for value, expected in zip(values, self._arguments, strict=True) if expected])
+        values, shapes = list(arguments), []
+        for n, expected in self._places:
+            value = values[n]
+            # Most arrays are as they should be: dtypes of one kind are one object.
+            if not (type(value) is np.ndarray and value.dtype is expected.dtype and value.flags.c_contiguous):
+                value = values[n] = expected.accepted(value)
+            shapes.append(value.shape)
+        sizes = self._sizes(shapes)
         if self._rows and not in_one_thread():
             return self._run_in_threads(values, sizes)
         return self._run(values, sizes)
@@ -198,12 +206,17 @@ class _Call:
         sizes: _Sizes = {}
         for expected, shape in zip(self._arrays, shapes, strict=True):
             expected.add_sizes(shape, sizes)
+        sizes = {name: sizes[name] for name in self._names}
         self._last = shapes, sizes
         return sizes
 
     def _run(self, values: list[Any], sizes: _Sizes) -> Any:
-        passed = [as_passed(value) for as_passed, value in zip(self._passed, values, strict=True)]
-        result = self._function(*passed, *[sizes[name] for name in self._names])
+        passed = values.copy()
+        for n, _ in self._places:
+            passed[n] = _pointer(values[n])
+        for n, number in self._numbers:
+            passed[n] = number(values[n])
+        result = self._function(*passed, *sizes.values())
         return bool(result) if self._is_truth else result
 
     def _run_in_threads(self, values: list[Any], sizes: _Sizes) -> None:

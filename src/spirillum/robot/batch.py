@@ -193,7 +193,7 @@ class RobotBatch:
             **{name: _column(items, source) for name, source in _columns("RobotBatch").items()},
             hand=hand,
             electrics=_electrics(items, hand),
-            curve=first.drive and first.drive.curve,
+            curve=first.drive.curve if first.drive else None,
             calibration={name: _factors(items, name) for name in first.calibration},
             shape=first.body.shape,
             front=first.body.front_end,

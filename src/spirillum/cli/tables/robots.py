@@ -11,7 +11,7 @@ from rich.table import Table
 
 from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid
 from spirillum.results.installation import report_lines
-from spirillum.units import in_unit
+from spirillum.units import for_people, in_unit, shown_in
 
 
 def robot(answer: Answer) -> Blocks:
@@ -21,7 +21,7 @@ def robot(answer: Answer) -> Blocks:
     rows = grid("fields", "field", "value", "unit")
     for name, item in fields.items():
         word = "none" if name in ("tail.taper", "channel", "seal") and item is None else _word(item)
-        value, unit = friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (word, "")
+        value, unit = _quantity(item) if isinstance(item, Mapping) else (word, "")
         if name not in ("name", "description", "reference"):
             rows.add_row(name, value, unit)
     yield rows
@@ -30,6 +30,14 @@ def robot(answer: Answer) -> Blocks:
         value, unit = friendly(item["value"], item["unit"])
         found.add_row(name.replace("_", " "), value, unit, item["meaning"])
     yield found
+
+
+def _quantity(item: Mapping[str, Any]) -> tuple[str, str]:
+    """A number, or several in one unit, as people read them."""
+    if not isinstance(item["value"], (list, tuple)):
+        return friendly(item["value"], item["unit"])
+    shown = for_people(item["unit"])
+    return ", ".join(f"{shown_in(value, shown):.4g}" for value in item["value"]), shown
 
 
 def _word(value: Any) -> str:
