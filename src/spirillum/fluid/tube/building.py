@@ -163,8 +163,9 @@ def _solved_tables(
     ]
     seconds = (time.perf_counter() - start) / len(every)
     return [
-        TubeTable(places.geometry, places.radius, table, *errors, len(some), seconds, _wire(places), places.stage.name)
-        for places, some, table, *errors in zip(every, nodes, packed, with_yaw, without, strict=True)
+        TubeTable(places.geometry, places.radius, table, error, level, len(some), seconds, _wire(places), stage.name)
+        for places, some, table, error, level in zip(every, nodes, packed, with_yaw, without, strict=True)
+        for stage in [places.stage]
     ]
 
 
