@@ -44,12 +44,6 @@ MODELS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 TORUS = {0.1: 0.7843079118776118, 0.001: 0.4410799504734741}
 """Broadside drag over 6 pi mu U (R + a), arXiv:2102.01791, Table 2."""
-RODENBORN = {
-    2.226: (6.2644, 131.928, 52.0588),
-    6.509: (11.0345, 81.928, 39.4118),
-    15.241: (7.8448, 68.072, 34.1176),
-}
-"""Wavelength over radius to thrust, torque and drag, measured: Rodenborn et al., PNAS 110:E338, 2013, Fig. 2."""
 CYLINDERS = {2.0: (0.25, 0.99), 4.0: (0.03, 0.90), 10.0: (-0.11, 0.86)}
 """Length over diameter to end corrections along and across: Tirado and Garcia de la Torre, 1979."""
 
@@ -138,8 +132,8 @@ def body_rows() -> list[Row]:
     return rows
 
 
-def published_rows() -> list[Row]:
-    """Wires of other shapes: the torus, exact, and helices measured in oil."""
+def torus_rows() -> list[Row]:
+    """The torus broadside on, exact."""
     rows = []
     accuracies: tuple[Accuracy, ...] = ("standard", "high")
     for accuracy in accuracies:
@@ -149,14 +143,6 @@ def published_rows() -> list[Row]:
             what = f"torus, a/R = {ratio:g}"
             found = _resistance(_ring(ratio), accuracy)[0, 0] / (6.0 * np.pi * (1.0 + ratio))
             rows.append({"wire": what, "accuracy": accuracy, "quantity": "drag", "error": found / exact - 1.0})
-        for wavelength, measured in RODENBORN.items():
-            what = f"helix, wavelength {wavelength:g} radii"
-            r = _resistance(_rodenborn(wavelength), accuracy)
-            found = (-r[0, 3] / 6.3**2, r[3, 3] / 6.3**3, r[0, 0] / 6.3)
-            rows += [
-                {"wire": what, "accuracy": accuracy, "quantity": quantity, "error": value / true - 1.0}
-                for quantity, value, true in zip(("thrust", "torque", "drag"), found, measured, strict=True)
-            ]
     return rows
 
 
@@ -167,13 +153,6 @@ def _resistance(wire: Wire, accuracy: Accuracy) -> np.ndarray:
 def _ring(ratio: float) -> Wire:
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
     return wire_along(np.stack([0.0 * angle, np.cos(angle), np.sin(angle)], axis=1), ratio, closed=True)
-
-
-def _rodenborn(wavelength: float) -> Wire:
-    """A helix of radius 6.3 mm, 130 mm long, of wire of radius 0.397 mm."""
-    xi = np.linspace(0.0, 130.0, 4001)
-    angle = -2.0 * np.pi * xi / (6.3 * wavelength)
-    return wire_along(np.stack([-xi, 6.3 * np.cos(angle), 6.3 * np.sin(angle)], axis=1), 0.397)
 
 
 def times(*, baseline: bool) -> Row:
@@ -224,7 +203,7 @@ def main() -> None:
         "tails": tails_rows(),
         "robot": robot_rows(),
         "bodies": body_rows(),
-        "published": published_rows(),
+        "torus": torus_rows(),
         "times": times(baseline=options.time),
     }
     print(json.dumps(answer, indent=1))

@@ -23,15 +23,13 @@
 #pragma GCC target("fma")
 #endif
 #endif
-#include "core.h"
+#include "drive.h"
 
 /* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/axial_motor.py. */
 typedef struct {
-    double torque, emf, inductance;                                 /* K_m, N m/A; K_b, V s/rad; L, H */
-    double constant, decay, decay_rate, growth, growth_rate, slope; /* R(I) of Table II */
-    double voltage, internal, polarity;                             /* V(I) of Table II; sign of the driven rate */
-    double speed, body, tail;                                       /* U, Omega, omega per joint torque */
-    double speed_flow, body_flow, tail_flow;                        /* U, Omega, omega per imposed mean flow */
+    Motor motor;
+    double speed, body, tail;                /* U, Omega, omega per joint torque */
+    double speed_flow, body_flow, tail_flow; /* U, Omega, omega per imposed mean flow */
 } AxialRobot;
 
 typedef struct {
@@ -71,12 +69,12 @@ typedef struct {
 /* The resistance that dI/dt rests on, back-emf included, over L. */
 static inline double resistance(const Block *b, int64_t k, double i) {
     const double size = fabs(i);
-    return b->always[k] + b->falling[k] * exponential(b->fall[k] * size) + b->rising[k] * exponential(b->rise[k] * size)
-         + b->bend[k] * size;
+    return winding(b->always[k], b->falling[k], exponential(b->fall[k] * size), b->rising[k],
+                   exponential(b->rise[k] * size), b->bend[k], size);
 }
 
 static inline double slope(const Block *b, int64_t k, double i, double r) {
-    return b->supply[k] - b->sag[k] * fabs(i) - r * i;
+    return excess_voltage(b->supply[k], b->sag[k], r, i, 0.0);
 }
 
 /* Fill a block; the largest rate L/R among its robots, 1/s. */
@@ -85,16 +83,17 @@ static double open_block(Block *b, const AxialRobot *robots, const AxialState *s
     double fastest = 0.0;
     for (int64_t k = 0; k < width; k++) {
         const AxialRobot *p = robots + k;
-        const double over = 1.0 / p->inductance, slip = p->tail - p->body;
-        const double driven = p->polarity * duty[k] / p->inductance;
-        b->always[k] = (p->constant + p->emf * slip * p->torque) * over;
-        b->falling[k] = p->decay * over;
-        b->fall[k] = -p->decay_rate;
-        b->rising[k] = p->growth * over;
-        b->rise[k] = p->growth_rate;
-        b->bend[k] = p->slope * over;
-        b->sag[k] = driven * p->internal;
-        b->supply[k] = driven * p->voltage - p->emf * (p->tail_flow - p->body_flow) * flow[k] * over;
+        const Motor *m = &p->motor;
+        const double over = 1.0 / m->inductance, slip = p->tail - p->body;
+        const double driven = m->polarity * duty[k] / m->inductance;
+        b->always[k] = (m->constant + m->back_emf * slip * m->torque_constant) * over;
+        b->falling[k] = m->decay * over;
+        b->fall[k] = -m->decay_rate;
+        b->rising[k] = m->growth * over;
+        b->rise[k] = m->growth_rate;
+        b->bend[k] = m->slope * over;
+        b->sag[k] = driven * m->internal_resistance;
+        b->supply[k] = driven * m->voltage - m->back_emf * (p->tail_flow - p->body_flow) * flow[k] * over;
         b->current[k] = states[k].current;
         b->charge[k] = b->squares[k] = b->heat[k] = 0.0;
         fastest = larger(fastest, b->always[k] + b->falling[k] + b->rising[k] + fabs(b->sag[k]));
@@ -147,14 +146,14 @@ static void close_step(const Block *b, int64_t k, const AxialRobot *p, AxialStat
                        double rest) {
     const double i = b->current[k], charge = b->charge[k] + i * rest, squares = b->squares[k] + i * i * rest;
     const double loss = b->heat[k] + resistance(b, k, i) * i * i * rest; /* all resistance times I^2, over L */
-    const double impulse = p->torque * charge, emf = p->emf * (p->tail - p->body) * p->torque;
+    const double impulse = p->motor.torque_constant * charge, emf = p->motor.back_emf * (p->tail - p->body) * p->motor.torque_constant;
     state->current = i;
     state->position += p->speed * impulse + p->speed_flow * carried;
     state->tail_angle += p->tail * impulse + p->tail_flow * carried;
     state->body_angle += p->body * impulse + p->body_flow * carried;
-    state->charge += p->polarity * duty * charge;
+    state->charge += p->motor.polarity * duty * charge;
     state->squared_current += squares;
-    state->heat += p->inductance * loss - emf * squares;
+    state->heat += p->motor.inductance * loss - emf * squares;
 }
 
 EXPORT void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
@@ -169,6 +168,23 @@ EXPORT void advance_axial(const double *parameters, double *states, double dt, c
         for (int64_t k = 0; k < width; k++)
             close_step(&block, k, robots + k, own + k, duty[low + k], flow[low + k] * dt, rest);
     }
+}
+
+/* Derivative of the state, which rests on the current alone. */
+EXPORT void axial_rates(const double *parameters, double current, double duty, double flow, double *out) {
+    const AxialRobot *p = (const AxialRobot *)parameters;
+    const Motor *m = &p->motor;
+    const double torque = m->torque_constant * current, square = current * current;
+    const double tail = p->tail * torque + p->tail_flow * flow, body = p->body * torque + p->body_flow * flow;
+    *(AxialState *)out = (AxialState){
+        .current = m->polarity * current_rate(m, duty, m->polarity * current, m->polarity * (tail - body)),
+        .position = p->speed * torque + p->speed_flow * flow,
+        .tail_angle = tail,
+        .body_angle = body,
+        .charge = m->polarity * duty * current,
+        .squared_current = square,
+        .heat = winding_resistance(m, current) * square,
+    };
 }
 
 /* Smoothed sliding speed of a body with a drag at its lowest point, m/s; r is (U, Omega, omega), the tail's rate given. */

@@ -16,9 +16,9 @@ typedef struct {
     double hand_k, root, length;     /* h k, rad/m; x of the root and axial length, m */
 } Wire;
 
-/* A station along the wire: distance from the root and its place at phase 0, m. */
+/* A station along a wire: distance from the root and its place at phase 0, m; angle of its wire against the first. */
 typedef struct {
-    double xi, x, y, z;
+    double xi, x, y, z, turn;
 } Station;
 
 /* A place of the robot near the wall. */

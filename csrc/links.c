@@ -73,12 +73,14 @@ void assemble(const double fluid[RATES][RATES], const Links *links, double a[RAT
     a[JOINT][JOINT] = 1.0;
 }
 
-/* Torque of the drive along its direction, N m; `spin` is the tail's rate about the motor axis without that torque, and
- * what the torque adds to it. */
-double drive_torque(const Drive *drive, double current, double spin, double spin_per_torque) {
-    if (drive->kind == MOTOR) return drive->polarity * drive->torque_constant * current;
+/* Torque of the drive along its direction, N m; the rates without that torque, and what the torque adds to each. */
+double drive_torque(const Drive *drive, double current, const double free[RATES], const double per_torque[RATES]) {
+    const double sense = drive->motor.polarity;
+    if (drive->kind == MOTOR) return sense * drive->motor.torque_constant * current;
+    if (drive->kind == CURVE) return sense * curve_torque(&drive->curve, drive->duty, sense * free[JOINT], per_torque[JOINT]);
     if (drive->kind == TORQUE) return drive->duty * drive->given;
-    if (drive->kind == RATE && drive->duty > 0.0) return (drive->given - spin) / spin_per_torque;
+    if (drive->kind == RATE && drive->duty > 0.0)
+        return (drive->given - free[SPIN] - free[JOINT]) / (per_torque[SPIN] + per_torque[JOINT]);
     return 0.0;
 }
 
@@ -140,16 +142,13 @@ void eliminate(double a[RATES][RATES], double b[RATES][2]) {
     }
 }
 
-/* Motor current (17) and its integrals; `slip` is the rate of the joint in the motor's own sense. */
-static void differentiate_motor(const Drive *drive, double current, double slip, State *dy) {
-    const double size = fabs(current);
-    const double resistance = drive->constant + drive->decay * exp(-drive->decay_rate * size)
-                            + drive->growth * exp(drive->growth_rate * size) + drive->slope * size;
-    const double supply = drive->duty * (drive->voltage - drive->internal_resistance * size);
-    dy->current = (supply - resistance * current - drive->back_emf * slip) / drive->inductance;
-    dy->electrical = supply * current;
-    dy->resistive = resistance * current * current;
-    dy->conversion = (drive->back_emf - drive->torque_constant) * slip * current;
+/* Motor current (17) and its integrals; `rate` is that of the joint in the motor's own sense. */
+static void differentiate_motor(const Drive *drive, double current, double rate, State *dy) {
+    const Motor *m = &drive->motor;
+    dy->current = current_rate(m, drive->duty, current, rate);
+    dy->electrical = drive->duty * (m->voltage - m->internal_resistance * fabs(current)) * current;
+    dy->resistive = winding_resistance(m, current) * current * current;
+    dy->conversion = (m->back_emf - m->torque_constant) * rate * current;
     dy->charge = drive->duty * current;
 }
 
@@ -169,5 +168,5 @@ void differentiate(const State *y, const Drive *drive, const double rotation[3][
         .flow = seen->flow_power,
     };
     for (int n = 0; n < 3; n++) dy->position[n] = rotation[n][0] * u[0] + rotation[n][1] * u[1] + rotation[n][2] * u[2];
-    if (drive->kind == MOTOR) differentiate_motor(drive, y->current, drive->polarity * u[JOINT], dy);
+    if (drive->kind == MOTOR) differentiate_motor(drive, y->current, drive->motor.polarity * u[JOINT], dy);
 }

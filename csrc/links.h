@@ -7,7 +7,7 @@
 #ifndef SPIRILLUM_LINKS_H
 #define SPIRILLUM_LINKS_H
 
-#include "core.h"
+#include "drive.h"
 
 enum { RATES = 7, SPIN = 3, JOINT = 6 }; /* q = (U, Omega_b, omega_m), body axes about the origin; Omega_x; omega_m */
 
@@ -42,7 +42,7 @@ typedef struct {
 } Seen;
 
 enum { STATES = sizeof(State) / sizeof(double), SEEN = sizeof(Seen) / sizeof(double) };
-enum { MOTOR, TORQUE, RATE, MAGNETIC }; /* kinds of drives */
+enum { MOTOR, TORQUE, RATE, MAGNETIC, CURVE }; /* kinds of drives */
 
 typedef struct {
     double kind, fixed, duty; /* one of the kinds; whether the joint is fixed; duty of the remote */
@@ -50,11 +50,10 @@ typedef struct {
         double given;     /* prescribed torque, N m, or rate, rad/s */
         double moment[3]; /* magnetic moment, A m^2 */
     };
-    double field, field_rate;                                       /* T; its rotation rate, rad/s */
-    double polarity, torque_constant, back_emf, inductance;         /* sign; K_m, N m/A; K_b, V s/rad; L, H */
-    double constant, decay, decay_rate, growth, growth_rate, slope; /* of R(I), Table II */
-    double voltage, internal_resistance;                            /* of the battery, V and ohm */
+    double field, field_rate;           /* T; its rotation rate, rad/s */
+    Motor motor;                        /* of a curve its polarity alone */
     double axis_y, axis_z, field_phase; /* of the field's axis, a unit vector, across the lab's x; at time 0, rad */
+    Curve curve;
 } Drive;
 
 /* Submerged weight of body and rotor, N, and its first moments about the origin at phase 0, N m. */
@@ -76,7 +75,7 @@ void axes_of(const State *y, double rotation[3][3]);
 void weight_loads(const Weight *weight, double phase, const double rotation[3][3], double force[RATES]);
 void field_loads(const Drive *drive, double time, const double rotation[3][3], double force[RATES]);
 void assemble(const double fluid[RATES][RATES], const Links *links, double a[RATES][RATES]);
-double drive_torque(const Drive *drive, double current, double spin, double spin_per_torque);
+double drive_torque(const Drive *drive, double current, const double free[RATES], const double per_torque[RATES]);
 void note_powers(const double fluid[RATES][RATES], const Links *links, const double field[RATES], Seen *seen);
 void turn_about_axis(const double *drag, double phase, double *out, int size);
 void eliminate(double a[RATES][RATES], double b[RATES][2]);

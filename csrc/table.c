@@ -10,6 +10,9 @@
  * The end of a tail of length L is off the axis by L sin(psi) across the plane of the offset and by L sin(p) - e along
  * it, so that sin(psi_c)^2 is a quadratic polynomial of sin(p) and e.
  *
+ * Outside the range the outer part is that of its end: how far beyond it a tail touches the glass depends on its phase.
+ * The largest yaw is that at a pitch of the last node with yaw at most: nearer to the touching pitch it goes to zero.
+ *
  * Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - |f|) between the nodes,
  * one nose up and one nose down, linear in t below the first, a polynomial of degree six in artanh(g/1.2), linear beyond
  * the last node, and a Fourier sum in the phase: the outer part is positive definite everywhere.
@@ -109,6 +112,7 @@ static void gap_weights(const double *nodes, int64_t count, double t, double *ou
 typedef struct {
     double t, f;
     double of_gap[MOST_NODES]; /* weights of the nodes in t */
+    double yawed_pitch;        /* at which the largest yaw is taken, rad */
     bool within;               /* the range of pitches */
 } Position;
 
@@ -121,8 +125,13 @@ static Position position_of(const Table *table, Pose pose) {
     double most = 0.0;
     for (int64_t i = 0; i < table->gaps; i++) most += p.of_gap[i] * table->most[i][lowered];
     p.f = pose.pitch / most;
-    p.within = !(fabs(p.f) > PITCH_SLACK || fabs(pose.pitch) > STEEPEST[lowered] * (1.0 + ROUNDING));
-    if (!p.within) p.f = copysign(smaller(PITCH_SLACK, STEEPEST[lowered] / most), p.f);
+    p.within = fabs(p.f) <= PITCH_SLACK && fabs(pose.pitch) <= STEEPEST[lowered] * (1.0 + ROUNDING);
+    p.f = copysign(smaller(fabs(p.f), smaller(PITCH_SLACK, STEEPEST[lowered] / most)), p.f);
+    p.yawed_pitch = pose.pitch;
+    if (table->yaw_pitches > 0) {
+        const double last = fabs(table->yaw_pitch_nodes[lowered ? 0 : table->yaw_pitches - 1]) * most;
+        p.yawed_pitch = clamped(pose.pitch, -last, last);
+    }
     return p;
 }
 
@@ -149,8 +158,8 @@ static void add_weighted(double weight, const double *restrict values, int64_t c
     for (int64_t n = 0; n < count; n++) out[n] += weight * values[n];
 }
 
-/* Add what a share of the largest yaw makes of the coefficients; whether it is within the range. */
-static bool add_yaw(const Table *table, const Position *p, double share, double *out) {
+/* Add what a share of the largest yaw makes of the coefficients. */
+static void add_yaw(const Table *table, const Position *p, double share, double *out) {
     const int64_t gaps = table->yaw_gaps, pitches = table->yaw_pitches, block = table->phases * FACTOR;
     const double *nodes = table->yaw_pitch_nodes;
     double of_gap[MOST_NODES], of_pitch[MOST_NODES], sizes[MOST_NODES], powers[YAW_ORDERS];
@@ -161,8 +170,7 @@ static bool add_yaw(const Table *table, const Position *p, double share, double 
     const int64_t step = p->f < 0.0 ? -1 : 1, count = p->f < 0.0 ? level + 1 : pitches - level;
     for (int64_t j = 0; j < count; j++) sizes[j] = fabs(nodes[level + step * j]);
     pitch_weights(sizes, count, fabs(p->f), BEYOND_YAWED, of_pitch);
-    const bool within = fabs(share) <= YAW_SLACK;
-    yaw_powers(within ? share : copysign(YAW_SLACK, share), powers);
+    yaw_powers(clamped(share, -YAW_SLACK, YAW_SLACK), powers);
     for (int64_t i = 0; i < gaps; i++) {
         for (int64_t j = 0; j < count; j++) {
             const double *node = table->yawed + (i * pitches + level + step * j) * YAW_ORDERS * block;
@@ -170,7 +178,6 @@ static bool add_yaw(const Table *table, const Position *p, double share, double 
             for (int n = 0; n < YAW_ORDERS; n++) add_weighted(weight * powers[n], node + n * block, block, out);
         }
     }
-    return within;
 }
 
 /* Fourier coefficients of the outer part's factor, (phases, FACTOR); how the range was left. */
@@ -188,8 +195,10 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
         }
     }
     if (pose.yaw != 0.0) {
-        const double most = largest_yaw_at(table->yaw_limit, pose.offset / table->radius, pose.pitch);
-        if (!(table->yaw_gaps > 0 && add_yaw(table, p, pose.yaw / most, out))) return TOO_FAR_YAWED;
+        const double most = largest_yaw_at(table->yaw_limit, pose.offset / table->radius, p->yawed_pitch);
+        if (!(table->yaw_gaps > 0)) return TOO_FAR_YAWED;
+        add_yaw(table, p, pose.yaw / most, out);
+        if (!(fabs(pose.yaw) <= YAW_SLACK * most)) return TOO_FAR_YAWED;
     }
     return p->within ? INSIDE : TOO_FAR_PITCHED;
 }

@@ -78,11 +78,14 @@ typedef struct {
     double opened[RATES];        /* mean flow of open ends per q */
 } Fluid;
 
+static const double FOLLOWED = 20.0 * PI / 180.0; /* tilt up to which a run goes on outside the table's range */
+
 static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
     const Tube *tube = robot->tube;
     const Pose pose = {seen->offset, seen->pitch, seen->yaw};
     double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
     seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
+    if (fabs(pose.pitch) < FOLLOWED && fabs(pose.yaw) < FOLLOWED) seen->outside = 0.0;
     turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
     turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
     const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
@@ -129,24 +132,29 @@ static double station_square(const Touch *t, const Station *station) {
     return d[0] * d[0] + d[1] * d[1];
 }
 
-/* Look for contacts of the wire where its stations are farthest from the axis. */
+/* Look for contacts of the wires, one after the other, where their stations are farthest from the axis. */
 static void touch_wire(Touch *t) {
     const TubeRobot *robot = t->robot;
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
     if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
     double before = 0.0, here = station_square(t, robot->stations);
+    bool first = true;
     for (int64_t k = 0; k <= last; k++) {
-        const double after = k < last ? station_square(t, robot->stations + k + 1) : 0.0;
-        if (here >= before && here > after && t->balance->count < MOST_CONTACTS) {
-            const Station *at = robot->stations + k;
-            const double bracket[3] = {at[k > 0 ? -1 : 0].xi, at->xi, at[k < last ? 1 : 0].xi};
-            const Nearest nearest = wire_nearest(robot->wire, t->y, t->rotation, tube->radius, bracket);
+        const Station *at = robot->stations + k;
+        const double next = k < last ? station_square(t, at + 1) : 0.0;
+        const bool tip = k == last || at[1].turn != at->turn;
+        if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
+            const double bracket[3] = {at[first ? 0 : -1].xi, at->xi, at[tip ? 0 : 1].xi};
+            State turned = *t->y;
+            turned.phase += at->turn;
+            const Nearest nearest = wire_nearest(robot->wire, &turned, t->rotation, tube->radius, bracket);
             t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
             add_contact(t, &nearest, 1.0);
         }
-        before = here;
-        here = after;
+        first = tip;
+        before = tip ? 0.0 : here;
+        here = next;
     }
 }
 
@@ -222,51 +230,99 @@ static Slice slice_at(const TubeRobot *robot, const State *y, const double rotat
     return s;
 }
 
-/* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin.
- *
- * A film loses pressure at the ends of the body and along it where it is tilted, which slices do not know: their
- * pressure is scaled by what leaves the rest of the table's film positive. The forces are then a convex function's. */
-static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Fluid *fluid,
-                       const Seen *seen, Balance *b) {
+/* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin. */
+static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Seen *seen,
+                       Balance *b) {
     const Film *film = &robot->table.film;
     const double half = 0.5 * (film->front - film->rear);
-    double sliced[6][6] = {{0.0}};
     b->slice_count = 0;
     b->bound = robot->tube->cavitation;
+    b->viscosity = robot->tube->viscosity;
     if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * film->body)) return;
     for (int n = 0; n < MOST_SLICES; n++) {
         const double angle = PI * (n + 0.5) / MOST_SLICES;
         const double x = film->rear + half * (1.0 - cos(angle)), length = half * sin(angle) * PI / MOST_SLICES;
-        const Slice *s = b->slices + b->slice_count;
         b->slices[b->slice_count++] = slice_at(robot, y, rotation, x, length);
+    }
+}
+
+/* Scale the slices' pressure.
+ *
+ * A film loses pressure at the ends of the body and along it where it is tilted, which slices do not know: their
+ * pressure is scaled by what leaves the rest of the table's film positive. The forces are then a convex function's. */
+static void scale_slices(const double film[6][6], Balance *b) {
+    double sliced[6][6] = {{0.0}};
+    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
         const double width = sqrt(2.0 * s->bend * s->gap), squeeze = 3.0 * PI * s->bend * width / squared(s->gap);
         const double roll = 2.0 * PI * width * squared(width) / (s->bend * squared(s->gap));
         for (int i = 0; i < 6; i++)
             for (int j = 0; j < 6; j++)
-                sliced[i][j]
-                    += length
-                     * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
+                sliced[i][j] += s->length
+                              * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
     }
-    b->viscosity = robot->tube->viscosity / larger(largest_share(fluid->film, sliced), 1.0);
+    b->viscosity /= larger(largest_share(film, sliced), 1.0);
+}
+
+/* Whether any slice cavitates at the rates; scaled, its pressure is less. */
+static bool cavitates_at(const Balance *b, const double q[RATES]) {
+    for (int64_t n = 0; n < b->slice_count; n++)
+        if (lift_at(b, b->slices + n, q).normal != 0.0) return true;
+    return false;
+}
+
+/* Rates in balance; what is left of it. Where no slice cavitates at those without slices, they are the rates. */
+static double balance_film(Balance *b, const double film[6][6], double q[RATES], double left[RATES]) {
+    const int64_t slices = b->slice_count;
+    if (slices > 0 && cavitates_at(b, q)) {
+        scale_slices(film, b);
+        return balance_rates(b, q, left);
+    }
+    b->slice_count = 0;
+    const double size = balance_rates(b, q, left);
+    b->slice_count = slices;
+    if (slices == 0 || !cavitates_at(b, q)) {
+        b->slice_count = 0;
+        return size;
+    }
+    scale_slices(film, b);
+    return balance_rates(b, q, left);
+}
+
+/* The same under a curve: a straight piece of it is a friction of the joint, and the next one is tried where it ends. */
+static double solve_on_curve(Balance *b, const Drive *drive, Seen *seen) {
+    const double sense = drive->motor.polarity, own = b->a[JOINT][JOINT], force = b->force[JOINT];
+    double *q = seen->rates, left[RATES];
+    int64_t number = -1;
+    for (int n = 0; n < MOST_POINTS; n++) number = next_piece(&drive->curve, number, sense * q[JOINT]);
+    Piece piece = {0.0, 0.0};
+    for (int64_t before = -2, n = 0; number != before && n < MOST_TRIALS; n++) {
+        piece = piece_of(&drive->curve, before = number, drive->duty);
+        b->a[JOINT][JOINT] = own - piece.slope;
+        b->force[JOINT] = force + sense * piece.torque;
+        seen->balance = balance_rates(b, q, left);
+        number = next_piece(&drive->curve, before, sense * q[JOINT]);
+    }
+    return sense * piece.torque + piece.slope * q[JOINT];
 }
 
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
  * a trial inside the wall has none, and the next one must not begin with them. */
-static double solve_rates(Balance *b, const Drive *drive, double current, Seen *seen) {
+static double solve_rates(Balance *b, const Drive *drive, const double film[6][6], double current, Seen *seen) {
     double *q = seen->rates, left[RATES];
     bool finite = true;
     for (int i = 0; i < RATES; i++) finite = finite && isfinite(q[i]);
     for (int i = 0; i < RATES && !finite; i++) q[i] = 0.0;
     b->along = driven_rate(drive);
     b->prescribed = drive->kind == RATE && drive->duty > 0.0;
-    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, 0.0, 1.0);
+    if (drive->kind == CURVE) return solve_on_curve(b, drive, seen);
+    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, q, q);
     b->force[b->along] += torque;
     if (drive->fixed != 0.0) {
         b->force[JOINT] = q[JOINT] = 0.0;
         for (int64_t n = 0; n < b->count; n++) b->contacts[n].rows[0][JOINT] = b->contacts[n].rows[1][JOINT] = 0.0;
     }
     if (b->prescribed) q[b->along] += drive->given - q[SPIN] - q[JOINT];
-    seen->balance = balance_rates(b, q, left);
+    seen->balance = balance_film(b, film, q, left);
     return b->prescribed ? left[b->along] : torque;
 }
 
@@ -335,11 +391,11 @@ void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen 
     for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);
     for (int i = 0; i < RATES; i++) asperities[i] = balance.force[i];
-    set_slices(robot, y, t.rotation, &fluid, seen, &balance);
+    set_slices(robot, y, t.rotation, seen, &balance);
     field_loads(&links->drive, time, t.rotation, field);
     assemble(fluid.matrix, links, balance.a);
     for (int i = 0; i < RATES; i++) balance.force[i] += weight[i] + field[i] + fluid.stream[i];
-    seen->drive_torque = solve_rates(&balance, &links->drive, y->current, seen);
+    seen->drive_torque = solve_rates(&balance, &links->drive, fluid.film, y->current, seen);
     note_powers(fluid.matrix, links, field, seen);
     seen->flow_power = 0.0;
     for (int i = 0; i < RATES; i++) {

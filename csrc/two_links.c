@@ -104,8 +104,13 @@ void two_links_rates(const TwoLinks *robot, const State *y, double time, Seen *s
         b[i][1] = i == along ? 1.0 : 0.0;
     }
     eliminate(a, b); /* the joint's rate is 0 where it is fixed */
-    const double torque = drive_torque(drive, y->current, b[SPIN][0] + b[JOINT][0], b[SPIN][1] + b[JOINT][1]);
-    for (int i = 0; i < RATES; i++) seen->rates[i] = b[i][0] + torque * b[i][1];
+    double free[RATES], per_torque[RATES];
+    for (int i = 0; i < RATES; i++) {
+        free[i] = b[i][0];
+        per_torque[i] = b[i][1];
+    }
+    const double torque = drive_torque(drive, y->current, free, per_torque);
+    for (int i = 0; i < RATES; i++) seen->rates[i] = free[i] + torque * per_torque[i];
     seen->drive_torque = torque;
     seen->tail_gap = INFINITY;
     seen->outside = 0.0;

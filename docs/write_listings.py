@@ -29,7 +29,15 @@ from spirillum.units import Kind, for_people, show
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 MARKED = re.compile(r"(?<=<!-- written: )([\w-]+)((?: [^\n]*?)?)( -->\n\n)(.*?)(?=\n<!-- end of written -->)", re.S)
-DEAR = ("study-variables", "simulation-variables", "sweep-variables", "claims", "study-figure")
+DEAR = (
+    "study-variables",
+    "simulation-variables",
+    "sweep-variables",
+    "claims",
+    "study-figure",
+    "validation-sources",
+    "validation-case",
+)
 """Listings for which robots have to swim: a slow test compares them."""
 
 Rows = Iterable[Sequence[str]]
@@ -308,6 +316,61 @@ def study_figure(name: str) -> str:
     return f"![{picture.alternative}](images/study/{name}.png)\n\n*{picture.caption.replace('*', '')}*\n"
 
 
+@lru_cache(maxsize=1)
+def _validated() -> dict[str, Any]:
+    """The results of all validation cases by name."""
+    from spirillum import validate
+
+    return {result.name: result for result in validate().cases}
+
+
+def validation_sources() -> str:
+    """A row for each validation case."""
+    rows = []
+    for name, result in _validated().items():
+        ratios = "; ".join(
+            f"{one.quantity} {one.mean:.2f}{f' (sd {one.deviation:.2f})' if one.count > 1 else ''}"
+            for one in result.summaries
+        )
+        published = sum(one.count for one in result.summaries)
+        covered = f"{sum(one.covered for one in result.summaries)} of {published}" if published else ""
+        verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
+        cells = result.case.kind, result.case.read, ratios, covered, verdicts
+        rows.append((f"[`{name}`](#{name})", result.case.title, *cells))
+    header = ("Case", "What", "Kind", "Read", "Ours over published, mean", "Covered", "Statements")
+    return table(header, rows)
+
+
+def validation_case(name: str) -> str:
+    """A validation case: figure, what it shows, its rows, what the assumptions do, statements, source."""
+    from spirillum.papers.validation_figure import case_picture
+    from spirillum.results.validation import HEADER, table_of
+
+    result = _validated()[name]
+    case, picture = result.case, case_picture(result)
+    references = ", ".join(f"[`{key}`](references.md#{key})" for key in case.references)
+    parts = [
+        f"{case.title} ({references}).",
+        f"![{picture.alternative}](images/validation/{name}.png)",
+        " ".join(case.explanation.split()),
+        table(HEADER, table_of(result)),
+    ]
+    if case.assumptions:
+        lines = [f"- {one.name}: {', '.join(one.values)}" for one in case.assumptions]
+        parts.append("Assumed beyond the publication, each value tried alone:\n\n" + "\n".join(lines))
+    if case.statements:
+        told = zip(result.statements, result.read, strict=True)
+        claims = [(one.claim, read, one.computed, one.verdict) for one, read in told]
+        parts.append(table(("Statement", "Read", "Computed", "Verdict"), claims))
+    elif result.statements:
+        verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
+        parts.append(f"Statements: {verdicts}; each with its reason on the page of [the paper's study](study.md).")
+    robots = [robot for robot in dict.fromkeys((case.robot, *(point.robot for point in case.points))) if robot]
+    start = ", ".join(f"`spirillum robot new mine.toml --from {robot}`" for robot in robots)
+    parts.append(f"Read ({case.read}): {' '.join(case.source.split())}. Robot files: {start}.")
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
 def models() -> str:
     """The hydrodynamic models with what they cost."""
     from spirillum.fluid.registry import MODELS
@@ -404,32 +467,6 @@ def _option(parameter: Any) -> Option:
     return Option(names, metavar, default, parameter.help or "")
 
 
-def file_listing(path: str) -> str:
-    """A file of the project as it is."""
-    kind = {".toml": "toml", ".py": "python"}[Path(path).suffix]
-    return f"```{kind}\n{(ROOT / path).read_text(encoding='utf-8').strip()}\n```\n"
-
-
-def function_listing(words: str) -> str:
-    """A function of a script: `PATH NAME`."""
-    import ast
-
-    path, name = words.split()
-    text = (ROOT / path).read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    found = next(item for item in tree.body if isinstance(item, ast.FunctionDef) and item.name == name)
-    return f"```python\n{ast.get_source_segment(text, found)}\n```\n"
-
-
-def part_listing(words: str) -> str:
-    """The lines of a script from one that starts with a word to the next that starts with another: `PATH FROM TO`."""
-    path, first, last = words.split()
-    lines = (ROOT / path).read_text(encoding="utf-8").splitlines()
-    start = next(n for n, line in enumerate(lines) if line.startswith(first))
-    end = next(n for n, line in enumerate(lines) if n >= start and line.startswith(last))
-    return "```toml\n" + "\n".join(lines[start : end + 1]) + "\n```\n"
-
-
 def notes(severity: str) -> str:
     """The codes of notes of one severity, each with what it means and an anchor of its own."""
     from spirillum.notes import KINDS
@@ -455,13 +492,12 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "simulation-variables": simulation_variables,
     "sweep-variables": sweep_variables,
     "claims": claims,
+    "validation-sources": validation_sources,
+    "validation-case": validation_case,
     "models": models,
     "reference-list": reference_list,
     "command-options": command_options,
     "shared-options": shared_options,
-    "file": file_listing,
-    "function": function_listing,
-    "part": part_listing,
     "notes": notes,
 }
 
@@ -476,12 +512,23 @@ def renewed(text: str) -> str:
     return MARKED.sub(lambda mark: f"{mark[1]}{mark[2]}{mark[3]}{written(mark[1], mark[2])}", text)
 
 
+def draw_validation() -> None:
+    """Draw the figures of the validation cases."""
+    from spirillum.papers.validation_figure import case_picture
+
+    folder = DOCS / "images" / "validation"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, result in _validated().items():
+        case_picture(result).figure().savefig(folder / f"{name}.png", dpi=150)
+
+
 def draw_pictures() -> None:
-    """Draw the figures of the paper's study, and run the example whose picture a page shows."""
+    """Draw the figures of validation and of the paper's study, and run the example whose picture a page shows."""
     import runpy
 
     from spirillum.papers.registry import figures_of
 
+    draw_validation()
     folder = DOCS / "images" / "study"
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in figures_of(_studied()).items():

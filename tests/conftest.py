@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The slowest files first: workers end at about the same time, and do not compile the same loops side by side."""
+    """The slowest files first: workers end at about the same time."""
     rank = {line.split()[1]: number for number, line in enumerate(_DURATIONS.read_text().splitlines())}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 

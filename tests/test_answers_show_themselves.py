@@ -129,7 +129,7 @@ def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
     assert drawn._repr_png_().startswith(b"\x89PNG")
     assert drawn.save(tmp_path / "models.pdf").read_bytes().startswith(b"%PDF")
     study = {"models": ["sbt"], "friction": ["rotor"], "robots": ["biorob2012-wide", "biorob2012-narrow"]}
-    assert len(sp.plot(sp.study(study)).figure.axes) == 3
+    assert len(sp.plot(sp.study(study)).figure.axes) == 4
     assert sp.plot(sp.load("biorob2012-wide")).figure.axes
     task = {"kind": "stop-at", "at": "0.2 mm", "tolerance": "0.1 mm"}
     assert len(sp.plot(sp.control("biorob2012-wide", task, plant={"model": "rft"})).figure.axes) == 3

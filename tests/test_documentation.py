@@ -17,7 +17,8 @@ from spirillum.measurement.observations import COLUMNS
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 INSTALL = (
-    "python3 -m venv .venv && . .venv/bin/activate && pip install . && spirillum study",
+    "python3 -m venv .venv && . .venv/bin/activate && pip install . "
+    "&& spirillum predict biorob2012-wide && spirillum study",
     'python3 -m venv .venv && . .venv/bin/activate && pip install -e ".[test]" && pytest',
 )
 

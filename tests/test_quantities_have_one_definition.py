@@ -22,7 +22,7 @@ def registered(name: str) -> str | None:
     for part in PARTS:
         if name not in QUANTITIES:
             name = name.removeprefix(part)
-    for end in ("_on", "_steady"):
+    for end in ("_on", "_steady", "_held", "_trial"):
         if name not in QUANTITIES:
             name = name.removesuffix(end)
     name = name if name in QUANTITIES else name.partition("_at_")[0]

@@ -1,4 +1,4 @@
-"""Draw the picture of docs/contact.md: the rotor's load, and what film and contact do to B_eff, body rate and azimuth.
+"""Draw the pictures of docs/contact.md: load of the rotor, B_eff, body rate and azimuth, and forces towards the wall.
 
 Some twenty seconds; the robots are the presets, laid down and let go as `spirillum study --predicted` does.
 """
@@ -115,6 +115,30 @@ def draw_azimuths(axes: Axes) -> None:
     axes.set_title("c  and carry it to opposite sides", loc="left")
 
 
+FORCES = {"weight_load": "weight", "film_load": "film", "outer_load": "other fluid", "contact_load": "asperities"}
+
+
+def draw_forces() -> None:
+    """Forces towards the wall of a robot that has waited ten minutes, and the yaw that moves them."""
+    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "20 s"}, in_tube={"wait": "600 s"})
+    with styled():
+        figure = new_figure(7.6, 2.9)
+        left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+        for (name, words), colour in zip(FORCES.items(), ("black", "blue", "green", "vermillion"), strict=True):
+            left.plot(run["time"], 1e3 * run[name], color=COLOURS.get(colour, colour), label=words)
+        left.set_ylabel("force towards the wall (mN)")
+        left.legend(loc="upper left", ncols=2)
+        left.set_ylim(-160.0, 210.0)
+        left.set_title("a  The film pulls, asperities carry", loc="left")
+        right.plot(run["time"], np.degrees(run["wall_yaw"]), color=COLOURS["orange"])
+        right.set_ylabel("yaw (deg)")
+        right.set_title("b  as the tail yaws the body", loc="left")
+        for axes in (left, right):
+            axes.set_xlabel("time with the motor on (s)")
+        figure.tight_layout()
+        figure.savefig(TARGET.with_name("contact-forces.png"), dpi=130)
+
+
 def draw() -> None:
     """Compute, draw, save."""
     dataset = sp.study(STUDY).isel(wavelength=0, amplitude=0)
@@ -130,3 +154,4 @@ def draw() -> None:
 
 if __name__ == "__main__":
     draw()
+    draw_forces()

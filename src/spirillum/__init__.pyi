@@ -47,11 +47,13 @@ from .measurement.measure import Measurement as Measurement
 from .measurement.proposal import Proposal as Proposal
 from .measurement.proposal import propose_setup as propose_setup
 from .pages.launch import page as page
+from .papers.validation import Validation as Validation
 from .results.calibration import calibrate as calibrate
 from .results.installation import InstallationReport as InstallationReport
 from .results.installation import report as report
 from .results.measurement import measure as measure
 from .results.study import study as study
+from .results.validation import validate as validate
 from .robot.batch import RobotBatch as RobotBatch
 from .robot.load import load as load
 from .robot.robot import Robot as Robot

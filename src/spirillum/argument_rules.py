@@ -12,7 +12,7 @@ class Rule(NamedTuple):
     """Options that a request in some state has no use for."""
 
     state: str
-    """Of the request, such as `run`: its command tells which states hold."""
+    """States of the request, such as `run`: its command defines which of them hold."""
     options: tuple[str, ...]
     """Names of the command's parameters."""
     conflict: str

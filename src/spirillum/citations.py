@@ -105,6 +105,41 @@ REFERENCES: dict[str, str] = {
         "B. Rodenborn, C.-H. Chen, H. L. Swinney, B. Liu and H. P. Zhang. Propulsion of microorganisms by a helical "
         "flagellum. Proceedings of the National Academy of Sciences 110:E338-E347, 2013."
     ),
+    "lisevich2024": (
+        "I. Lisevich and others. Physics of swimming and its fitness cost determine "
+        "strategies of bacterial investment in flagellar motility. bioRxiv, doi:10.1101/2024.03.30.587422, 2024."
+    ),
+    "djutanta2023": (
+        "F. Djutanta and others. Decoding the hydrodynamic properties of microscale helical propellers from Brownian "
+        "fluctuations. Proceedings of the National Academy of Sciences 120:e2220033120, 2023 (arXiv:2208.13854)."
+    ),
+    "purcell1997": (
+        "E. M. Purcell. The efficiency of propulsion by a rotating flagellum. "
+        "Proceedings of the National Academy of Sciences 94:11307-11311, 1997."
+    ),
+    "das2018": (
+        "D. Das and E. Lauga. Computing the motor torque of Escherichia coli. Soft Matter, 2018 (arXiv:1806.09694)."
+    ),
+    "magariyama1995": (
+        "Y. Magariyama and others. Simultaneous measurement of bacterial flagellar rotation rate and swimming speed. "
+        "Biophysical Journal 69:2154-2162, 1995."
+    ),
+    "martinez2014": (
+        "V. A. Martinez and others. Flagellated bacterial motility in polymer solutions. "
+        "Proceedings of the National Academy of Sciences 111:17771-17776, 2014."
+    ),
+    "caldag2019": (
+        "H. O. Caldag and S. Yesilyurt. Trajectories of magnetically-actuated helical swimmers in cylindrical channels "
+        "at low Reynolds numbers. Journal of Fluids and Structures 90:164-176, 2019."
+    ),
+    "liu2014": (
+        "B. Liu, K. S. Breuer and T. R. Powers. Propulsion by a helical flagellum in a capillary tube. "
+        "Physics of Fluids 26:011701, 2014."
+    ),
+    "temel2013": (
+        "F. Z. Temel and S. Yesilyurt. Simulation-based analysis of micro-robots swimming at the center and near the "
+        "wall of circular mini-channels. Microfluidics and Nanofluidics 14:287-298, 2013."
+    ),
     "tirado1979": (
         "M. M. Tirado and J. Garcia de la Torre. Translational friction coefficients of rigid, symmetric top "
         "macromolecules. Application to circular cylinders. Journal of Chemical Physics 71:2581-2587, 1979; "

@@ -179,7 +179,7 @@ _IN_TITLE = ("schema", "robot", "model", "friction", "model_reason", "fitted_by"
 
 
 def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What an answer says in a few words or in plain numbers: files, counts, verdicts."""
+    """Values of an answer as short text or plain numbers: files, counts, verdicts."""
     return [
         (name.replace("_", " "), str(item))
         for name, item in answer.items()

@@ -32,7 +32,7 @@ def _one_line(text: str) -> str:
 
 
 def failure_sentence(error: BaseException) -> str:
-    """Return what a thread or process that goes on tells of an error that ended a piece of its work."""
+    """Return the message of an error that ended a piece of work in a thread or process that continues."""
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, MemoryError):
@@ -43,7 +43,7 @@ def failure_sentence(error: BaseException) -> str:
 
 
 def clipped(value: object, longest: int = 60) -> str:
-    """A value as Python writes it, cut to a length; an integer too long to write is said to be one."""
+    """A value as Python writes it, truncated; an integer too long to write is described."""
     try:
         text = repr(value)
     except ValueError:  # Python refuses to write integers of thousands of digits

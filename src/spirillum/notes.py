@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 from spirillum.note_kinds import CAUTIONS, INFORMATION, TRACKING
 
 LONGEST = 160
-"""Characters of a sentence, without the names of robots and files that stand in it."""
+"""Largest number of characters of a sentence, without the names of robots and files in it."""
 
 
 class NoteKind(NamedTuple):
@@ -51,7 +51,7 @@ class Note(str):
         return note
 
     def __getnewargs__(self) -> tuple[str, str, tuple[str, ...]]:  # type: ignore[override]
-        """What another process makes it anew from."""
+        """Arguments with which another process recreates it."""
         return self.code, str(self), self.fields
 
     @property

@@ -79,7 +79,7 @@ def imap_unordered(
 
 
 def memory_in_use() -> float:
-    """Memory of this process, bytes; 0 where the system does not say."""
+    """Memory of this process, bytes; 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):
@@ -88,7 +88,7 @@ def memory_in_use() -> float:
 
 
 def _begin(single: bool) -> None:  # noqa: FBT001 - called by the pool
-    """In a new process: it ends with the one that asked, and keeps to one thread where it should."""
+    """Start of a worker process: it ends with its parent, and uses one thread where requested."""
     Thread(target=_end_with_parent, daemon=True).start()
     if single:  # for libraries that are loaded from here on
         os.environ.update(dict.fromkeys(_THREADS, "1"))

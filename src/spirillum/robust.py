@@ -51,7 +51,7 @@ def running_median(values: Samples, window: int) -> Samples:
 
 
 def stretches_of(mask: np.ndarray) -> list[np.ndarray]:
-    """Places of a series that follow each other and are in a mask, stretch by stretch.
+    """Indices of a series that follow each other and are in a mask, stretch by stretch.
 
     Args:
         mask: (n,).

@@ -39,6 +39,10 @@ def schema_of(name: str) -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
+_REQUIRING = ("required", "if", "else")
+"""Keys of a table that state its requirements."""
+
+
 def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
     """Take what every table requires out of a schema; it is required where the file extends no other one."""
     tables = schema.get("$defs", {})
@@ -51,12 +55,13 @@ def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
         below = {name: found for name, item in whole.get("properties", {}).items() if (found := needed(item))}
         rest = whole.get("additionalProperties")
         others = needed(rest) if isinstance(rest, dict) else {}
-        found = {"required": whole.get("required"), "properties": below, "additionalProperties": others}
+        found = {"properties": below, "additionalProperties": others} | {word: whole.get(word) for word in _REQUIRING}
         return {name: item for name, item in found.items() if item}
 
     condition = needed(schema)
     for table in (schema, *tables.values()):
-        table.pop("required", None)
+        for word in _REQUIRING:
+            table.pop(word, None)
     return {"if": {"required": ["extends"]}, "else": condition}
 
 

@@ -245,7 +245,7 @@ _OTHER_MEASURES = (
     ("A m**2", "A m**2/kg", "is a moment per mass; allowed: the moment, as A m^2 (SI)"),
     ("A m**2", "A/m", "is a magnetisation; allowed: the moment, which is that times the volume, as A m^2 (SI)"),
 )
-"""SI unit of a kind, that of what is often given in its place, and the end of the sentence."""
+"""SI unit of a kind, that of a common mistake, and the end of the sentence."""
 
 
 def _refusal(unit: str, spellings: Sequence[str], kind: Kind, hint: str) -> str:
@@ -351,7 +351,7 @@ def show(value: float, unit: str) -> str:
 
 
 def show_apart(one: float, other: float, unit: str, least: int = 4) -> tuple[str, str]:
-    """Texts of two SI values in a display `unit`, with as many digits as tell them apart, and at least some."""
+    """Texts of two SI values in a display `unit`, with as many digits as distinguish them, and at least some."""
     for digits in range(least, 18):
         texts = tuple(f"{shown_in(value, unit):.{digits}g}" for value in (one, other))
         if texts[0] != texts[1] or one == other:

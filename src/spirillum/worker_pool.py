@@ -21,7 +21,7 @@ from spirillum.processes import AHEAD, imap_unordered
 from spirillum.version import own_version, versions
 
 ESTIMATE = "estimate: "
-"""How a progress message begins that says what work will take: a command prints it as a line of its own."""
+"""Prefix of a progress message that estimates the work: a command prints it as a line of its own."""
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss|inproc)://\S{1,200}")
 _PATIENCE = 5.0
 """Time in which a scheduler has to answer, s."""
@@ -48,7 +48,7 @@ class WorkerPool:
 
     @property
     def size(self) -> int:
-        """Number of workers; those of a cluster are asked for."""
+        """Number of workers; by default those of the cluster."""
         if self.cluster is None:
             return self.workers
         with _client(self.cluster) as client:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.robot.load import preset_names
+from spirillum.robot.load import preset_names, shipped_robots
 
 KEYS = (
     "robot",
@@ -191,7 +191,7 @@ def test_completion_offers_presets(monkeypatch, capsys: pytest.CaptureFixture[st
     from spirillum.cli import shared_options
     from spirillum.fluid.registry import SWIMMER_MODELS
 
-    assert shared_options.complete_presets("") == list(preset_names())
+    assert shared_options.complete_presets("") == list(shipped_robots())
     assert shared_options.complete_presets("bio") == ["biorob2012-narrow", "biorob2012-wide"]
     assert shared_options.complete_parts("ro") == ["robot", "rotor"]
     assert shared_options.complete_auto_models("") == ["auto", *sorted(SWIMMER_MODELS)]

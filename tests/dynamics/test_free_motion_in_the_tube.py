@@ -242,3 +242,4 @@ def test_run_states_an_error_up_to_the_yaw_at_which_the_table_was_checked(
     assert np.isfinite(run.attrs["error_estimate"]) == known
     assert ("there is no error estimate" in run.attrs["warnings"]) != known
     assert "roughness and dry friction are assumed" in run.attrs["known_error"]
+    assert "not validated against an experiment" in run.attrs["known_error"]

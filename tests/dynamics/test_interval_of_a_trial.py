@@ -85,3 +85,29 @@ def test_the_page_of_unknowns_lists_all_of_them() -> None:
     listed = [(name, kind, float(low), float(high)) for name, kind, low, high in rows]
     assert listed == [(one.name, one.kind, one.low, one.high) for one in UNKNOWNS]
     assert math.log2(RUNS).is_integer()
+
+
+@pytest.mark.slow
+def test_planted_truths_lie_inside_as_often_as_stated() -> None:
+    """A hundred robots that swim, each with unknowns drawn from the stated distributions: 85 to 95 inside.
+
+    This tests the sampling, not the physics. At a rate of the drive, and over two seconds, a trial is quick.
+    """
+    robot = sp.load("biorob2012-wide", **{"drive.kind": "rate", "drive.rate": "1.2 Hz"})
+    timing = {"duration": "2 s", "band": False}
+    answer = sp.predict(robot, interval=True, **timing).trial
+    assert answer is not None
+    speed = answer.intervals["forward_velocity"]
+    unknowns = open_unknowns(robot, WEIGHT, NOTHING)
+    weight = robot.derived()["submerged_weight"].value
+    rng, inside, swimming = np.random.default_rng(11), 0, 0
+    while swimming < 100:
+        (sample,) = samples_of(robot, weight, unknowns, rng.random((1, len(unknowns))))
+        in_tube = {"wait": sample.wait, "friction_coefficient": sample.friction_coefficient}
+        one = sp.predict(sample.robot, roughness=sample.roughness, in_tube=in_tube, **timing).trial
+        assert one is not None
+        if one.reason or one.basis["state"] == "standing" or one.values["forward_velocity"] <= 0.0:
+            continue
+        swimming += 1
+        inside += speed.low <= one.values["forward_velocity"] <= speed.high
+    assert 85 <= inside <= 95

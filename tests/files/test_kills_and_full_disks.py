@@ -189,7 +189,10 @@ def test_figures_are_ours_in_a_session_with_other_settings(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     "commands",
     [
-        ("predict biorob2012-wide --model tube --no-band", "compare-models biorob2012-wide --model sbt -o models.png"),
+        (
+            "predict biorob2012-wide --model tube --no-band --motion held",
+            "compare-models biorob2012-wide --model sbt -o models.png",
+        ),
         pytest.param(("calibrate o.csv biorob2012-wide --method paper",), marks=pytest.mark.slow),
         pytest.param(("rank-models o.csv biorob2012-wide --model sbt --model rft",), marks=pytest.mark.slow),
     ],

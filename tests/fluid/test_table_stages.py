@@ -50,9 +50,15 @@ def solved_by(shipped: TubeTable, monkeypatch: pytest.MonkeyPatch) -> TubeTable:
     return shipped
 
 
+_MADE: dict[tuple[float, str], TubeTable] = {}
+
+
 def made(table: TubeTable, stage: Any) -> TubeTable:
-    (found,) = building.built_tables([(table.geometry, table.radius)], stage=stage)
-    return found
+    """A table in a stage; each is made once."""
+    key = table.radius, stage.name
+    if key not in _MADE:
+        (_MADE[key],) = building.built_tables([(table.geometry, table.radius)], stage=stage)
+    return _MADE[key]
 
 
 def errors_between_nodes(table: TubeTable, truth: TubeTable, *, yawed: bool) -> dict[str, float]:

@@ -140,7 +140,7 @@ def test_wrong_actions_are_a_sentence(name: str, action: float) -> None:
         ({"robot": "nobody"}, "nobody"),
         ({"lab": {"camera": {"fps": -1}}}, r"camera\.fps"),
         ({"colour": "red"}, "allowed: options of its task"),
-        ({"robot": "ecoli"}, r"drive\.kind = 'torque'"),
+        ({"robot": "ecoli"}, r"drive\.kind = 'torque-speed'"),
     ],
 )
 def test_wrong_options_are_a_sentence(options: dict[str, Any], sentence: str) -> None:

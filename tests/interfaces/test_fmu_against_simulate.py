@@ -69,7 +69,7 @@ def test_run_by_fmpy_is_that_of_simulate(units: dict[str, Path]) -> None:
     for name in names:
         values = run[name].values
         scale = float(np.abs(values).max())
-        assert found[name][-1] == pytest.approx(float(values[-1]), abs=1e-6 * scale), name
+        assert found[name][-1] == pytest.approx(float(values[-1]), abs=1e-9 * scale), name
 
 
 @needs_compiler
@@ -94,7 +94,7 @@ def test_parameters_can_be_set(units: dict[str, Path]) -> None:
     run = sp.simulate(weak, model="rft", motion="held", timing={"duration": 0.1})
     on = {"time": [0.0], "remote": [True]}
     found = simulated(units["plain"], on, stop=0.1, step=0.05, start_values={"battery.voltage": 3.2})
-    assert found["position"][-1] == pytest.approx(float(run["position"][-1]), rel=1e-6)
+    assert found["position"][-1] == pytest.approx(float(run["position"][-1]), rel=1e-9)
     dead = simulated(units["plain"], on, stop=0.1, step=0.05, start_values={"battery.voltage": 0.0})
     assert not dead["position"].any()
 
@@ -115,10 +115,10 @@ def test_plain_c_program_loads_it(units: dict[str, Path], tmp_path: Path) -> Non
     time, position, tail_angle, current, charge = map(float, first.split())
     run = sp.simulate(TABLE_II, model="rft", motion="held", timing={"duration": 0.2, "on": [(0.0, 0.1)]})
     assert time == pytest.approx(0.2)
-    assert position == pytest.approx(float(run["position"][-1]), rel=1e-6)
-    assert tail_angle == pytest.approx(float(run["tail_angle"][-1]), rel=1e-6)
-    assert current == pytest.approx(float(run["motor_current"][-1]), abs=1e-7)
-    assert charge == pytest.approx(float(run["battery_charge_used"][-1]), rel=1e-6)
+    assert position == pytest.approx(float(run["position"][-1]), rel=1e-9)
+    assert tail_angle == pytest.approx(float(run["tail_angle"][-1]), rel=1e-9)
+    assert current == pytest.approx(float(run["motor_current"][-1]), abs=1e-10)
+    assert charge == pytest.approx(float(run["battery_charge_used"][-1]), rel=1e-9)
     assert others == [
         "3: an input or parameter is no number",
         "3: the step is no positive time",

@@ -89,11 +89,11 @@ def check_motion(case: Case, seen: np.ndarray, dy: np.ndarray) -> None:
     moved = Rotation.from_quat(case.state[3:7] + step * dy[3:7], scalar_first=True)
     assert (later.inv() * moved).magnitude() == pytest.approx(0.0, abs=step**2 * (1.0 + q[3:6] @ q[3:6]))
     assert dy[[7, 8]] == pytest.approx(q[[6, 3]])
-    resistance = (
-        drive[12] + drive[13] * np.exp(-drive[14] * abs(current)) + drive[15] * np.exp(drive[16] * abs(current))
-    )
-    resistance += drive[17] * abs(current)
-    supply = drive[rigid_links.DUTY] * (drive[rigid_links.VOLTAGE] - drive[19] * abs(current))
+    constant, decay, fall, growth, rise, slope = drive[rigid_links.CONSTANT : rigid_links.SLOPE + 1]
+    resistance = constant + decay * np.exp(-fall * abs(current)) + growth * np.exp(rise * abs(current))
+    resistance += slope * abs(current)
+    sag = drive[rigid_links.INTERNAL_RESISTANCE] * abs(current)
+    supply = drive[rigid_links.DUTY] * (drive[rigid_links.VOLTAGE] - sag)
     emf = drive[rigid_links.BACK_EMF] * drive[rigid_links.POLARITY] * q[6]
     change = (supply - resistance * current - emf) / drive[rigid_links.INDUCTANCE]
     assert dy[CURRENT] == pytest.approx(change if kind == rigid_links.MOTOR else 0.0, rel=1e-12)

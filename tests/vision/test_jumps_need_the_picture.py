@@ -78,6 +78,13 @@ def test_an_outline_that_hops_is_no_cut_and_widens_the_interval_by_its_hop():
     assert hops_in(moving(), PIXEL, even) == (0.0, 0.0, 0.0, ())
 
 
+def test_angles_misread_under_a_highlight_are_no_hop():
+    motion = moving()
+    misread = motion.body_angle.copy()
+    misread[140:150] += np.linspace(0.0, 0.3, 10)
+    assert hops_in(motion._replace(body_angle=misread), PIXEL, steps_with([])) == (0.0, 0.0, 0.0, ())
+
+
 def test_a_cut_that_the_picture_shows_is_told():
     motion = moving(lost=40)
     assert [flag.name for flag in cuts_in(motion, PIXEL, steps_with([149]))] == ["video-is-cut"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from remembered import remembered
 from spirillum.vision.camera.optics import Optics
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.body import BodyFinder
@@ -18,10 +19,12 @@ cv2 = pytest.importorskip("cv2")
 CAMERA = Optics((320, 240), 350.0, 0.2, 0.015)
 
 
-def on_paper(flat, time, *, clear):
-    """A drawn frame on paper with lines every 2 mm both ways; of the body a share is seen that the paper leaves."""
-    paper = replace(flat, start=(1.0, 0.0)).draw(time).astype(float)
-    lines = np.arange(-0.1, 0.1, flat.spacing)
+@remembered
+def layers(flat):
+    """What does not change from frame to frame: paper with lines every 2 mm both ways, no robot; both bodies' films."""
+    away = replace(flat, start=(1.0, 0.0))
+    empty = away.draw(0.0).astype(float)
+    paper, lines = empty.copy(), np.arange(-0.1, 0.1, flat.spacing)
     for axis in (0, 1):
         ends = np.zeros((lines.size, 3))
         ends[:, axis] = lines
@@ -29,10 +32,22 @@ def on_paper(flat, time, *, clear):
             there = np.clip(1.0 - np.abs(np.arange(paper.shape[1 - axis]) - at), 0.0, 1.0) * 0.5
             shade = there[None, :, None] if axis == 0 else there[:, None, None]
             paper += shade * (np.array([40.0, 60.0, 140.0]) - paper)
-    empty = replace(flat, start=(1.0, 0.0)).draw(time).astype(float)
-    dark, bright = (replace(flat, body=(level,) * 3).draw(time).astype(float) for level in (0, 255))
+    return empty, paper, *(replace(flat, body=(level,) * 3) for level in (0, 255))
+
+
+@remembered
+def drawn_robot(flat, time):
+    """A frame with a black body; the share of each pixel that the body fills, and that the robot does."""
+    empty, _, black, white = layers(flat=flat)
+    dark, bright = black.draw(time).astype(float), white.draw(time).astype(float)
     body = ((bright - dark) / 255.0).mean(axis=2, keepdims=True)
-    robot = np.clip(np.abs(dark - empty).sum(axis=2, keepdims=True) / 24.0, 0.0, 1.0)
+    return dark, body, np.clip(np.abs(dark - empty).sum(axis=2, keepdims=True) / 24.0, 0.0, 1.0)
+
+
+def on_paper(flat, time, *, clear):
+    """A drawn frame on the paper; of the body a share is seen that the paper leaves."""
+    _, paper, *_ = layers(flat=flat)
+    dark, body, robot = drawn_robot(flat=flat, time=time)
     under = robot * dark + (1.0 - robot) * paper
     return np.clip(under + body * (clear * paper + (1.0 - clear) * np.array(flat.body)), 0, 255).astype(np.uint8)
 

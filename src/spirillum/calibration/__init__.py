@@ -1,1 +1,1 @@
-"""From observations to parameters: fits, their uncertainty, and what the data cannot tell."""
+"""From observations to parameters: fits, their uncertainty, and what the data do not identify."""

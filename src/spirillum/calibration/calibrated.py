@@ -39,8 +39,9 @@ class Calibrated(DisplayMixin):
     values: dict[str, Estimate]
     """Free numbers by label."""
     friction: tuple[Estimate, ...]
-    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed. Without
-    interval where the error of the model's torque is not known."""
+    """B_eff of every robot, N m s/rad; empty where it was not requested, NaN where no motor rate was observed. Without
+    an interval where the error of the model's torque is not known.
+    """
     friction_sensitivity: dict[str, Samples]
     """Change of B_eff of every robot per relative change of a constant of fluid or motor, N m s/rad, by its field."""
     friction_statement: str

@@ -49,7 +49,7 @@ _FLOOR = 0.1
 
 @dataclass(frozen=True)
 class Ratio:
-    """One quantity of every robot: mean over the trials, and what their scatter says about the error."""
+    """One quantity of every robot: mean over the trials, and the error estimated from their scatter."""
 
     mean: Samples
     """SI; NaN where it was not observed."""
@@ -73,7 +73,7 @@ class Ratio:
         return error_of_mean(error, self.stated, self.scale, self.trials)
 
     def drawn_error(self, count: int, rng: np.random.Generator) -> Samples:
-        """Draws of the relative error of one trial as the scatter tells it, (count, 1); NaN without repeated trials.
+        """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials.
 
         Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.
         """
@@ -109,7 +109,7 @@ class Experiment:
     channels: tuple[float, ...]
     """Channel diameters, m, ascending."""
     channel: np.ndarray
-    """Place of each robot's channel in `channels`."""
+    """Index of each robot's channel in `channels`."""
     rows: tuple[tuple[int, ...], ...]
     """Rows of the file that belong to each robot."""
     advance: Ratio
@@ -129,7 +129,7 @@ class Experiment:
     sha256: str
     """Hash of the file."""
     synthetic: bool
-    """Whether the file says that its numbers were made by a program."""
+    """Whether the file states that its numbers are synthetic."""
     outliers: tuple[Note, ...] = ()
     """Trials that are far off the others of their tail, a sentence each."""
     doubts: tuple[Note, ...] = ()
@@ -234,7 +234,7 @@ def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
 
 
 def _check_name(path: Path, item: ObservationRow, robot: Robot, robots: Sequence[Robot]) -> None:
-    """A row that names one of the robots has to lie in its channel; any other name is the user's own."""
+    """A row that names one of the robots must match its channel; any other name is the user's own."""
     if item.robot != robot.name and any(item.robot == other.name for other in robots):
         raise InputError(
             f"{path}, row {item.row}, column robot: '{item.robot[:40]}', but its channel of "
@@ -309,7 +309,7 @@ class _Trials:
 
     @property
     def is_near_zero(self) -> bool:
-        """Whether the mean is not told from 0 by the scatter of the trials, or by their stated errors."""
+        """Whether the mean is compatible with 0, by the scatter of the trials or their stated errors."""
         error = np.sqrt(self.squares / self.freedom) if self.freedom else self.stated * abs(self.mean)
         return bool(abs(self.mean) * np.sqrt(self.trials) <= _NEAR_ZERO * error)
 
@@ -353,7 +353,7 @@ def _ratios(path: Path, items: Sequence[ObservationRow], hand: float) -> _Seen:
 
 
 def _check_rates(path: Path, observations: Sequence[ObservationRow], found: Sequence[_Seen]) -> None:
-    """Speeds alone say nothing of the fluid: how fast the tail turned has to be known too."""
+    """Refuse speeds without rates: the tail's rotation rate must be known too."""
     speeds = [item for item in observations if np.isfinite(item.forward_velocity)]
     if speeds and not any(np.isfinite(seen.advance.mean) for seen in found):
         raise InputError(

@@ -33,6 +33,7 @@ from spirillum.calibration.fit_warnings import (
 )
 from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement, torque_error
 from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
+from spirillum.calibration.in_trial import DEFAULT_FREE
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.paper_method import paper_fit
@@ -43,16 +44,18 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, WALLED, ModelChoice
+from spirillum.swimming.released_motion import HELD, RELEASED, check_released
 from spirillum.swimming.steady import requirements
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
-    """Return whether a fit may be one with walls: so it is asked for, or with `auto` its free numbers allow it.
+    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters.
 
     Args:
         asked: name of a model, or `auto`.
@@ -108,6 +111,7 @@ def fit_model(
     assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
     prepare: bool = False,
+    answer: str = HELD,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Fit parameters of a model to observed speeds and rates."""
@@ -117,22 +121,35 @@ def fit_model(
         raise InputError(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
+    _check_answer(answer, method)
     if model != AUTO:
-        free_names(free, find_swimmer_model(model, AUTO).name)
+        free_names(free, find_swimmer_model(model, AUTO).name, released=answer == RELEASED)
     if prepare and not is_fitted_in_tube(model, free, method):
         raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
+    if method == "posterior":
+        for library in ("emcee", "arviz_base", "arviz_stats"):
+            import_optional(library, "method 'posterior'", "posterior")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
     experiment = read_experiment(observations, given_robots(robots))
     choice = choose_fitted_model(model, experiment, free, method)
-    names = free_names(free, choice.model)
+    names = free_names(
+        DEFAULT_FREE if free is None and answer == RELEASED else free, choice.model, released=answer == RELEASED
+    )
     if free is None and not _has_motor(experiment):
-        names = tuple(name for name in names if name != "friction")
-    problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare)
+        names = tuple(name for name in names if name not in ("friction", "shared_friction"))
+    problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare, answer=answer)
     inertia_warnings(experiment)
     found = _fitted_by(method, problem, friction, sampling, progress)
     return replace(found, model_reason=choice.reason)
+
+
+def _check_answer(answer: str, method: str) -> None:
+    """Refuse a fit of trials by the method that inverts held motion."""
+    check_released(answer)
+    if answer == RELEASED and method == "paper":
+        raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
 
 
 def _fitted_by(

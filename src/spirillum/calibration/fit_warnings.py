@@ -27,7 +27,7 @@ RATES_IN_RADIANS = Note(
     "(6.3 times)",
     ("tail_rate_Hz", "body_rate_Hz", "motor_rate_Hz"),
 )
-"""Said where most of the robots would need more torque than their motors give."""
+"""Caution where most of the robots would need more torque than their motors give."""
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 """Name of each compared quantity in a sentence."""
 _LARGE_MISFIT = 0.03

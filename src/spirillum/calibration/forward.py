@@ -58,7 +58,7 @@ class DryContact:
 
 @dataclass(frozen=True)
 class Forward:
-    """The robots of an experiment, ready to be asked."""
+    """The robots of an experiment, prepared for evaluation."""
 
     resistance: DrawnResistance
     electrics: Electrics | None
@@ -70,7 +70,7 @@ class Forward:
     factors: Mapping[str, Samples] = field(default_factory=dict)
     """The robots' own factors, where they are not free; 1 where they have none."""
     contact: DryContact | None = None
-    """Where dry friction under the robots may be drawn."""
+    """Ranges of dry friction under the robots."""
 
     def matrices(self, draws: Draws) -> Samples:
         """Balance matrices, (draws, robots, 3, 3), with all factors and dry friction in them."""

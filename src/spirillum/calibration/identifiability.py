@@ -1,4 +1,4 @@
-"""What the observations can and cannot tell: sensitivities, their singular directions, and profiles.
+"""Identifiability of parameters: sensitivities, their singular directions, and likelihood profiles.
 
 The Jacobian of all predictions, over their standard errors, maps the coordinates of the fit to what is seen. A singular
 value s of it says that the observations know the direction to 1/s standard deviations of the prior. Where s is below 1
@@ -27,14 +27,15 @@ from spirillum.errors import InputError
 from spirillum.notes import Note
 
 _UNKNOWN = 1.0
-"""Singular value below which the prior says more than the observations."""
+"""Singular value below which the prior is more informative than the observations."""
 _POOR = 3.0
 FAR = 3.0
 """Standard deviations of the prior beyond which the observations have overruled it."""
 _COLLINEAR = 1e4
-"""Collinearity index (inverse of the least singular value of the Jacobian with its columns normalised; Brun et al.
-2001) from which on numbers are the same to the observations. Sets that can be told apart have some tens at most, those
-that cannot have more than 1e7, which rounding leaves of infinity."""
+"""Collinearity index (inverse of the least singular value of the Jacobian with normalised columns; Brun et al. 2001)
+from which on parameters cannot be distinguished by the observations. Identifiable sets have some tens at most, others
+more than 1e7, which is infinity up to rounding.
+"""
 _INVOLVED = 0.05
 """Least share of a collinear direction at which a number is named."""
 _MEMBER = 0.25
@@ -59,12 +60,12 @@ class Identifiability:
 
     @property
     def unknown(self) -> int:
-        """Number of directions of which the observations say less than the prior."""
+        """Number of directions in which the prior is more informative than the observations."""
         return int(np.count_nonzero(self.singular < _UNKNOWN))
 
 
 def check_identifiable(problem: Problem, z: Samples) -> None:
-    """Refuse free numbers that no observations of these quantities can tell apart, however exact.
+    """Refuse free parameters that no observations of these quantities identify, however exact.
 
     A number whose uncertainty is stated is known by that, and left out.
     """
@@ -165,7 +166,7 @@ class LikelihoodProfile:
 
 
 def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[LikelihoodProfile]:
-    """LikelihoodProfile likelihood of every free number: the others are fitted anew at each held value."""
+    """Likelihood profile of every free parameter: the others are fitted again at each of its values."""
 
     def residuals(z: Samples) -> Samples:
         return weighted_residuals(problem, z, fit.error, fit.discrepancy)

@@ -1,4 +1,4 @@
-"""The forward model of robots in their tubes: each robot's own table, asked at the place of every draw.
+"""The forward model of robots in their tubes: each robot's own table, evaluated at the pose of every draw.
 
 A table (`spirillum prepare`) answers for any gap and pitch in microseconds, so that a fit takes seconds. Its error at
 places that were not used for it stands in it: no prediction is taken to be better.

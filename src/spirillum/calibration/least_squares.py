@@ -36,7 +36,7 @@ FEWEST_LEFT = 0.5
 _MIDDLE = 0.6745
 """Median of a half-normal number over its scale."""
 _SHARP = 0.01
-"""Relative error that all errors are taken to have where it is asked how many numbers a quantity fits."""
+"""Relative error assumed for all observations when the number of parameters that a quantity constrains is counted."""
 LEAST_ERROR = 1e-3
 """Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
 
@@ -215,11 +215,11 @@ def _best(
     starts: int,
     prior: float,
 ) -> Samples:
-    """The best of several local fits; the first starts where it is told, the others are spread over the prior."""
+    """The best of several local fits; the first starts at the given point, the others are spread over the prior."""
     from scipy.optimize import least_squares
 
     def jacobian(z: Samples) -> Samples:
-        """By forward differences, all from one call: most of what a call takes does not depend on how much it asks."""
+        """Forward differences, all from one call: most of its cost does not depend on the number of points."""
         step = np.copysign(_SMALL_STEP * np.maximum(1.0, np.abs(z)), z)
         step = np.where(np.abs(z + step) > LARGEST, -step, step)
         rows = _residuals(problem, np.concatenate([z[None], z + np.diag(step)]), error, discrepancy, prior)
@@ -301,7 +301,7 @@ def _discrepancy(
 def drawn_fit(
     problem: Problem, fit: LeastSquares, count: int, rng: np.random.Generator
 ) -> tuple[Samples, dict[Quantity, Samples]]:
-    """Draws around a fit: discrepancies from what the residuals tell of them, then the numbers given each.
+    """Draws around a fit: discrepancies given the residuals, then the parameters given each discrepancy.
 
     Returns:
         Coordinates, (draws, free numbers), and discrepancies by quantity, (draws,).

@@ -252,7 +252,7 @@ DEFAULT_FREE = {
     "rft": ("body_drag", "friction"),
     "tube": ("gap", "friction"),
 }
-"""What is free if nothing is said: what the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
+"""Free parameters by default: those that the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
 
 
 ASSUMABLE = {
@@ -270,7 +270,7 @@ class Coordinate:
 
     parameter: FitParameter
     channel: int | None
-    """Place of its channel; None for all."""
+    """Index of its channel; None for all."""
     label: str
     """Name, with the channel where there are several."""
     prior: Prior
@@ -282,16 +282,17 @@ def listed_names(free: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def is_free_in(model: str, free: str | Sequence[str] | None) -> bool:
-    """Return whether a model has all these parameters; it has those of its own that are free where none is named."""
+    """Return whether a model has all these parameters; by default it has its own."""
     return free is None or all(name in PARAMETERS and model in PARAMETERS[name].models for name in listed_names(free))
 
 
-def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
+def free_names(free: str | Sequence[str] | None, model: str, *, released: bool = False) -> tuple[str, ...]:
     """Names of the free parameters.
 
     Args:
         free: names, or one text with commas; None: those that the paper fitted.
         model: name of the model.
+        released: trials are fitted, in which the run decides where the robot lies.
     """
     if free is None:
         return DEFAULT_FREE[model]
@@ -313,7 +314,7 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
             "free = 'gap' together with 'roughness': the height of its asperities decides the gap of a robot that lies "
             "on them; allowed: one of them"
         )
-    if "friction_coefficient" in names and "roughness" not in names:
+    if "friction_coefficient" in names and "roughness" not in names and not released:
         raise InputError(
             "free = 'friction_coefficient' without 'roughness': dry friction acts where the robot lies on its "
             "asperities, whose height then decides its gap; allowed: roughness too"
@@ -331,7 +332,7 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
 
 
 OBSERVED = ("tail.wavelength", "tail.amplitude")
-"""Fields whose values stand in the observations."""
+"""Fields whose values are given by the observations."""
 _IN_PLACE_OF = {
     "body_drag": "calibration.{model}.body_drag",
     "body_rotation": "calibration.{model}.body_rotation",
@@ -351,7 +352,7 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
             "allowed: other fields"
         )
     for known in _possible_models(model, free):
-        for name in free_names(free, known):
+        for name in free_names(free, known, released=True):
             field = _IN_PLACE_OF.get(name, "").format(model=known)
             if field in asked:
                 raise InputError(

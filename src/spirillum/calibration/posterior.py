@@ -43,7 +43,7 @@ class Sampling:
     """Draws of each walker that stay in the answer."""
     seed: int = 1
     doublings: int = 3
-    """How often sampling goes on for twice as long, as long as the chains have not mixed."""
+    """How often the length of the chains is doubled while they have not mixed."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

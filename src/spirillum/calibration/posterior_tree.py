@@ -38,6 +38,7 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
     for name in values:
         tree["posterior"][name].attrs = {"units": units.get(name, "1"), "long_name": name.replace("_", " ")}
     tree.attrs = {
+        **({} if problem.trials is None else {"answer": "trial"}),
         "schema": SCHEMA,
         "converged": int(posterior.converged),
         "observations": experiment.source,

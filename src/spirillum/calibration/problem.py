@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
 from spirillum.calibration.forward import Forward, kinematics
+from spirillum.calibration.in_trial import TrialSurfaces, check_free, trial_surfaces
 from spirillum.calibration.in_tube import Ranges, place_ranges, tube_forward
 from spirillum.calibration.parameters import (
     ASSUMABLE,
@@ -29,6 +30,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
+from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 
 Progress = Callable[[str, int, int], None]
@@ -44,6 +46,8 @@ _TOLERANCE_SPREAD = 0.1
 _FRICTION_SPREAD = 1.5
 _LOG_NORMAL = {**_FACTOR_SPREADS, "friction_coefficient": (0.1, 0.8)}
 """Medians of log-normal priors that are the same for all robots, and standard deviations of the logarithm."""
+_REACH = 2.5
+"""Standard deviations of a prior to either side over which trials are made."""
 _WIRE_POINTS = 9
 _WIRE_RANGE = 5.0  # standard deviations that the table reaches to either side
 
@@ -63,6 +67,8 @@ class Problem:
     """Relative error of interpolated resistances, that no prediction is taken to be better than; 0 without any."""
     fixed_friction: Samples
     """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
+    trials: TrialSurfaces | None = None
+    """What trials measure, where these are fitted; None: held motion is."""
     assumed: Mapping[str, float] = field(default_factory=dict)
     """Parameter to its stated uncertainty, half of a relative 95 % interval: a prior where it is free, else a share of
     the interval of B_eff alone."""
@@ -110,7 +116,7 @@ class Problem:
         return found
 
     def _all_values(self, z: Samples) -> Samples:
-        """Every free number, (draws, free numbers); log-normal ones at once, for that is asked thousands of times."""
+        """Every free parameter, (draws, parameters); log-normal ones at once, for speed."""
         medians, spreads = self._log_normal
         found: Samples = medians * np.exp(spreads * np.clip(z[:, : medians.size], -30.0, 30.0))
         for place, item in enumerate(self.coordinates):
@@ -136,6 +142,12 @@ class Problem:
     def predicted(self, z: Samples) -> dict[Quantity, Samples]:
         """What is compared, (draws, robots)."""
         draws = self.draws(z)
+        shape = (z.shape[0], self.experiment.size)
+        if self.trials is not None:
+            advance, turning, motor_rate = self.trials.at(draws)
+            over = np.where(self.experiment.by_motor, advance / (1.0 - turning), advance)
+            every: dict[Quantity, Samples] = {"advance": over, "turning": turning, "motor_rate": motor_rate}
+            return {name: np.broadcast_to(every[name], shape) for name in self.quantities}
         balance = self.forward.balance(draws)
         found = kinematics(balance)
         answer: dict[Quantity, Samples] = {
@@ -146,15 +158,14 @@ class Problem:
             friction = draws.get("shared_friction", self.fixed_friction[None])
             answer["motor_rate"] = self.forward.motor_rate(balance, draws, friction)
         # What does not depend on any free number comes back once for all draws.
-        shape = (z.shape[0], self.experiment.size)
         return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
 
     def values_at(self, z: Samples) -> dict[str, float]:
-        """Free numbers by label at one place of the coordinates, (free numbers,)."""
+        """Free parameters by label at one point of the coordinates, (parameters,)."""
         return {label: float(values[0]) for label, values in self.values(z[None]).items()}
 
     def predicted_at(self, z: Samples) -> dict[Quantity, Samples]:
-        """What is compared, (robots,), at one place of the coordinates, (free numbers,)."""
+        """Compared quantities, (robots,), at one point of the coordinates, (parameters,)."""
         return {name: values[0] for name, values in self.predicted(z[None]).items()}
 
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:
@@ -202,6 +213,7 @@ def posed(
     assumed: Mapping[str, float] | None = None,
     *,
     prepare: bool = False,
+    answer: str = HELD,
 ) -> Problem:
     """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers.
 
@@ -213,19 +225,23 @@ def posed(
         assumed: parameter to its stated uncertainty, half of a relative 95 % interval. Where the motor's rate is
             compared, such a parameter is free too, with that for its prior.
         prepare: for `tube`, make the robots' tables that are not there.
+        answer: `held`, or `trial`: what is compared with the observations.
     """
     stated = dict(assumed or {})
     free = _with_assumed(free, stated)
     chosen = find_swimmer_model(model)
     batch = RobotBatch.of(experiment.robots)
     _check_domain(experiment, chosen, batch)
+    if answer == RELEASED:
+        check_free(free, chosen.name)
     _check_motor(experiment, free, batch)
     parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
     tell = progress or (lambda _what, _done, _total: None)
     ranges: Ranges = {}
     if chosen.placed:
         ranges = place_ranges(batch, chosen, [name for name in free if name in ("gap", "pitch", "roughness")])
-        forward, error = tube_forward(experiment, batch, free, tell, prepare=prepare)
+        bound = () if answer == RELEASED else free  # in a trial the run has the dry friction
+        forward, error = tube_forward(experiment, batch, bound, tell, prepare=prepare)
     else:
         forward, error = _forward(experiment, chosen, batch, parameters, tell)
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
@@ -245,7 +261,20 @@ def posed(
         # The prior of B_eff rests on the torque at the middle of all other priors: they come first.
         before = replace(problem, coordinates=tuple(item for items in laid.values() for item in items))
         laid[parameter.name] = _coordinates(before, parameter, batch, ranges)
-    return replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
+    problem = replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
+    if answer == HELD:
+        return problem
+    trials = trial_surfaces(experiment, _ends(problem), tell, prepare=prepare)
+    return replace(problem, trials=trials, interpolation_error=max(error, trials.error))
+
+
+def _ends(problem: Problem) -> dict[str, tuple[float, float]]:
+    """Values of each free parameter within which nearly all of its prior lies."""
+    found = {}
+    for item in problem.coordinates:
+        low, high = (float(item.prior.value(np.array([end]))[0]) for end in (-_REACH, _REACH))
+        found[item.parameter.name] = (low, high)
+    return found
 
 
 def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[str, ...]:

@@ -30,7 +30,10 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
+from spirillum.swimming.model_choice import WALLED
+from spirillum.swimming.released_motion import HELD, RELEASED, check_released
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
@@ -46,6 +49,7 @@ _WORST = 3
 _MODELS = ("sbt", "rft")
 _FREE = "body_drag,body_rotation"
 _FREE_IN_TUBE = "gap,pitch"
+_FREE_IN_TRIAL = "friction_coefficient,roughness"
 """Two numbers for each channel in every model: else one would be praised for its freedom in what another was denied."""
 
 
@@ -62,7 +66,7 @@ def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ModelRank:
-    """One model's place."""
+    """The rank of one model."""
 
     model: str
     elpd: float
@@ -187,6 +191,7 @@ def rank_models(
     free: str | Sequence[str] | None = None,
     sampling: Sampling | None = None,
     prepare: bool = False,
+    answer: str = HELD,
     progress: Progress | None = None,
 ) -> Ranking:
     """Fit several models to the same observations and rank them by leave-one-out accuracy.
@@ -199,12 +204,18 @@ def rank_models(
             `tube`.
         sampling: how the posteriors are sampled.
         prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
+        answer: what `tube` is fitted as: `held`, or `trial` (two numbers: friction coefficient and roughness).
         progress: told what is being done.
 
     Raises:
         InputError: for wrong input, a single model, or observations that none of the models explains.
     """
-    wanted = free_by_model(models, free)
+    check_released(answer)
+    wanted = free_by_model(models, free, answer)
+    if answer == RELEASED and WALLED not in wanted:
+        raise InputError(
+            f"answer = 'trial' without model '{WALLED}', of which it is; allowed: with it among the models"
+        )
     if prepare and "tube" not in wanted:
         raise InputError(
             f"prepare with models {', '.join(wanted)}, which take no tables; allowed: with 'tube' among them"
@@ -222,6 +233,7 @@ def rank_models(
                 method="posterior",
                 sampling=sampling,
                 prepare=prepare and name == "tube",
+                answer=answer if name == WALLED else HELD,
                 progress=progress,
             )
         except UnexplainedError as error:
@@ -234,7 +246,9 @@ def rank_models(
     return replace(found, warnings=(*said, *found.warnings))
 
 
-def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None) -> dict[str, tuple[str, ...]]:
+def free_by_model(
+    models: Sequence[str] | None, free: str | Sequence[str] | None, answer: str = HELD
+) -> dict[str, tuple[str, ...]]:
     """Models that are ranked, each with its free parameters."""
     names = list(dict.fromkeys(models or _MODELS))
     for name in names:
@@ -243,8 +257,11 @@ def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
     if free:
         _check_common(names, free)
-    wanted = {name: free or (_FREE_IN_TUBE if name == "tube" else _FREE) for name in names}
-    return {name: free_names(wanted[name], find_swimmer_model(name).name) for name in names}
+    in_tube = _FREE_IN_TRIAL if answer == RELEASED else _FREE_IN_TUBE
+    wanted = {name: free or (in_tube if name == WALLED else _FREE) for name in names}
+    return {
+        name: free_names(wanted[name], find_swimmer_model(name).name, released=answer == RELEASED) for name in names
+    }
 
 
 def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
@@ -263,6 +280,7 @@ def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
 
 def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
     """Rank models whose posteriors are of the same observations."""
+    import_optional("arviz_stats", "a ranking of models", "posterior")
     from arviz_stats import compare, loo
 
     found = {}

@@ -55,7 +55,7 @@ _MOST = 2000
 _BLOCKS = 20
 """Blocks of draws, each of which is left out once."""
 _TIED = 2.0
-"""Standard errors within which a candidate is not told apart from the best one."""
+"""Standard errors within which a candidate is tied with the best one."""
 _SAID = 5
 """Candidates that are left out by name."""
 
@@ -78,7 +78,7 @@ class CandidateRobot:
 
     @property
     def tied(self) -> bool:
-        """Whether the draws do not tell it apart from the best candidate; true of the best itself."""
+        """Whether it is tied with the best candidate; true of the best itself."""
         return self.behind <= _TIED * self.behind_error
 
 
@@ -122,7 +122,7 @@ def suggest(
     candidates: str | Path | None = None,
     trials: int = 5,
 ) -> Suggestion:
-    """Rank robots that might be measured next by what they would tell.
+    """Rank candidate robots by the expected information of measuring them.
 
     Args:
         posterior: file of a calibration's posterior.

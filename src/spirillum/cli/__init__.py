@@ -26,9 +26,9 @@ _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "
     "drive that prescribes the rate, --set drive.kind=rate --set drive.rate=1.2Hz",
 }
-"""What is said of options that only other commands have, by command and option."""
+"""Sentences for options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
-"""What is wrong with a name or place, not with the program."""
+"""Errors of a name or location, not of the program."""
 _TERMINATED = 128 + signal.SIGTERM
 """Exit code after SIGTERM, which schedulers expect, however the command ends then."""
 _KEPT = "interrupted; what was done is kept"
@@ -73,7 +73,7 @@ def _leave_threads(code: int) -> None:
 
 
 def _prepare() -> None:
-    """What only a process of its own may set."""
+    """What only a separate process may set."""
     gc.set_threshold(_OBJECTS)
     for ending in (signal.SIGINT, signal.SIGTERM):  # both end as cleanly, with the work that was started
         if signal.getsignal(ending) != signal.SIG_IGN:
@@ -100,7 +100,7 @@ class _Closed(TextIOBase):
     """Standard output that was closed before the program began."""
 
     def write(self, _text: str) -> int:
-        """Say that an answer would be lost."""
+        """Warn that an answer would be lost."""
         from spirillum.errors import InputError
 
         raise InputError("standard output is closed, and the answer is lost; allowed: a terminal, a file or a pipe")
@@ -168,7 +168,7 @@ def _check_names(arguments: Sequence[str]) -> None:
 
 
 def _explained(error: BaseException) -> int | None:
-    """Say an error that is the user's in a sentence; None for one that is ours."""
+    """Return the sentence of an error that is the user's; None for one that is ours."""
     from typer import Abort
 
     from spirillum.errors import TOO_LARGE, InputError
@@ -202,7 +202,7 @@ def _of_usage(error: Any) -> str:
 
 
 def _of_place(error: OSError) -> str:
-    """What is wrong with a file's name or place; empty if it is something else."""
+    """Return what is wrong with a file's name or location; empty for any other error."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         target = "the output" if error.filename is None else str(error.filename)[:200]
         return f"no space is left for {target}; allowed: a place with space"

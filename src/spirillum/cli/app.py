@@ -42,6 +42,7 @@ from spirillum.cli.shared_options import (
 )
 from spirillum.cli.show_commands import film, show
 from spirillum.cli.track_commands import track
+from spirillum.cli.validate_commands import validate
 from spirillum.cli.virtual_commands import render, virtual_experiment
 
 _ROWS = 10
@@ -98,7 +99,7 @@ def _root(
     },
 )
 def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> None:
-    """Predict the swimming of one robot: held at its pose, and in its tube what a trial measures and where it leads.
+    """Predict one robot: held at a pose, in a trial after release in its tube, and in the steady state.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
@@ -118,6 +119,10 @@ def compare_models(
     request: Request,
     *,
     output: Picture = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Plot why models differ, effect by effect: .png, .pdf or .svg."),
+    ] = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     all_of_it: All = False,
     json: Json = False,
@@ -129,14 +134,20 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
+    draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.effects:effects_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
-    renderer.show(renderer.with_files(result.to_dict(), file=draw(result)), json=json, all_of_it=all_of_it)
+    files = {"file": draw(result), "plot": draw_effects(result)}
+    renderer.show(renderer.with_files(result.to_dict(), **files), json=json, all_of_it=all_of_it)
 
 
 @from_function(
     "spirillum.fluid.resistance:resistance",
-    without={**NO_FORM, "resolution.phases": "the matrix is that of one phase"},
+    without={
+        **NO_FORM,
+        "resolution.phases": "the matrix is that of one phase",
+        "accuracy": "the option is that of the resolution",
+    },
     complete={"model": complete_resistance_models},
 )
 def resistance(request: Request, *, json: Json = False) -> None:
@@ -170,7 +181,7 @@ def study(
         bool | None,
         typer.Option(
             "--band/--no-band",
-            help="Model tube: the band over gap and pitch too, or not; else as the study says.",
+            help="Also the band over gap and pitch (model tube); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -178,8 +189,7 @@ def study(
         bool | None,
         typer.Option(
             "--predicted/--no-predicted",
-            help="Lay the robots down in their tubes and let them go too, with nothing fitted (minutes), or not; else "
-            "as the study says.",
+            help="Also simulate release from rest in the tubes (minutes); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -187,8 +197,23 @@ def study(
         bool | None,
         typer.Option(
             "--settled/--no-settled",
-            help="Let the robots go in their tubes and follow each to its steady motion too (seconds a robot), or not; "
-            "else as the study says.",
+            help="Also find the steady state of each robot after release (seconds a robot); default: as in the study.",
+            show_default=False,
+        ),
+    ] = None,
+    trial: Annotated[
+        bool | None,
+        typer.Option(
+            "--trial/--no-trial",
+            help="Also a trial of each robot in its tube (seconds a robot); default: as in the study.",
+            show_default=False,
+        ),
+    ] = None,
+    interval: Annotated[
+        bool | None,
+        typer.Option(
+            "--interval/--no-interval",
+            help="Also the 90 % interval of each trial (half a minute a robot); default: as in the study.",
             show_default=False,
         ),
     ] = None,
@@ -229,6 +254,8 @@ def study(
             band=band,
             predicted=predicted,
             settled=settled,
+            trial=trial,
+            interval=interval,
             workers=workers if cluster is None else cluster,
             store=store,
             calibration=calibration,
@@ -288,7 +315,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),
     "Design": (design,),
-    "Files": (export, schema, citation, report),
+    "Files": (export, schema, citation, validate, report),
 }
 """The commands by what one wants to do, with their panels of the help."""
 

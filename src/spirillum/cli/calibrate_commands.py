@@ -15,6 +15,7 @@ from spirillum.cli.shared_options import (
     MODEL_PANEL,
     Json,
     Settings,
+    complete_answers,
     complete_auto_models,
     complete_models,
     complete_robots,
@@ -27,6 +28,14 @@ if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking
     from spirillum.calibration.suggest import Suggestion
 
+_FittedAs = Annotated[
+    str,
+    typer.Option(
+        "--as",
+        autocompletion=complete_answers,
+        help="What model tube is fitted as: held at a pose, or a trial, released in its tube as predict has it.",
+    ),
+]
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str],
@@ -62,9 +71,8 @@ def calibrate(
         str,
         typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
     ] = "posterior",
-    friction: Annotated[
-        str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
-    ] = "rotor",
+    fitted_as: _FittedAs = "held",
+    friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
     assume_uncertainty: Annotated[
         list[str] | None,
         typer.Option(
@@ -75,7 +83,7 @@ def calibrate(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
+        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
     ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
@@ -85,7 +93,7 @@ def calibrate(
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     doublings: Annotated[
-        int, typer.Option(help="How often sampling may go on for twice as long, until the chains have mixed.")
+        int, typer.Option(help="How often the length of the chains may be doubled, until they have mixed.")
     ] = 3,
     settings: Settings = None,
     json: Json = False,
@@ -116,6 +124,7 @@ def calibrate(
             assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(seed=seed, doublings=doublings),
             prepare=prepare,
+            answer=fitted_as,
             figures=not no_figures,
             progress=progress,
         )
@@ -139,7 +148,7 @@ _A = TypeVar("_A", "Ranking", "Suggestion")
 
 
 def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
-    """An answer that says whose robots were taken, where fields were set and none was named."""
+    """Refuse settings without a named robot, where the robots come from another file."""
     from spirillum.robot.load import PAPER_ROBOTS_TAKEN
 
     return found if robot or not settings else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
@@ -165,13 +174,14 @@ def rank_models(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
+        typer.Option("--prepare", help=f"With tube, compute missing tables first, {TABLE_TAKES} each."),
     ] = False,
+    fitted_as: _FittedAs = "held",
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Rank models by how well they predict tails that they were not fitted to, and say where each fails.
+    """Rank models by cross-validation over the tails, with the tails where each fails.
 
     Example: `spirillum rank-models observations.csv --model sbt --model rft --model slender`
     """
@@ -184,7 +194,7 @@ def rank_models(
     from spirillum.robot.load import PAPER_ROBOTS
 
     fields = set_fields(overrides_from(settings))
-    for name, fitted in free_by_model(model, free).items():
+    for name, fitted in free_by_model(model, free, fitted_as).items():
         check_not_set(fields, fitted, name)
     names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
@@ -195,6 +205,7 @@ def rank_models(
             free=free,
             sampling=Sampling(seed=seed),
             prepare=prepare,
+            answer=fitted_as,
             progress=progress,
         )
     renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)

@@ -95,7 +95,7 @@ def control(
         str,
         typer.Option(
             autocompletion=_complete_controllers,
-            help="feedback, or what it is judged against: nothing, open-loop, knowing.",
+            help="feedback, or a baseline: nothing, open-loop, knowing.",
             rich_help_panel=_TASK,
         ),
     ] = "feedback",
@@ -124,7 +124,7 @@ def control(
         str,
         typer.Option(
             autocompletion=_complete_eyes,
-            help="model: the camera of the lab; tracker: pictures of the virtual camera, tracked.",
+            help="model (the camera of the lab) or tracker (rendered frames, tracked).",
             rich_help_panel=_LAB,
         ),
     ] = "model",
@@ -132,7 +132,7 @@ def control(
         str | None,
         typer.Option(
             metavar="PORT",
-            help="Send the commands through a remote at a serial port, too; virtual: one made for the run.",
+            help="Send the commands through a remote at a serial port; virtual: a simulated one.",
             rich_help_panel=_LAB,
         ),
     ] = None,

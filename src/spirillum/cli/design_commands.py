@@ -15,7 +15,7 @@ _Pairs = Annotated[
     list[str],
     typer.Option(
         metavar="FIELD=LOW:HIGH",
-        help="A field to choose, with its range, such as tail.wavelength=5mm:40mm or tail.turns=2:6; repeatable.",
+        help="A design variable with its range, such as tail.wavelength=5mm:40mm or tail.turns=2:6; repeatable.",
     ),
 ]
 
@@ -37,13 +37,13 @@ def design(
     ] = None,
     unknown: Annotated[
         list[str] | None,
-        typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
+        typer.Option(metavar="FIELD=LOW:HIGH", help="An unknown field, uniform over its range; repeatable."),
     ] = None,
     model: Annotated[
         str,
         typer.Option(
             help="Hydrodynamic model: sbt, rft, slender or tube; auto: tube for a robot in a channel, slender without "
-            "one, learned from some fifteen tails in about a minute of one core; sbt where they cannot be learned."
+            "one, by a surrogate in about a minute."
         ),
     ] = "auto",
     json: Json = False,

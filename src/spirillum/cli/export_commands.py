@@ -48,9 +48,7 @@ def export(
         typer.Option("--sidecar", help="Masses and 12x12 resistance in a JSON file beside .stl, .glb and .vtp too."),
     ] = False,
     no_sidecar: Annotated[bool, typer.Option("--no-sidecar", help="Leave it out beside .urdf and .mjcf.")] = False,
-    film: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="For .mcap: a film of the run, whose frames it holds too.")
-    ] = None,
+    film: Annotated[Path | None, typer.Option(metavar="FILE", help="For .mcap: a video of the run to include.")] = None,
     speed: Annotated[float, typer.Option(help="For .mcap: time of the run over time of that film.")] = 1.0,
     json: Json = False,
 ) -> None:

@@ -51,7 +51,7 @@ def flow(
         str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
     ] = "xz",
     offset: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Place of the plane on the axis across it, such as -50mm.")
+        str, typer.Option(metavar="LENGTH", help="Position of the plane on the axis normal to it, such as -50mm.")
     ] = "0mm",
     extent: Annotated[
         str | None,

@@ -29,7 +29,7 @@ def measure(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Readings by hand (CSV); they replace what is seen on their frames.",
+            help="Readings by hand (CSV); they replace the detections on their frames.",
             rich_help_panel=_BY_HAND,
         ),
     ] = None,

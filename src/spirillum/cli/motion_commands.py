@@ -164,7 +164,7 @@ def _drawn(
 
 @contextmanager
 def _after_the_run(what: str) -> Iterator[None]:
-    """Say of what cannot be drawn that the run itself is not lost."""
+    """Report that something cannot be plotted and that the run itself is kept."""
     from spirillum.errors import InputError
 
     try:

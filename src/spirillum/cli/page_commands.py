@@ -25,7 +25,7 @@ def page(
     ] = None,
     port: Annotated[int, typer.Option(help="Port to listen on; 0: a free one.")] = 0,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; any other than the loopback lets others on the network in.")
+        str, typer.Option(help="Address to listen on; any but the loopback is open to the network.")
     ] = "127.0.0.1",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, open no browser.")] = False,
     settings: Settings = None,

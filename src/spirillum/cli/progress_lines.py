@@ -12,7 +12,7 @@ _PERIOD = 15.0
 _SHARE = 0.05
 """Least time between two lines over the time since the start, so that a long log stays readable."""
 _AT_ONCE = 1.0
-"""What is done within this time from the start of a stage was kept from before, and tells nothing of the pace, s."""
+"""Work that is done within this time from the start of a stage was cached and does not enter the pace, s."""
 _LOOK = 1.0
 """Time between two looks whether a line is due, s: a step may take minutes."""
 

@@ -1,4 +1,4 @@
-"""One renderer for all answers: JSON for machines, or title, cautions and tables for people."""
+"""One renderer for all answers: JSON, or title, cautions and tables."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NARROWEST = 80
 
 
 _PACE = 900.0
-"""Time over which the pace of work is averaged, s: a place of a table takes half a minute."""
+"""Time over which the pace of work is averaged, s: a pose of a table takes half a minute."""
 
 
 class _PipedConsole(Console):
@@ -138,7 +138,7 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
 
 
 def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
-    """A sign of life on standard error that says what is done; none for `--json` and where nobody watches."""
+    """Progress lines on standard error; none for `--json` and where no terminal is attached."""
     console = Console(stderr=True)
     return nullcontext() if quiet or not console.is_terminal else console.status(what)
 

@@ -17,7 +17,8 @@ robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot f
 def robot_new(
     path: Annotated[Path, typer.Argument(help="Robot file to write.")],
     preset: Annotated[
-        str, typer.Option("--from", autocompletion=complete_presets, help="Preset to start from.")
+        str,
+        typer.Option("--from", autocompletion=complete_presets, help="Preset or validation robot to start from."),
     ] = "biorob2012-wide",
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it is there.")] = False,
 ) -> None:

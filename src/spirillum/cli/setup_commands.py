@@ -43,7 +43,7 @@ def propose(
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
     json: Json = False,
 ) -> None:
-    """Look at a film and write a setup file: what the film tells is filled in, the rest is marked.
+    """Inspect a video and write a setup file: detected values are filled in, the rest is marked.
 
     Example: `spirillum setup propose trial-1.mp4 my-robot.toml --spacing 2mm -o setup.toml`
     """
@@ -61,7 +61,7 @@ def check(
     film: Annotated[Path | None, typer.Argument(help="A film that was taken with it, to look at too.")] = None,
     json: Json = False,
 ) -> None:
-    """Check a setup file, and say what its uncertain heights do to lengths, and whether a film fits it.
+    """Check a setup file, the effect of its uncertain heights on lengths, and its agreement with a video.
 
     Example: `spirillum setup check setup.toml trial-1.mp4`
     """

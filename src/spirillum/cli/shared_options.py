@@ -13,7 +13,7 @@ import typer
 MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
 PLACE_PANEL = "Place in the channel (model tube)"
-"""Panel of the help: where in its channel the robot lies."""
+"""Panel of the help: pose of the robot in its channel."""
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
@@ -25,9 +25,10 @@ def starting(words: Iterable[str], incomplete: str) -> list[str]:
 
 
 def complete_presets(incomplete: str) -> list[str]:
-    """Names of presets."""
-    folder = Path(__file__).parent.parent / "robot" / "presets"
-    return starting(sorted(path.stem for path in folder.glob("*.toml")), incomplete)
+    """Names of the robots that come with the package."""
+    package = Path(__file__).parent.parent
+    presets = sorted(path.stem for path in package.glob("robot/presets/*.toml"))
+    return starting([*presets, *sorted(path.stem for path in package.glob("papers/*/robots/*.toml"))], incomplete)
 
 
 def complete_robots(incomplete: str) -> list[str]:
@@ -100,6 +101,11 @@ def _complete_friction(incomplete: str) -> list[str]:
     return starting(("body", "none", "paper", "rotor"), incomplete)
 
 
+def complete_answers(incomplete: str) -> list[str]:
+    """What a robot in its tube may be fitted as."""
+    return starting(("held", "trial"), incomplete)
+
+
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "accuracy": _complete_accuracies,
     "ends": _complete_ends,
@@ -144,9 +150,9 @@ METAVARS = {
     "posterior_for": "new|measured",
     "subject_to": "CONDITION",
 }
-"""What stands for a value in the help, where its kind does not tell."""
+"""Placeholder of a value in the help, where its kind does not give one."""
 _FRICTION = (
-    "Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall brakes "
+    "Friction model. none; rotor: in the joint, between body and tail; body: between body and wall "
     "the body; paper: as eq. (19) is printed, on the tail from outside."
 )
 TEXTS = {
@@ -177,7 +183,7 @@ Posterior = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Posterior of a calibration: its middle replaces the robot's values; intervals.",
+        help="Posterior of a calibration: its median replaces the robot's values; intervals.",
         rich_help_panel=MODEL_PANEL,
     ),
 ]
@@ -187,8 +193,8 @@ Settings = Annotated[
         "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
     ),
 ]
-All = Annotated[bool, typer.Option("--all", help="All quantities instead of those that matter most.")]
-Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
+All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")

@@ -33,9 +33,7 @@ def show(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
     ] = None,
-    window: Annotated[
-        bool, typer.Option("--window", help="A window to turn the robot in, instead of a file unless -o names one.")
-    ] = False,
+    window: Annotated[bool, typer.Option("--window", help="Open an interactive window.")] = False,
     json: Json = False,
 ) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
@@ -62,7 +60,7 @@ def film(
     ] = None,
     camera: Annotated[
         str,
-        typer.Option(autocompletion=_complete_cameras, help="fixed, follow, or auto: follow a robot that swims far."),
+        typer.Option(autocompletion=_complete_cameras, help="fixed, follow, or auto (follow a robot that swims far)."),
     ] = "auto",
     json: Json = False,
 ) -> None:

@@ -35,7 +35,9 @@ def track(
     window: Annotated[str, typer.Option(metavar="TIME", help="Time over which each frame's rates are taken.")] = "2s",
     learn_from: Annotated[
         Path | None,
-        typer.Option(metavar="FILM", help="Learn from a film of the same robot and camera; begin at the first frame."),
+        typer.Option(
+            metavar="FILM", help="Learn from this video of the same robot and camera, then track from the first frame."
+        ),
     ] = None,
     udp: Annotated[
         str | None,

@@ -28,7 +28,7 @@ _Trouble = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME,...",
-        help="Of a real bench: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
+        help="Artifacts of a recording: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
         "mirrored-lamps, grid-paper, glass-cover, noise, lamp, compression, missing-frames, tilted, glare, "
         "standing-glare, bubbles, hand; with commas between them, or repeated.",
         rich_help_panel=DISTURBANCES_PANEL,

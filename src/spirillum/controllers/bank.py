@@ -56,7 +56,7 @@ class Paths:
 
 
 class Bank:
-    """The members, and what they have done since they were laid down."""
+    """The members, and their motion since release."""
 
     def __init__(
         self,

@@ -62,6 +62,8 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
+_START = "released at its placement and controlled from time 0, without the waiting of a trial"
+"""How a run begins."""
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
 _SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
 _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
@@ -161,6 +163,7 @@ class Control(DisplayMixin):
             "model": self.model,
             **({"model_reason": self.model_reason} if self.model_reason else {}),
             "task": {"kind": self.task.kind, **_fields(self.task)},
+            "start": _START,
             "controller": self.controller,
             "seed": self.seed,
             "good": self.score.good,
@@ -223,7 +226,7 @@ def control(
     bench: Callable[[Plant, Lab, int], Senses] | None = None,
     progress: Progress | None = None,
 ) -> Control:
-    """Control a robot: plant, sensors, remote and controller in a closed loop, all of it drawn from a seed.
+    """Control a robot: plant, sensors, remote and controller in a closed loop, sampled from a seed.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
@@ -301,7 +304,7 @@ class _Pace:
 
 
 def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[Note]]:
-    """A lab without the pulse of flow where a model knows no flow, and the sentence that says so."""
+    """A lab without the pulse of flow for a model without imposed flow, and the sentence about it."""
     if model == "tube" or not lab.pulse.velocity:
         return lab, []
     still = lab.pulse.model_copy(update={"velocity": 0.0})

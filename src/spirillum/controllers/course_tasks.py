@@ -50,7 +50,7 @@ _EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
 
 
 class _Watching(Controller):
-    """A controller that follows the robot; one that knows is told place and coming flow."""
+    """A controller that follows the robot; an oracle is given position and coming flow."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, *, knowing: bool = False) -> None:
         """Begin."""
@@ -64,7 +64,7 @@ class _Watching(Controller):
         self._error = 0.0
 
     def _follow(self, news: Message) -> Samples:
-        """Place, speed at full duty, drift and the camera's error where a command that is decided now will act."""
+        """Predicted position, speed at full duty, drift and camera error when a command issued now will act."""
         for sight in news.sights if news.truth is None else ():
             self._follower.see(sight)
         if news.truth is not None:
@@ -81,7 +81,7 @@ class _Watching(Controller):
         return duty
 
     def estimate(self) -> Mapping[str, float]:
-        """Place, its standard deviation, speed at the robot's own duty, and drift."""
+        """Position, its standard deviation, speed at the robot's own duty, and drift."""
         return {
             "estimated_position": float(self._now[0]),
             "estimated_position_error": self._error,
@@ -122,7 +122,7 @@ class KeepCourse(_Watching):
         self._leash, self._course, self._until = leash * _CATCH_UP * set_speed, 0.0, 0.0
 
     def decide(self, news: Message) -> float:
-        """The duty that leads back to the course in T, by the robot as it is estimated."""
+        """Duty that returns to the course within T, for the estimated robot."""
         ahead, acts = self._follow(news), news.time + self._delay
         self._course += self._set_speed * (acts - self._until)
         self._course, self._until = float(np.clip(self._course, ahead[0] - self._leash, ahead[0] + self._leash)), acts
@@ -329,7 +329,7 @@ class SaveBatteryTask(RideOutTask):
 
 
 def _path(run: LoopRun) -> tuple[Samples, Samples]:
-    """Times, s, and places along the tube, m."""
+    """Times, s, and positions along the tube, m."""
     return (
         np.array([moment.time for moment in run.moments]),
         np.array([moment.pose.position[0] for moment in run.moments]),

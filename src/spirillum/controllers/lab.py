@@ -49,7 +49,7 @@ class CameraModel(Options):
     scale_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.002
     """Relative standard deviation of the scale, one value for a whole run."""
     position_noise: LengthOrZero = 1e-5
-    """Standard deviation of the place along the channel, of each frame by itself."""
+    """Standard deviation of the position along the channel, independent from frame to frame."""
     heading_noise: _AngleNoise = 7e-4
     """Standard deviation of the heading (yaw, as seen from above), of each frame by itself."""
     body_angle_noise: _AngleNoise = 3e-3
@@ -57,7 +57,7 @@ class CameraModel(Options):
     tail_phase_noise: _AngleNoise = 1e-2
     """Standard deviation of the tail's phase, of each frame by itself."""
     position_wander: LengthOrZero = 3e-5
-    """Standard deviation of the slow error of the place along the channel."""
+    """Standard deviation of the slow error of the position along the channel."""
     heading_wander: _AngleNoise = 2.5e-3
     """Standard deviation of the slow error of the heading."""
     body_angle_wander: _AngleNoise = 7e-3
@@ -114,11 +114,11 @@ class Pulse(Options):
     duration: Time = 2.0
     """How long it lasts."""
     start: Time | None = None
-    """When it begins; None: drawn, evenly over the first nine tenths of the run, and its sense by a coin."""
+    """When it begins; None: sampled uniformly over the first nine tenths of the run, with a random sign."""
 
 
 class Unknown(Options):
-    """What the controller does not know of the robot; each run draws it anew."""
+    """Robot parameters unknown to the controller; each run samples them anew."""
 
     argument: ClassVar[str] = "unknown"
     prefixed: ClassVar[bool] = True

@@ -45,7 +45,7 @@ _ANYWHERE = 1e2
 """Standard deviation of where an angle began, rad."""
 _COARSE, _FINE = 41, 61
 _NEGLIGIBLE = 15.0
-"""Points whose log posterior lies so far below the highest are left out of the finer grid."""
+"""Points whose log posterior is lower than the maximum by more than this are left out of the finer grid."""
 _UNINFORMED = 0.8
 """A factor counts as not learnt where its 95 % interval is at least this share of the prior's."""
 
@@ -66,7 +66,7 @@ class Factor:
     low: float
     high: float
     told: bool
-    """Whether the data say more than the prior."""
+    """Whether the data are more informative than the prior."""
 
     def to_dict(self) -> dict[str, Any]:
         """The factor as data."""

@@ -29,7 +29,7 @@ _LONGEST_WAIT = 12.0
 """So long the robot swims on without being seen while it is learnt how it looks, s."""
 _AT_ONCE = 1e-9
 _LEAST_OFF = 0.05
-"""The run goes on for at least so long after the last command, s."""
+"""Least time that a run continues after the last command, s."""
 _REPORTS = 200
 """How often a run reports its progress."""
 
@@ -97,7 +97,7 @@ class LoopRun:
 
 
 class _Loop:
-    """A run while it goes on."""
+    """A run in progress."""
 
     def __init__(self, plant: Plant, controller: Controller, lab: Lab, senses: Senses, flow: FlowPulse | None) -> None:
         self.plant, self.controller, self.lab, self.flow = plant, controller, lab, flow
@@ -174,7 +174,7 @@ class _Loop:
         return True
 
     def handle(self, time: float, kind: _Kind, content: Any) -> bool:
-        """One event; whether the run goes on."""
+        """Process one event; return whether the run continues."""
         if kind is _Kind.DELIVERY:
             self._deliver(time, content)
             return True
@@ -209,7 +209,7 @@ class _Loop:
             self._readings.append(content)
 
     def arrive(self, time: float, sent: Command) -> bool:
-        """A command reaches the robot; whether what carries it is still there, and the run goes on."""
+        """Deliver a command to the robot; return whether the port is still there and the run continues."""
         try:
             command = self.senses.deliver(sent)
         except InputError as error:

@@ -25,7 +25,7 @@ from spirillum.robot.robot import Robot
 
 @dataclass(frozen=True)
 class ControlJob:
-    """All that a run follows from; a process of its own can do it."""
+    """Complete input of a run; a separate process can compute it."""
 
     robot: Robot
     plant: Mapping[str, Any]
@@ -38,7 +38,7 @@ class ControlJob:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The score of a run, and what it had drawn."""
+    """The score of a run, and its sampled parameters."""
 
     controller: str
     seed: int
@@ -49,7 +49,7 @@ class Outcome:
 
 
 def draw_plant(job: ControlJob) -> tuple[Plant, SampledErrors]:
-    """The plant of a run, at rest where it starts, and what was drawn for it."""
+    """The plant of a run, at rest at its start, and its sampled parameters."""
     lab = job.brief.lab
     drawn = draw(lab.unknown, lab.pulse, job.seed, job.brief.duration)
     return plant_of(job.robot, job.plant, drawn), drawn

@@ -1,4 +1,4 @@
-"""Sensors and disturbances of one run: errors drawn from its seed, the same whatever the controller does.
+"""Sensors and disturbances of one run: errors sampled from its seed, the same for every controller.
 
 Each part has a stream of random numbers of its own, of which every frame, reading and command takes its share whether
 it arrives or not. Runs of the same seed under two controllers can so be compared in pairs.
@@ -26,12 +26,12 @@ _SEEN = ("position", "heading", "body_angle", "tail_phase")
 _LATEST = 0.9
 """Share of a run in which a pulse may begin."""
 _FARTHEST = 4.0
-"""Standard deviations beyond which nothing is drawn."""
+"""Standard deviations at which samples are truncated."""
 
 
 @dataclass(frozen=True)
 class FlowPulse:
-    """A pulse of flow at its place in the run; SI."""
+    """A pulse of flow at its time in the run; SI."""
 
     start: float
     """s."""
@@ -47,7 +47,7 @@ class FlowPulse:
 
 @dataclass(frozen=True)
 class SampledErrors:
-    """What a run has drawn from its seed and the controller does not know."""
+    """Sampled parameters of a run that the controller does not know."""
 
     friction: float
     """Factor of the friction."""
@@ -162,7 +162,7 @@ def _stream(seed: int, name: str) -> np.random.Generator:
 def plant_of(
     robot: Robot, arguments: Mapping[str, Any], drawn: SampledErrors, progress: Progress | None = None
 ) -> Plant:
-    """The robot that a run has drawn, at rest where it starts."""
+    """The sampled robot of a run, at rest at its start."""
     arguments = dict(arguments)
     if drawn.gap != 1.0:
         if robot.channel is None:
@@ -191,7 +191,7 @@ def _with_friction(robot: Robot, factor: float) -> Robot:
 
 
 def _with_supply_and_fluid(robot: Robot, drawn: SampledErrors) -> Robot:
-    """A robot whose battery and fluid have the voltage and viscosity that were drawn."""
+    """A robot with the sampled voltage and viscosity."""
     changes: dict[str, Any] = {}
     if drawn.viscosity != 1.0:
         fluid = robot.fluid

@@ -71,9 +71,9 @@ class Controller(Protocol):
     """Decides once in a period of the remote; new for each run."""
 
     blind: bool = False
-    """Whether it goes on without a camera; else the drive is switched off when the camera is silent."""
+    """Whether it continues without a camera; else the drive is switched off when the camera is silent."""
     knowing: bool = False
-    """Whether it is told the truth."""
+    """Whether it is given the truth."""
 
     def decide(self, news: Message) -> float | Command:
         """Duty from now on, 0 (off) to 1; for a magnetic robot a command with its field."""

@@ -82,18 +82,18 @@ class Steering:
     """Of the body, m."""
 
     def moved(self, place: complex, tilt: complex, dt: float) -> complex:
-        """Place after a time, m."""
+        """Lateral position after a time, m."""
         return complex(np.exp(self.orbit * dt) * place + pushed_for(self.orbit, dt) * self.gain * tilt)
 
     def tilt(self, law: Law, place: complex) -> complex:
-        """The tilt that a law asks for at a place, rad."""
+        """Tilt commanded by a law at a lateral position, rad."""
         per_place = (1.0 / _CLOSED + self.orbit.real) / self.gain if law == "position" else 1.0 / (_AHEAD * self.length)
         asked = -per_place * place
         return complex(asked * min(1.0, MOST_TILT / max(abs(asked), 1e-12)))
 
 
 class Steer(Controller):
-    """Feedback of the place across the tube."""
+    """Feedback of the lateral position."""
 
     def __init__(self, lab: Lab, known: Steering, law: Law, *, knowing: bool = False) -> None:
         """Begin."""
@@ -122,7 +122,7 @@ class Steer(Controller):
         return Command(1.0, _field(self._rate, self._tilt))
 
     def estimate(self) -> Mapping[str, float]:
-        """Place across the tube, tilt and rate of the field."""
+        """Lateral position, tilt and rate of the field."""
         place = complex(np.nan, np.nan) if self._place is None else self._place
         return {
             "estimated_side": place.real,
@@ -151,7 +151,7 @@ class Steer(Controller):
             self._turns.clear()
 
     def _moved(self, time: float) -> complex:
-        """Place at a time, with the tilts that have been sent, m."""
+        """Lateral position at a time, given the tilts that have been sent, m."""
         place, now = self._place or 0j, self._seen_at
         for (_, tilt), (end, _) in zip(self._sent, [*list(self._sent)[1:], (time, 0j)], strict=True):
             until = min(end, time)
@@ -210,14 +210,14 @@ class KeepAxisTask(Task):
     across: ClassVar[bool] = True
 
     law: Annotated[Law, BeforeValidator(one_of("position", "aim"))] = "position"
-    """`position`: feedback of the place, with the orbit as predicted; `aim`: at a point of the axis ahead."""
+    """`position`: feedback of the lateral position, with the predicted orbit; `aim`: at a point of the axis ahead."""
     rate: Rate | None = None
     """Of the field, at most 0.9 of the step-out rate; None: the robot's own."""
     tolerance: Length = 5e-4
     """How far from the axis is good."""
 
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> SteeringBrief:
-        """Check the rate of the field, find orbit and gain, and the tilts for the robot as its file says."""
+        """Check the field's rate, find orbit and gain, and the tilts for the robot of the file."""
         field, step_out = plant.state.field, float(plant.steady.step_out_rate)
         if field is None:
             raise InputError(f"task 'keep-axis' with {plant.robot.name}; allowed: a robot with drive.kind 'magnetic'")

@@ -1,4 +1,4 @@
-"""The task `stop-at`: go to a place and stop there, with a remote that knows on and off.
+"""The task `stop-at`: go to a position and stop there, with a remote that is on or off.
 
 With the place x that the follower expects where a command will act, the goal g, the way d = 1 or -1 of the robot, the
 tolerance e and the hysteresis h = e/10:
@@ -75,7 +75,7 @@ class StopController(Controller):
         return duty
 
     def estimate(self) -> Mapping[str, float]:
-        """Place, its standard deviation, speed while on, and drift."""
+        """Position, its standard deviation, speed while on, and drift."""
         return self._estimate
 
 
@@ -100,7 +100,7 @@ class Timed(Controller):
 
 
 class KnowingStop(Controller):
-    """Knows place, speed and all flow to come, without error: what no controller can beat by much.
+    """Knows position, speed and all flow to come, without error: a bound for any controller.
 
     It stops as far before the goal as a coming pulse will carry it on at most, and swims on when the pulse is over.
     """
@@ -135,13 +135,13 @@ class KnowingStop(Controller):
 _STEP = 0.2
 """Step in which the open loop's time is looked for, s."""
 _PATIENCE = 10.0
-"""The robot as its file says has so many times the time at its steady speed to arrive."""
+"""Multiple of the time that the robot of the file needs at its steady speed, within which it has to arrive."""
 _SPARE, _SETTLING = 2.5, 5.0
 """A run lasts so many times as long as the robot of the file needs, and s."""
 
 
 class StopAtTask(Task):
-    """Go to a place and stop, with a remote that knows on and off."""
+    """Go to a position and stop, with a remote that is on or off."""
 
     kind: ClassVar[str] = "stop-at"
     error_name: ClassVar[str] = "distance from the goal at the end"
@@ -160,7 +160,7 @@ class StopAtTask(Task):
         return self.at
 
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:
-        """Check that the place is ahead and in the tube, and time the way there."""
+        """Check that the goal is ahead and in the tube, and time the path to it."""
         speed = float(plant.steady.forward_velocity)
         self._check_place(plant, speed)
         needed = self._time_to_goal(plant, speed, progress)
@@ -189,7 +189,7 @@ class StopAtTask(Task):
         return abs(error) <= self.tolerance
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:  # noqa: ARG002 - one interface for all tasks
-        """The place, throughout."""
+        """The position, throughout."""
         return np.full_like(time, self.goal), self.tolerance
 
     def _check_place(self, plant: Plant, speed: float) -> None:
@@ -213,7 +213,7 @@ class StopAtTask(Task):
             )
 
     def _time_to_goal(self, plant: Plant, speed: float, progress: Progress | None) -> float:
-        """When the robot as its file says arrives with its drive on and without a pulse, s."""
+        """Arrival time of the robot of the file with its drive on and without a pulse, s."""
         way, other = float(np.sign(speed)), plant.copy()
         most = _PATIENCE * self.goal / speed + 10.0
         place = before = 0.0

@@ -1,4 +1,4 @@
-"""What a task is: what a robot has to do, which controllers it has, and how a run is judged."""
+"""Definition of a task: goal, controllers, and score of a run."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ CONTROLLERS = {
     "open-loop": "commands computed beforehand for the robot as its file says, without a look",
     "knowing": "knows place, speed and coming flow without error",
 }
-"""Controllers of every task: the one that it is about, and those that it is judged against."""
+"""Controllers of every task: its own, and the baselines."""
 _LONGEST = 24.0 * 3600.0
 
 
 @dataclass(frozen=True)
 class Brief:
-    """What is computed once for all runs of a task, from the robot as its file says; SI."""
+    """Values computed once for all runs of a task, from the robot of the file; SI."""
 
     lab: Lab
     duration: float
@@ -74,7 +74,7 @@ class Task(Options):
     error_unit: ClassVar[str]
     """SI."""
     across: ClassVar[bool] = False
-    """Whether it is about the distance from the tube's axis, not the place along it."""
+    """Whether it concerns the distance from the tube's axis, not the position along it."""
 
     duration: Annotated[Time, within(0.1, _LONGEST, "s")] | None = None
     """Of a run; None: from the speed that is predicted."""
@@ -106,7 +106,7 @@ class Task(Options):
 
     @abstractmethod
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
-        """For figures: the place that is aimed at, m, (n,), by a robot that swims along `way`, and what is good, m."""
+        """For figures: the target position, m, (n,), of a robot on a trajectory `way`, and the tolerance, m."""
 
 
 def carried_by_flow(plant: Plant, velocity: float, duration: float) -> float:

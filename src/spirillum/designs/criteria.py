@@ -1,4 +1,4 @@
-"""How a design is judged: one table for Python and the command line."""
+"""Objectives and constraints of a design: one table for Python and the command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from spirillum.robot.arguments import Options
 
 
 class Judged(Options):
-    """How designs are judged under what is not known."""
+    """Statistics of designs under uncertainty."""
 
     argument: ClassVar[str] = "judged"
 
@@ -20,11 +20,13 @@ class Judged(Options):
     level: Annotated[float, Field(gt=0.0, lt=0.5)] = 0.1
     """Of the quantile: the share of the draws that are worse."""
     confidence: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
-    """Share of the draws in which a condition has to hold."""
+    """Share of the draws that must satisfy a condition."""
     draws: Annotated[int, Field(strict=True, ge=8, le=16384)] = 256
-    """Draws under which the search swims every design; what is stated rests on four times as many, drawn anew."""
+    """Draws used by the search; the stated statistics use four times as many new ones."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Seed of draws and search."""
+    confirm: Annotated[bool, Field(strict=True)] = False
+    """Make the tables that trials of the best three designs lack: 4 to 12 minutes of one core each."""
 
     def check_read(self, *, known: bool, conditions: bool) -> None:
         """Refuse what was given and nothing reads; a seed serves the search in any case.
@@ -36,7 +38,11 @@ class Judged(Options):
         Raises:
             InputError: naming it.
         """
-        given = [name for name in type(self).model_fields if name in self.model_fields_set and name != "seed"]
+        given = [
+            name
+            for name in type(self).model_fields
+            if name in self.model_fields_set and name not in ("seed", "confirm")
+        ]
         if given and known:
             raise InputError(
                 f"{', '.join(given)} where nothing is unknown; allowed: with a field that is not known (unknown) or a "

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
+from spirillum.designs.confirmation import CONFIRMED, best_apart, confirmed
 from spirillum.designs.criteria import Judged
 from spirillum.designs.design_result import Alternative, Design, Uncertainty
 from spirillum.designs.evaluation import Evaluation, Objective
@@ -33,7 +34,7 @@ from spirillum.robot.toml_writer import with_numbers
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.drive_warnings import drive_warnings
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.model_choice import AUTO, WALLED
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
 from spirillum.swimming.steady import friction_reading
 from spirillum.swimming.steady_quantities import LEVEL, STEADY, Swimming
@@ -43,11 +44,9 @@ _MORE_DRAWS = 4
 """Draws of what is stated over those of the search."""
 _SETS = 16
 """Independent sets of these draws, from which the interval of a probability follows."""
-_NEAR = 0.1
-"""The runner-up differs from the best design by at least this share of a range."""
 _FRONT_POINTS = 13
 _MOST_OF_STEP_OUT = 0.95
-"""Share of the step-out rate above which a warning says how little room there is."""
+"""Share of the step-out rate above which a warning states the margin."""
 _STATED_SEED = 7919
 """Added to the seed for the draws of what is stated."""
 
@@ -75,6 +74,9 @@ def design(
     every design is swum under the same draws. The best one is then stated from new draws: it owes part of its lead to
     those by which it was chosen.
 
+    The search holds robots at their pose. By `tube` and its own drive the best three designs that differ by a tenth
+    of a range are confirmed by trials, where their tubes have tables (`confirmed`).
+
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         vary: dotted field to its range, as ``{"tail.wavelength": "5 mm:40 mm"}``, or two values; `tail.turns` are whole
@@ -84,8 +86,9 @@ def design(
         minimise: a quantity to make small.
         subject_to: a condition, as ``"motor_current <= 0.4 A"``, or several.
         unknown: dotted field to the range over which it is uniform.
-        posterior: file of a calibration's posterior, whose draws are what is not known.
-        judged: `statistic`, `level`, `confidence`, `draws`, `seed`.
+        posterior: posterior of a calibration; its draws are the unknowns.
+        judged: `statistic`, `level`, `confidence`, `draws`, `seed`; `confirm` makes the tables that trials of the best
+            designs lack.
         bench: `mandrel`, `clearance`.
         model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from
             some designs that are solved for, the best of them in the end. `slender` is asked itself where more than
@@ -137,6 +140,11 @@ def design(
     stated = replace(searched, drawn=drawn)
     answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
     answer = replace(answer, learned=learned, model_reason=choice.reason)
+    if choice.model == WALLED and rate is None and posterior is None:
+        built = [(shares, _built(given, space, shares)) for shares in answer.leading]
+        answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=tell))
+    elif options.confirm:
+        raise InputError("confirm = True, but trials follow from the drive in the tube; allowed: model 'tube' alone")
     return replace(answer, warnings=(*answer.warnings, *lead_warnings(answer)))
 
 
@@ -228,9 +236,8 @@ def _answer(
             _deciding(stated.drawn.values, own[0]),
         )
     alternatives = [_alternative("today", None, stated, own[0], unknowns)]
-    second = _runner_up(searched, archive, best)
-    if second is not None:
-        alternatives.append(_alternative("runner_up", second, stated, own[0], unknowns))
+    leading = best_apart(searched, archive, best, CONFIRMED)
+    alternatives += [_alternative("runner_up", second, stated, own[0], unknowns) for second in leading[1:2]]
     value = float(objective.of(own)[0])
     profiles = tuple(profile_of(searched, best, number) for number in range(space.size))
     bound_by = bound_by_of(stated, best, profiles)
@@ -254,6 +261,7 @@ def _answer(
         refused=archive.refused,
         breaking=archive.breaking,
         warnings=_warnings(given, unknowns, stated, best, swum, bound_by),
+        leading=tuple(leading),
     )
 
 
@@ -300,17 +308,6 @@ def _deciding(unknowns: Mapping[str, Samples], values: Samples) -> dict[str, flo
         size = float(np.sqrt(np.sum(one**2) * np.sum(own**2)))
         found[name] = float(np.sum(one * own) / size) ** 2 if size > 0 else 0.0
     return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
-def _runner_up(searched: Evaluation, archive: Archive, best: Samples) -> Samples | None:
-    """The best design that differs by a tenth of a range; None if there is none."""
-    shares, values = archive.all()
-    objective = searched.objectives[0]
-    worth = values[0] * (1.0 if objective.target is not None else objective.sign)
-    apart = np.max(np.abs(searched.space.settled(shares) - searched.space.settled(best[None])), axis=1) >= _NEAR
-    worth = np.where(apart & np.isfinite(worth), worth, -np.inf)
-    first = int(np.argmax(worth))
-    return shares[first] if np.isfinite(worth[first]) else None
 
 
 def _alternative(

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.designs.confirmation import ConfirmedDesign
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
@@ -118,9 +119,13 @@ class Design(DisplayMixin):
     breaking: int
     warnings: tuple[Note, ...]
     learned: Learned | None = None
-    """How well a model that solves for the flow is known; None where it was asked for every design."""
+    """Accuracy of a model that solves for the flow; None where it was evaluated for every design."""
     model_reason: str = ""
-    """Why the model was taken, in half a sentence; empty where it was asked for."""
+    """Reason of the model, in half a sentence; empty where it was named."""
+    leading: tuple[Samples, ...] = field(default=(), repr=False)
+    """The best design and the next ones, at least a tenth of a range apart: positions in the ranges, (variables,)."""
+    confirmed: tuple[ConfirmedDesign, ...] = ()
+    """Trials of these, by `tube`; none for other models."""
 
     @property
     def calibrated(self) -> bool:
@@ -193,6 +198,8 @@ class Design(DisplayMixin):
             },
             "designs": {"swum": self.swum, "refused": self.refused, "breaking_a_condition": self.breaking},
         }
+        if self.confirmed:
+            content["confirmed"] = [self._confirmed(one) for one in self.confirmed]
         if self.uncertainty is not None:
             content["uncertainty"] = self._uncertainty(self.uncertainty)
         if self.learned is not None:
@@ -205,6 +212,15 @@ class Design(DisplayMixin):
             units = dict(self.units) | {item.name: item.unit for item in self.objectives}
             content["front"] = {name: quantity(column, units[name]) for name, column in self.front.items()}
         return envelope("design", content, self.warnings)
+
+    def _confirmed(self, one: ConfirmedDesign) -> dict[str, Any]:
+        space = self.searched.space
+        values = zip(space.variables, space.values(one.shares[None])[0], strict=True)
+        return {
+            "design": {item.path: quantity(float(value), item.unit) for item, value in values},
+            "held": {"forward_velocity": quantity(one.held, "m/s")},
+            "trial": one.trial.to_dict(),
+        }
 
     def _ends(self, name: str) -> dict[str, Any]:
         known = self.uncertainty

@@ -103,7 +103,7 @@ class Evaluation:
     bench: Manufacturability
     drawn: SampledRobots
     confidence: float
-    """Share of the draws in which a condition has to hold."""
+    """Share of the draws that must satisfy a condition."""
     tail_rate: float | None = None
     """Prescribed rate of the tail, rad/s; None: the robot's own drive."""
 
@@ -152,14 +152,14 @@ class Evaluation:
         return DesignScores(cost, values, refused)
 
     def unbuildable(self, shares: Samples) -> Samples:
-        """By how much designs break what bench, tube and model ask for, summed, (designs,); 0 where they do not."""
+        """Summed violation of the limits of manufacture, tube and model, (designs,); 0 where there is none."""
         found = np.zeros(len(shares))
         for limit in self.limits(shares):
             found = found + np.broadcast_to(np.where(limit.holds, 0.0, _excess(limit)), found.shape)
         return found
 
     def limits(self, shares: Samples | None) -> list[Limit]:
-        """What bench, tube and model ask of designs; None: of the robot as it is."""
+        """Limits of manufacture, tube and model for designs; None: of the robot as it is."""
         batch = RobotBatch.of(self.space.robot) if shares is None else self.space.batch(shares)
         with np.errstate(all="ignore"):  # what is out of all proportion is refused by a limit
             return [*requirements(batch, self.model), *self.bench.limits(batch)]

@@ -1,4 +1,4 @@
-"""Whether the best design leads others by more than the error of what it was found with."""
+"""Whether the best design is better than others by more than the error of its model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 
 def lead_warnings(answer: Design) -> tuple[Note, ...]:
-    """Sentences on fields that do not matter, on a better design, and on leads below the error of the objective.
+    """Sentences on fields without influence, on a better design, and on differences below the error of the objective.
 
     Returns:
         One sentence for each such error; none where every lead is larger.

@@ -53,7 +53,7 @@ class Points:
     variables: tuple[Variable, ...]
     """Fields of the tail that are varied."""
     features: Samples
-    """Where in their ranges the designs lie, (points, fields)."""
+    """Positions of the designs in their ranges, (points, fields)."""
     logarithms: Samples
     """Upper triangle of log C, (points, 6)."""
 
@@ -63,13 +63,13 @@ class Points:
         return replace(self, features=self.features[rest], logarithms=self.logarithms[rest])
 
     def joined(self, more: Points) -> Points:
-        """These points and those of others that lie elsewhere."""
+        """These points and those of others that differ from them."""
         new = [row for row, at in enumerate(more.features) if not self.has(at)]
         features = np.concatenate([self.features, more.features[new]])
         return replace(self, features=features, logarithms=np.concatenate([self.logarithms, more.logarithms[new]]))
 
     def has(self, feature: Samples) -> bool:
-        """Whether one of the points lies there."""
+        """Whether one of the points is near."""
         return bool(np.any(np.all(np.abs(self.features - feature) < 1e-9, axis=1)))
 
     def at(self, features: Samples) -> Samples:
@@ -84,7 +84,7 @@ class Points:
 
 
 def features_of(batch: RobotBatch, variables: tuple[Variable, ...]) -> Samples:
-    """Where in the ranges of some fields of the tail the robots of a batch lie, (robots, fields)."""
+    """Positions of the robots of a batch in the ranges of some fields of the tail, (robots, fields)."""
     found = np.zeros((batch.size, len(variables)))
     for column, item in enumerate(variables):
         values = batch.tail_length / batch.wavelength if item.path == TURNS else getattr(batch, _COLUMNS[item.path])
@@ -106,7 +106,7 @@ class Corrected(SwimmerModel):
         self.points = points
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
-        """What the model itself asks for, and the fast model; asked once for each tail."""
+        """Limits of the model and of the fast model; evaluated once for each tail."""
         features = features_of(batch, self.points.variables)
         _, first, inverse = np.unique(features, axis=0, return_index=True, return_inverse=True)
         few, place = batch.taken(first), np.ravel(inverse)
@@ -114,7 +114,7 @@ class Corrected(SwimmerModel):
 
     @abstractmethod
     def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        """What the model itself asks for, without what needs a solution of the flow."""
+        """Limits of the model that need no solution of the flow."""
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`."""
@@ -138,7 +138,7 @@ class Corrected(SwimmerModel):
 
 
 class LearnedTube(Corrected):
-    """`tube` as it is learned, at the reference place."""
+    """Surrogate of `tube`, at the reference pose."""
 
     name = "tube"
 
@@ -236,7 +236,7 @@ def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
 
 
 def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
-    """The model that is asked for, or with `auto` the one that knows most about the robot.
+    """The named model, or with `auto` the most complete one that applies to the robot.
 
     Args:
         asked: name of a model, or `auto`.

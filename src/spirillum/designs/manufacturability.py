@@ -23,10 +23,9 @@ class Manufacturability(Options):
     prefixed: ClassVar[bool] = True
 
     mandrel: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
-    """Least diameter around which the wire is bent, in wire diameters: enamelled copper wire is tested by winding it
-    around its own diameter (IEC 60851-3, mandrel winding)."""
+    """Least bending diameter of the wire, in wire diameters (IEC 60851-3, mandrel winding)."""
     clearance: LengthOrZero | None = None
-    """Least distance of the tail from the glass where its axis is the tube's; None: one wire diameter."""
+    """Least distance between the tail on the tube's axis and the glass; None: one wire diameter."""
 
     def check(self, designs: RobotBatch) -> None:
         """Refuse a clearance that no design leaves, before any of them is swum.

@@ -16,7 +16,7 @@ _HALVINGS = 12
 _FLAT = 0.01
 """Loss of the objective up to which a variable is free, relative."""
 _TOUCHES = 1e-3
-"""Share of a range, or relative excess of a condition, within which the best design lies at it."""
+"""Share of a range, or relative excess of a constraint, within which the best design is at its bound."""
 
 
 def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectiveProfile:

@@ -91,6 +91,6 @@ def _value(name: str, given: object, unit: str) -> float:
 
 @lru_cache(maxsize=64)
 def _kind(unit: str) -> Kind:
-    """Any value of an SI unit; the fields' and the model's own limits say which make sense."""
+    """Any value of an SI unit; the limits of fields and model decide which are valid."""
     plain = unit.replace("^", "**")
     return Kind(f"quantity in {unit}", plain, f"1 {unit}", f"-1e12 {plain}", f"1e12 {plain}")

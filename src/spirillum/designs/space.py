@@ -47,7 +47,7 @@ class Variable(NamedTuple):
         return found
 
     def share(self, value: float) -> float:
-        """Where in the range a value lies; of a whole number the middle of its part."""
+        """Position of a value in its range; of a whole number the middle of its interval."""
         if self.is_whole:
             return (value - self.low + 0.5) / (self.high - self.low + 1.0)
         return (value - self.low) / (self.high - self.low)
@@ -70,7 +70,7 @@ class Space:
         return np.stack([variable.at(shares[:, n]) for n, variable in enumerate(self.variables)], axis=-1)
 
     def settled(self, shares: Samples) -> Samples:
-        """Shares of the values that shares stand for, of which those of one whole number are the same."""
+        """Normalised values, of which those of one whole number coincide."""
         values = self.values(shares)
         found = shares.copy()
         for n, variable in enumerate(self.variables):

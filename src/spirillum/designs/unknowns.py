@@ -38,7 +38,7 @@ class Unknowns:
     """Ranges, or a posterior, of what is not known of a robot."""
 
     robot: Robot
-    """With the middle of the posterior in place of its own values."""
+    """With the posterior median in place of its own values."""
     ranges: tuple[Variable, ...] = ()
     """Fields with the ranges over which they are uniform and independent."""
     fit: Fit = NO_FIT

@@ -20,7 +20,7 @@ _WITHIN = 0.01
 _LEAST_TURNS = 2
 """Turns for which a motion that changes within a turn has to be steady."""
 _SINKS = 0.2
-"""Way up or down over that along, from which on a robot is said to sink or rise."""
+"""Ratio of vertical to horizontal displacement from which on a robot is reported to sink or rise."""
 STEADY = (
     "from the time on at which speed and tail rate (of a free run: averaged over a turn of the tail) stay within 1 % "
     "of what they are at the end of their time on at constant duty, for at least half of that time (and two turns)"
@@ -114,7 +114,7 @@ def _average(time: Samples, values: Samples, stretches: Sequence[DutyInterval]) 
 def _steady_part(
     time: Samples, judged: Sequence[Samples], stretch: DutyInterval, *, by_turn: bool
 ) -> DutyInterval | None:
-    """The end of a stretch in which all judged quantities are steady; None without one."""
+    """End of a stretch in which all compared quantities are steady; None without one."""
     inside = time[(time >= stretch.start) & (time <= stretch.end)]
     if inside.size < 3:
         return None

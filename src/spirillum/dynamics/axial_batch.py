@@ -26,11 +26,11 @@ from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_l
 from spirillum.units import parse_option
 
 FACTORS = ("friction", "viscosity")
-"""Ranges that are factors of the robot's own value, drawn evenly in their logarithm."""
+"""Ranges that are factors of the robot's own value, sampled log-uniformly."""
 _NAMES = tuple(item.name for item in PARAMETERS)
 _FIRST_RESPONSE = _NAMES.index("forward_velocity_per_torque")
 _FIXED = ("polarity", *_NAMES[_FIRST_RESPONSE:])
-"""Numbers that follow from others and cannot be drawn alone."""
+"""Numbers that follow from others and cannot be sampled alone."""
 _LARGEST_FACTOR = 1e3
 """Of friction and viscosity."""
 
@@ -88,7 +88,7 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
 def drawn_numbers(
     axial: AxialRobot, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[Samples, Samples]:
-    """Numbers of robots drawn from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,)."""
+    """Numbers of robots sampled from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,)."""
     numbers = np.tile(np.array(axial.values), (count, 1))
     factors = {name: np.ones(count) for name in FACTORS}
     for name, (low, high) in ranges.items():
@@ -176,7 +176,7 @@ class AxialBatch:
         self.axial: AxialRobot = axial_robot(
             robot, model=model, friction=friction, calibration=calibration, placement=placement
         )
-        """The robot that they are drawn around."""
+        """The robot that they are sampled around."""
         self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.axial.robot, ranges)
         self._pool: Samples | None = None if posterior is None else posterior_numbers(self.axial, posterior, _POOL)
         self._rng = np.random.default_rng(seed)
@@ -196,7 +196,7 @@ class AxialBatch:
 
     @property
     def held(self) -> AxialRobot:
-        """The robot that they are drawn around, by its earlier name."""
+        """The robot that they are sampled around, by its earlier name."""
         return self.axial
 
     @property
@@ -205,7 +205,7 @@ class AxialBatch:
         return len(self.time)
 
     def redraw(self, which: np.ndarray | None = None, rng: np.random.Generator | None = None) -> None:
-        """Take new robots from the ranges or the posterior; their motion goes on.
+        """Sample new robots from the ranges or the posterior; their motion continues.
 
         Args:
             which: truth value of each robot; None: all.
@@ -228,7 +228,7 @@ class AxialBatch:
         self.numbers[chosen], self._viscosity[chosen] = numbers, viscosity
 
     def reset(self, which: np.ndarray | None = None) -> None:
-        """Back to rest at place 0, with the drive on at the robot's own duty.
+        """Back to rest at position 0, with the drive on at the robot's own duty.
 
         Args:
             which: truth value of each robot; None: all.

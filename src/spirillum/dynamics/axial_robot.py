@@ -25,9 +25,10 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fitted.fit import read_fit
 from spirillum.kernels import axial_motor as kernel
+from spirillum.kernels.drive import MOTOR, steady_currents, windings
 from spirillum.notes import Note
 from spirillum.quantities import unit_of
-from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
@@ -88,8 +89,6 @@ OUTPUTS = (
     "electrical_power",
 )
 """Outputs; quantities of the registry."""
-_HALVINGS = 200
-_LARGEST_EXPONENT = 600.0
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ class AxialRobot:
                 f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a current that changes"
             )
         response = responses(steady, steady.batch, np.array([steady.effective_friction]))[0]
-        return cls(steady, (*_of_motor(motor), *response.tolist()))
+        return cls(steady, (*(float(column[0]) for column in motor.columns), *response.tolist()))
 
     @property
     def robot(self) -> Robot:
@@ -199,24 +198,6 @@ def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscos
     return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
 
 
-def _of_motor(motor: Electrics) -> tuple[float, ...]:
-    columns = (
-        motor.joint_torque_constant,
-        motor.joint_back_emf_constant,
-        motor.inductance,
-        motor.constant,
-        motor.decay,
-        motor.decay_rate,
-        motor.growth,
-        motor.growth_rate,
-        motor.slope,
-        motor.voltage,
-        motor.internal_resistance,
-        motor.polarity,
-    )
-    return tuple(float(column[0]) for column in columns)
-
-
 def motion(p: Samples, current: Any, flow: Any) -> Samples:
     """U, omega and Omega, (3, ...), of robots with numbers `p` (..., 18), a current, A, and an imposed flow, m/s."""
     torque = p[..., kernel.TORQUE] * current
@@ -235,7 +216,7 @@ def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
 
 
 def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
-    """d/dt of the state, (5,), which depends on the current alone.
+    """d/dt of the state and its two integrals, (7,), which depends on the current alone.
 
     Args:
         p: the robot's numbers, (18,).
@@ -243,32 +224,17 @@ def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
         duty: 0 to 1.
         flow: imposed mean flow, m/s.
     """
-    return np.array(
-        [_current_rate(p, current, duty, flow), *motion(p, current, flow), p[kernel.POLARITY] * duty * current]
-    )
-
-
-def winding(p: Samples, size: float) -> tuple[float, float]:
-    """R and dR/d|I|."""
-    falling = p[kernel.DECAY] * math.exp(-p[kernel.DECAY_RATE] * size)
-    rising = p[kernel.GROWTH] * math.exp(min(p[kernel.GROWTH_RATE] * size, _LARGEST_EXPONENT))
-    value = p[kernel.CONSTANT] + falling + rising + p[kernel.SLOPE] * size
-    slope = p[kernel.GROWTH_RATE] * rising - p[kernel.DECAY_RATE] * falling
-    return float(value), float(slope + p[kernel.SLOPE])
-
-
-def _current_rate(p: Samples, current: float, duty: float, flow: float) -> float:
-    size = abs(current)
-    supply = p[kernel.POLARITY] * duty * (p[kernel.VOLTAGE] - p[kernel.INTERNAL] * size)
-    slip = (p[kernel.TAIL] - p[kernel.BODY]) * p[kernel.TORQUE] * current
-    slip += (p[kernel.TAIL_FLOW] - p[kernel.BODY_FLOW]) * flow
-    return float((supply - winding(p, size)[0] * current - p[kernel.EMF] * slip) / p[kernel.INDUCTANCE])
+    found = np.empty(kernel.STATES)
+    kernel.rates(p, current, duty, flow, found)
+    return found
 
 
 def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, Samples, Samples]:
     """A (5, 5), B (5, 2), C (12, 5), D (12, 2) of the equations linearised at a current and duty, in closed form."""
     size, sense, sign = abs(current), math.copysign(1.0, current), p[kernel.POLARITY]
-    r, r_slope = winding(p, size)
+    found = np.empty((1, 2))
+    windings(p[None, :MOTOR], np.array([current]), found)
+    r, r_slope = found[0]
     emf, inductance, internal = p[kernel.EMF], p[kernel.INDUCTANCE], p[kernel.INTERNAL]
     voltage = p[kernel.VOLTAGE] - internal * size
     per_current, per_flow = motion(p, 1.0, 0.0), motion(p, 0.0, 1.0)
@@ -287,20 +253,9 @@ def slopes(p: Samples, current: float, duty: float) -> tuple[Samples, Samples, S
 
 
 def steady_current(p: Samples, duty: float, flow: float) -> float:
-    """The current at which it no longer changes, A: between none and that of the bare resistance, by bisection."""
-    at_rest = _current_rate(p, 0.0, duty, flow)
-    if at_rest == 0.0:
-        return 0.0
-    sense, reach = math.copysign(1.0, at_rest), 1e-9
-    while sense * _current_rate(p, sense * reach, duty, flow) > 0.0 and reach < 1e9:
-        reach *= 2.0
-    low, high = 0.0, reach
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if sense * _current_rate(p, sense * middle, duty, flow) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return sense * 0.5 * (low + high)
+    """The current at which it no longer changes, A."""
+    sense, found = p[kernel.POLARITY], np.empty(1)
+    back_emf = sense * p[kernel.EMF] * (p[kernel.TAIL_FLOW] - p[kernel.BODY_FLOW]) * flow
+    per_current = p[kernel.EMF] * (p[kernel.TAIL] - p[kernel.BODY]) * p[kernel.TORQUE]
+    steady_currents(np.array([[*p[:MOTOR], duty, back_emf, per_current]]), found)
+    return float(sense * found[0])

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.display import DisplayMixin
+from spirillum.dynamics.effects import Effect, effects_of
 from spirillum.dynamics.trial_request import TrialRequest
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
@@ -46,7 +47,7 @@ class ModelComparison(DisplayMixin):
 
     @cached_property
     def reference(self) -> str:
-        """The model that the others are held against.
+        """The reference model of the comparison.
 
         The last that puts a number on its own error, for such a model resolves what the others neglect; the first
         that answers where none does.
@@ -85,6 +86,16 @@ class ModelComparison(DisplayMixin):
         calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
         return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
 
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """What each effect does to the speed, from Lighthill's theory to the trial.
+
+        Empty without `sbt` and `slender`, or with calibration factors, which stand for several effects at once.
+        """
+        if any(answer.calibrated for answer in self.predictions.values()):
+            return ()
+        return effects_of(self.robot, self.predictions, self.friction)
+
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum compare-models --json`."""
         entries = {name: self._answered(name, answer) for name, answer in self.predictions.items()}
@@ -94,6 +105,7 @@ class ModelComparison(DisplayMixin):
             "friction": self.friction,
             "reference": self.reference,
             "models": [entries[name] for name in self.models],
+            "effects": [{"effect": one.name, "forward_velocity": quantity(one.speed, "m/s")} for one in self.effects],
         }
         return envelope("model-comparison", content, self.warnings)
 
@@ -145,7 +157,7 @@ def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Se
 
 
 def estimated_error(prediction: Prediction) -> float | None:
-    """The relative error that a model estimates of its own speed; None where it states its error in words only."""
+    """Relative error that a model estimates for its own speed; None where its error is stated in words only."""
     return prediction.error_estimate if math.isfinite(prediction.error_estimate) else None
 
 
@@ -242,7 +254,7 @@ def _chosen(models: Sequence[str] | None) -> list[str]:
 
 
 def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
-    """A sentence and every model's reason; what has nothing to do with models, such as a wrong rate, is said once."""
+    """One sentence with every model's reason; an error common to all models is stated once."""
     reasons = list(dict.fromkeys(refusals.values()))
     if len(reasons) == 1:
         return reasons[0], ()

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.errors import InputError
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.robot import Robot
 
@@ -59,6 +60,7 @@ def films_of(robot: Robot, roughness: float | None, drag: float, load: float) ->
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
         return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
+    robot.check_body("motion beside the wall of a channel, with lubrication films,")
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)
@@ -82,6 +84,11 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
     across = _across(radius, channel)
     if body.shape in ("sphere", "spheroid"):
         return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius]]
+    if body.shape == "profile":
+        known = "capsule, cylinder, sphere or spheroid"
+        raise InputError(
+            f"lubrication films of a body.profile beside a wall are not known; allowed: body.shape = {known}"
+        )
     front, rear = half - body.rounding(body.front_end), -half + body.rounding(body.rear_end)
     length = front - rear
     if length < 1e-6 * radius:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _DRAWS = 100
 """Draws of a posterior that are run."""
 _SURE = 80
-"""Draws from which on the limits of a 95 % interval lie between them, not at their ends."""
+"""Number of draws from which on the limits of a 95 % interval are interpolated."""
 _FEWEST, _MOST = 20, 1000
 _FACTORS = {
     "mean_forward_velocity": ("advance", "motor_rate"),
@@ -39,7 +39,7 @@ _OVER = ("", "_on", "_steady")
 def chosen_run(
     model: str, motion: str | None, robot: Robot, placement: Placement, fit: Fit
 ) -> tuple[ModelChoice, str, list[Note]]:
-    """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
+    """Model and motion of a run: the requested ones, else those of the robot and the fit.
 
     Args:
         model: name of the model, or `auto`.

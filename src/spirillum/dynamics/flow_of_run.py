@@ -1,4 +1,4 @@
-"""The flow around a robot at a moment of its run in the tube: place, tail and rates are those of the run."""
+"""The flow around a robot at a moment of its run in the tube, with pose and rates of the run."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ _SAME_TIME = 1e-3
 """Share of the time between two samples within which a moment is that of a sample."""
 _TOLERANCE = 0.03
 _THINNEST = 0.02
-"""Thinnest film that is drawn, in diameters of the body: thinner ones of a yawed robot take many minutes."""
+"""Thinnest film that is resolved, in diameters of the body: thinner ones of a yawed robot take many minutes."""
 
 
 class RunSnapshot(NamedTuple):
     """A robot in its tube at a moment of a run, in axes of the body that do not roll; nothing is solved for yet."""
 
     prediction: Prediction
-    """Its motion as an answer, and the place."""
+    """Its motion as an answer, and the pose."""
     phase: float
     """Of the tail, rad."""
     body: np.ndarray
@@ -67,7 +67,7 @@ class RunSnapshot(NamedTuple):
     mean_flow: float
     """Mean flow through the tube, m/s."""
     lifted: float
-    """How much further off the wall than in the run it is drawn, m."""
+    """How much further from the wall than in the run it is resolved, m."""
 
 
 def flow_of_run(
@@ -208,7 +208,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
 
 @contextmanager
 def _said_of_the_run() -> Iterator[None]:
-    """What is refused inside is said of the run, with the names that the fields of a placement have there."""
+    """Restate errors of a placement in terms of the run."""
     try:
         yield
     except InputError as error:

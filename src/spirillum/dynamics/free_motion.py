@@ -1,4 +1,4 @@
-"""Free motion of a robot in its tube: where weight, film, contact and its own motion make it lie, and how it swims.
+"""Free motion of a robot in its tube: resting pose and swimming under weight, film, contact and its own motor.
 
 The motion is the run of `simulate`, followed to where it no longer changes from turn to turn of the tail; every
 quantity is the mean over such a turn.
@@ -60,16 +60,16 @@ _LIGHT = 1e-9
 
 
 class Release(NamedTuple):
-    """How a robot is laid down in its tube, and what drives and touches it there."""
+    """Release of a robot in its tube, its drive, and its contact."""
 
     table: TubeTable
     """Its table."""
     placement: Placement
-    """Where it is laid down, ends, and a constant flow."""
+    """Initial pose, ends, and a constant flow."""
     in_tube: InTube
-    """What is asked for of azimuth and dry friction."""
+    """Requested azimuth and dry friction."""
     roughness: float | None
-    """Height of the asperities that is asked for, m; None: the fitted one, or 1e-4 of the body's radius."""
+    """Requested height of the asperities, m; None: the fitted one, or 1e-4 of the body's radius."""
     contact: FittedContact
     """Roughness and dry friction of a calibration, or of a draw of its posterior."""
     tail_rate: str | float | None
@@ -84,17 +84,17 @@ class FreeMotion(NamedTuple):
     """A free robot in its tube, followed to its steady motion."""
 
     prediction: Prediction
-    """The steady motion; where it lies is `prediction.lying`."""
+    """The steady motion; its pose is `prediction.lying`."""
     run: LongRun
     """How it came there."""
     robot: TubeRobot
     """What its rates follow from."""
     start_gap: float
-    """Smallest distance of body and wall where it was laid down, m."""
+    """Smallest distance between body and wall at release, m."""
     laid: Release
-    """How it was laid down."""
+    """Initial pose."""
     checked: Checked
-    """Whether its table was checked where it lies."""
+    """Whether its table was checked at this pose."""
 
 
 def free_motion(
@@ -110,7 +110,7 @@ def free_motion(
     until: float | None = None,
     progress: Progress | None = None,
 ) -> FreeMotion:
-    """Follow a free robot in its tube from where it is laid down to its steady motion.
+    """Follow a robot after release in its tube to its steady motion.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
@@ -183,7 +183,7 @@ def free_motion(
 
 
 def let_go(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
-    """The robot held where it is laid down, what its rates follow from with its drive on, and that place."""
+    """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
     rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
     held = predict(
         robot, model="tube", tail_rate=laid.tail_rate, friction=laid.friction, placement=laid.placement, band=False
@@ -213,7 +213,7 @@ def _check_until(until: float | None, gap: float) -> None:
 
 
 def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
-    """The robot with its drive on, or with its tail at the rate that was asked for."""
+    """The robot with its drive on, or with its tail at the requested rate."""
     drive = held.robot.drive
     if held.tail_rate is None:
         return links.at_duty(1.0 if drive is None else drive.duty)
@@ -224,7 +224,7 @@ def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
 
 
 def _checked(run: LongRun, links: TubeRobot) -> Checked:
-    """How the places of the last turn stand to those at which the table was checked."""
+    """Compare the poses of the last turn with those at which the table was checked."""
     names = ("gap", "offset", "pitch", "yaw")
     return held_against_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
 

@@ -24,6 +24,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.freedom import LINKS
+from spirillum.swimming.motor import packed_curve
 from spirillum.swimming.steady import calibrated_resistance
 
 _KINDS = {
@@ -31,24 +32,8 @@ _KINDS = {
     "torque": rigid_links.TORQUE,
     "rate": rigid_links.RATE,
     "magnetic": rigid_links.MAGNETIC,
+    "torque-speed": rigid_links.CURVE,
 }
-_ELECTRICS = {
-    "polarity": rigid_links.POLARITY,
-    "joint_torque_constant": rigid_links.TORQUE_CONSTANT,
-    "joint_back_emf_constant": rigid_links.BACK_EMF,
-    "inductance": rigid_links.INDUCTANCE,
-    "constant": rigid_links.CONSTANT,
-    "decay": rigid_links.DECAY,
-    "decay_rate": rigid_links.DECAY_RATE,
-    "growth": rigid_links.GROWTH,
-    "growth_rate": rigid_links.GROWTH_RATE,
-    "slope": rigid_links.SLOPE,
-    "voltage": rigid_links.VOLTAGE,
-    "internal_resistance": rigid_links.INTERNAL_RESISTANCE,
-    "duty": rigid_links.DUTY,
-}
-
-
 _Robot = TypeVar("_Robot", bound="FreeRobot")
 """Instead of `Self`, which checks of shapes take in classes as a whole only."""
 
@@ -67,7 +52,7 @@ class FreeRobot(ABC):
     weight: Samples
     """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
     drive: Samples
-    """Drive and motor (23,), see `spirillum.kernels.rigid_links`."""
+    """Drive and motor (48,), see `spirillum.kernels.rigid_links`."""
     table: Samples = field(default_factory=lambda: np.zeros(0))
     """The robot's table in its tube, see `spirillum.kernels.tube_table`; empty without walls."""
     length: float
@@ -119,7 +104,7 @@ class FreeRobot(ABC):
         return found
 
     def at_duty(self: _Robot, duty: float) -> _Robot:
-        """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
+        """The robot at the duty of the remote; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
         drive[rigid_links.DUTY] = duty
         return replace(self, drive=drive)
@@ -173,7 +158,7 @@ def weight_of(robot: Robot) -> Samples:
 
 
 def drive_of(batch: RobotBatch) -> Samples:
-    """Drive and motor of a batch of one at full duty (23,)."""
+    """Drive and motor of a batch of one at full duty (48,)."""
     drive = np.zeros(rigid_links.DRIVE)
     drive[rigid_links.KIND], drive[rigid_links.FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
     drive[rigid_links.DUTY] = 1.0
@@ -185,9 +170,12 @@ def drive_of(batch: RobotBatch) -> Samples:
         moment, angle = float(batch.magnetic_moment[0]), float(batch.moment_angle[0])
         drive[rigid_links.MOMENT : rigid_links.FIELD] = moment * np.cos(angle), 0.0, moment * np.sin(angle)
         drive[rigid_links.FIELD], drive[rigid_links.FIELD_RATE] = batch.magnetic_field[0], batch.field_rate[0]
+    elif batch.curve is not None:
+        drive[rigid_links.POLARITY] = batch.curve.sense * batch.hand[0]
+        drive[rigid_links.CURVE_POINTS :] = packed_curve(batch.curve)
     elif batch.electrics is not None:
-        for name, column in _ELECTRICS.items():
-            drive[column] = getattr(batch.electrics, name)[0]
+        drive[rigid_links.TORQUE_CONSTANT : rigid_links.AXIS_Y] = [column[0] for column in batch.electrics.columns]
+        drive[rigid_links.DUTY] = batch.electrics.duty[0]
     return drive
 
 
@@ -199,7 +187,7 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
     Args:
         drag: resistance against the seven rates (7, 7).
         weight: submerged weight and moments (8,).
-        drive: drive and motor (23,).
+        drive: drive and motor (48,).
     """
     kind = drive[rigid_links.KIND]
     field = float(np.linalg.norm(drive[rigid_links.MOMENT : rigid_links.FIELD])) * drive[rigid_links.FIELD]
@@ -209,6 +197,7 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
     heavy = float(np.abs(weight[: rigid_links.MOMENT_BODY]).sum()) * float(np.sqrt(drag[4, 4] / drag[1, 1]))
     resistance = drive[rigid_links.CONSTANT]
     stall = drive[rigid_links.TORQUE_CONSTANT] * drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 0.0
+    stall = max(stall, drive[rigid_links.CURVE_AT + 1])
     return float(max(stall, field, given if kind in (rigid_links.TORQUE, rigid_links.RATE) else 0.0, heavy, 1e-300))
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,8 @@ from spirillum.kernels import rigid_links, stiff_steps
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
-_END = "end of the channel"
+END_OF_CHANNEL = "end of the channel"
+"""Event of a robot whose nose or tail reaches the end of its channel."""
 _STUCK = "no step is small enough"
 INTERRUPTED = "interrupted"
 """The event of a run that was interrupted, which keeps what was done."""
@@ -46,13 +48,13 @@ class Reach(NamedTuple):
     """What ends a run, or its drive."""
 
     nose: float
-    """Place of the nose's tip on the motor axis, m."""
+    """Position of the nose's tip on the motor axis, m."""
     tip: float
-    """Place of the tail's tip, m."""
+    """Position of the tail's tip, m."""
     channel: float
     """Half the channel's length, m; infinite without one."""
     middle: float
-    """Place of the channel's middle, m."""
+    """Position of the channel's middle, m."""
     charge: float
     """Charge of the battery, A s; infinite without a rating."""
 
@@ -197,7 +199,8 @@ def _stretch(
 ) -> _Stretch:
     robot = run.robot.at_duty(duty).between(run.time, stop)
     data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
-    stiff_steps.watched(run.state, 0.0, data, robot.table, limits, robot.roughness, run.gaps)
+    outside = float(observed_at(robot, run.state)[rigid_links.OUTSIDE]) if robot.table.size else 0.0
+    stiff_steps.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, rigid_links.STATES))
     sizes, done = robot.step_sizes(), 0
     sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
@@ -242,7 +245,7 @@ def _crossed(
     new, inner, gaps = run.state.copy(), np.empty(rigid_links.STATES), np.empty_like(run.gaps)
     dy = np.empty(rigid_links.STATES)
 
-    def at(share: float, place: int) -> float:
+    def at(place: int, share: float) -> float:
         stiff_steps.interpolate(share, run.before, new, run.increments, inner)
         outside = 0.0
         if place == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
@@ -251,13 +254,8 @@ def _crossed(
         stiff_steps.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
         return float(gaps[place])
 
-    found: list[tuple[float, int]] = []
-    for place in np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist():
-        low, high = 0.0, 1.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if (at(middle, place) > 0) == (watched[place] > 0) else (low, middle)
-        found.append((high, place))
+    crossed = np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist()
+    found = [(_crossing(partial(at, place)), place) for place in crossed]
     sites = robot.gap_count
     for share, place in sorted(found):
         moment = begin + share * length
@@ -266,11 +264,11 @@ def _crossed(
         if place < sites:
             events.append(Event(moment, robot.contact_event(place, touches=bool(watched[place] > 0))))
             continue
-        at(share, place)
+        at(place, share)
         if place == sites + stiff_steps.CHARGE_LEFT:
             what = BATTERY_EMPTY
         elif place == sites + stiff_steps.ROOM:
-            what = _END
+            what = END_OF_CHANNEL
         else:
             what = robot.range_left(inner, moment)
         run.state[:] = inner
@@ -279,6 +277,19 @@ def _crossed(
         events.append(Event(moment, what))
         return what
     return ""
+
+
+def _crossing(value: Callable[[float], float]) -> float:
+    """Share of a step at which what changes its sign within has done so."""
+    from scipy.optimize import brentq
+
+    first, last = value(0.0), value(1.0)
+    if (first > 0) == (last > 0):  # it touches zero at an end
+        return 0.0 if first == 0.0 else 1.0
+    share = float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-15)) if first and last else 1.0
+    while share < 1.0 and (value(share) > 0) == (first > 0):
+        share = min(1.0, share + 2e-15)
+    return share
 
 
 def watched_limits(robot: FreeRobot, reach: Reach, *, spent: bool = False) -> Samples:

@@ -101,8 +101,8 @@ def magnetic_sweep(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.
         rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
             None: 40 rates up to one and a half times the step-out rate of the held robot.
-        model: `slender` or `rft`; or `auto`: `slender` for a robot without a channel. A sweep knows no walls, so that
-            a robot in a channel needs the name of a model, which leaves them out.
+        model: `slender` or `rft`; or `auto`: `slender` for a robot without a channel. A robot in a channel needs the
+            name of a model: a sweep leaves the walls out.
         turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
             at most 25, and the last is averaged, over whole slips where the robot slips.
         resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.

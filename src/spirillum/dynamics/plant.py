@@ -67,16 +67,16 @@ class Snapshot:
     time: float
     """s."""
     pose: RobotPose
-    """Where it is and how it lies."""
+    """Position and attitude."""
     values: dict[str, float]
     """Quantities by name, SI; NaN where one has no value."""
     ended: str
-    """Why the run ended here, in half a sentence; empty while it goes on."""
+    """Why the run ended, in half a sentence; empty while it continues."""
 
 
 @dataclass(frozen=True)
 class PlantState:
-    """All that the next step of a plant follows from; another plant of the same robot goes on from it."""
+    """Complete state for the next step of a plant; another plant of the same robot can continue from it."""
 
     time: float
     """s."""
@@ -85,7 +85,7 @@ class PlantState:
     duty: float
     """Duty of the last step, which the drive has."""
     command: float
-    """Duty that the next step asks for if none is given."""
+    """Duty of the next step if none is given."""
     flow: float | None
     """Mean flow that is imposed, m/s; None: none is."""
     field: TurningField | None
@@ -93,7 +93,7 @@ class PlantState:
     spent: bool
     """Whether the battery is empty."""
     ended: str
-    """Why the run has ended; empty while it goes on."""
+    """Why the run has ended; empty while it continues."""
     azimuth: float
     """Azimuth counted over whole turns, rad."""
     checkpoint: Checkpoint | None
@@ -248,7 +248,7 @@ class Plant:
         return self.observe()
 
     def copy(self) -> Plant:
-        """A plant of its own that is where this one is; geometry and table are shared."""
+        """An independent plant in the same state; geometry and table are shared."""
         return copy.copy(self)
 
     def step(
@@ -386,7 +386,7 @@ class Plant:
         return links_in_tube(self.steady, table, placed, self._asked, self._height, weight=self._weight)
 
     def _commanded(self, *, remote: bool | None, duty: float | None) -> float:
-        """Duty that is asked for."""
+        """Commanded duty."""
         if remote is not None and duty is not None:
             raise InputError("remote and duty are given together; allowed: one of them")
         if remote is not None:

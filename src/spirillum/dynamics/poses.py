@@ -1,4 +1,4 @@
-"""Where a robot is and how it lies: position, attitude, and the angle of its tail."""
+"""Pose of a robot: position, attitude, and the angle of its tail."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Poses:
 
     @property
     def travelled(self) -> float:
-        """Largest distance between the body's places, along the axis on which it is largest, m."""
+        """Largest distance between positions of the body, along the axis on which it is largest, m."""
         return float(np.ptp(self.position, axis=0).max())
 
     @property

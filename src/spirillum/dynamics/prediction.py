@@ -63,15 +63,13 @@ def predict(  # noqa: PLR0913 - the options of the command
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose values replace the robot's.
-        posterior: file of a calibration's posterior, for intervals; in free motion in the tube 40 of its draws are
-            followed to their steady motions, in some second each.
-        posterior_for: with a posterior, intervals of a `new` tail like those fitted, or of this one, which was
-            `measured`.
+        posterior: file of a calibration's posterior, for intervals.
+        posterior_for: with a posterior, intervals of a `new` tail, or of this `measured` one.
         resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
         placement: where in the channel the robot lies, or is laid down.
-        band: of `tube`, with the band over what the placement leaves open, or the reference place alone; None: with it
+        band: of `tube`, with the band over unknown gap and pitch, or the reference pose alone; None: with it
             where the robot has a table, without which it takes minutes; not of free motion in the tube.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`; None: `held`, in the tube
+        motion: `held` (lateral motion and tilt constrained) or `free`; None: `held`, in the tube
             with the columns `trial` and `steady` beside it.
         roughness: of released motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4
             of the body's radius.
@@ -79,10 +77,10 @@ def predict(  # noqa: PLR0913 - the options of the command
             see `InTube`.
         duration: of the trial: time with the motor on, over which its values are means, with its unit or a float in s;
             None: 20 s.
-        interval: of the trial, the 90 % interval over what nobody states (waiting time, roughness, dry friction,
-            weight, effective friction), from 64 runs in some two minutes.
-        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong, as
-            with the robot's option `model.beyond_stokes`.
+        interval: of the trial, the 90 % interval over its unknowns (waiting time, roughness, dry friction, weight,
+            effective friction): 64 runs, up to two minutes.
+        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia dominates and these models
+            are wrong, as the robot's option `model.beyond_stokes`.
         progress: told what is being computed, how much is done, and of how much.
 
     Raises:

@@ -1,4 +1,4 @@
-"""One turn of the tail as a map of a robot's place in its tube, and the place that a turn brings back.
+"""Return map of a robot's pose in its tube over one turn of the tail, and its fixed point.
 
 The state is seen whenever the tail stands at the same angle against the wall: a turn then maps place and attitude to
 place and attitude. A steady motion is a fixed point of that map, whatever happens within a turn, and the eigenvalues
@@ -23,8 +23,9 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
 _SEARCHING = 10.0 * TubeRobot.tolerance
-"""Error of a step in time while a fixed place is looked for; it is settled at that of a run, as are its multipliers:
-one close to 1 says how slowly the place is approached."""
+"""Error of a time step while a fixed point is searched; it is refined at that of a run, as are its multipliers: one
+close to 1 is the rate of approach.
+"""
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
@@ -100,7 +101,7 @@ class ReturnMap:
         return Turn(end, time, steps[steps[:, 0] <= time])
 
     def _turned(self, y: Samples, turn: float, begun: tuple[float, float]) -> float:
-        """Angle by which the tail has turned against the wall where the robot lies, rad."""
+        """Angle by which the tail has turned relative to the nearest wall, rad."""
         raw = turn + y[rigid_links.PHASE] - begun[0] - begun[1]
         counted = y[rigid_links.ROLL] + y[rigid_links.PHASE] - begun[1]
         return float(self.sign * (raw + 2.0 * np.pi * np.round((counted - raw) / (2.0 * np.pi))))
@@ -134,7 +135,7 @@ def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
 
 
 class FixedPoint(NamedTuple):
-    """A place that a turn of the tail brings back, in a tube without gravity but for its azimuth."""
+    """A fixed point of the return map, in a tube without gravity up to its azimuth."""
 
     turn: Turn
     """The turn from there."""
@@ -145,7 +146,7 @@ class FixedPoint(NamedTuple):
 
 
 def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint | None:
-    """The fixed place near a state by Newton's method, if it is found.
+    """The fixed point near a state by Newton's method, if it is found.
 
     After each step some turns let go by what dies out within a few, such as gaps. It is looked for with longer
     steps in time than those of a run, and settled with these.
@@ -172,7 +173,7 @@ class _Found(NamedTuple):
     """Where Newton's method has ended."""
 
     x: Samples
-    """Coordinates of the place, (4,)."""
+    """Coordinates of the pose, (4,)."""
     turn: Turn
     """The turn from there."""
     derivative: Samples
@@ -180,7 +181,7 @@ class _Found(NamedTuple):
 
 
 def _newton(place: _Place, x: Samples, free: np.ndarray) -> _Found | None:
-    """Newton's method for the place that a turn brings back, from coordinates (4,); None where it fails."""
+    """Newton's method for the fixed point of the return map, from coordinates (4,); None where it fails."""
     found = place.change(x)
     for _ in range(_ROUNDS):
         if found is None:

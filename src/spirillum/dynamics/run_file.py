@@ -1,4 +1,4 @@
-"""Runs read back from their NetCDF files, checked: what a file says is not believed before."""
+"""Runs read from their NetCDF files, with all content checked."""
 
 from __future__ import annotations
 

@@ -51,6 +51,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         **({"placement": json.loads(dataset.attrs["placement"])} if "placement" in dataset.attrs else {}),
         **_in_the_tube(dataset),
         "events": json.loads(dataset.attrs["events"]),
+        **({"state": dataset.attrs["state"]} if "state" in dataset.attrs else {}),
         "steady": dataset.attrs["steady"],
         "duration": quantity(float(last["time"]), "s"),
     }
@@ -122,7 +123,7 @@ def _imposed_flow(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 _MOST_ALIKE = 4
-"""Events of one kind that are told one by one."""
+"""Events of one kind that are listed one by one."""
 
 
 class Told(NamedTuple):

@@ -1,4 +1,4 @@
-"""How a robot that is laid down in its tube settles: the way through its film, and where it comes to lie.
+"""Settling of a robot after release in its tube: drainage of its film, and its steady state.
 
 It is the free motion of `spirillum.predict` with the way there: the same run, the same steady motion.
 
@@ -22,6 +22,7 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.run_state import state_of
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
@@ -101,7 +102,7 @@ _SAMPLES = 400
 
 @dataclass(frozen=True, repr=False)
 class Settling(DisplayMixin):
-    """How a robot settles, SI; azimuths about +x from the lowest place."""
+    """Settling of a robot, SI; azimuths about +x from the lowest point of the tube."""
 
     prediction: Prediction
     """The steady motion that it comes to, means over a turn of the tail."""
@@ -118,13 +119,19 @@ class Settling(DisplayMixin):
 
     @property
     def lying(self) -> SteadyState:
-        """Where it comes to lie."""
+        """The steady state."""
         return self._free.run.lying
 
     @property
     def weight(self) -> float:
         """Submerged weight that acts, N; negative for a robot that floats."""
         return float(self._free.robot.weight[: rigid_links.MOMENT_BODY].sum())
+
+    @property
+    def weight_uncertainty(self) -> float | None:
+        """Uncertainty of that weight where mass and volume are each known to 1 %, N; None without masses."""
+        found = self.robot.derived().get("submerged_weight_uncertainty")
+        return None if found is None or not self.weight else found.value
 
     @property
     def roughness(self) -> float:
@@ -188,9 +195,10 @@ class Settling(DisplayMixin):
             "forward_velocity": quantity(motion.forward_velocity, "m/s"),
             "tail_rotation_rate": quantity(motion.tail_rotation_rate, "rad/s"),
             "body_rotation_rate": quantity(motion.body_rotation_rate, "rad/s"),
-            "submerged_weight": quantity(self.weight, "N"),
+            "submerged_weight": quantity(self.weight, "N", uncertainty=self.weight_uncertainty),
             "roughness": quantity(self.roughness, "m"),
             "friction_coefficient": quantity(self.friction_coefficient, "1"),
+            "state": state_of(self.lying, self.warnings),
             "lying": self.lying.to_dict(),
             "drainage_time": quantity(self.drainage_time, "s", until=quantity(self.until, "m")),
             "passing": {
@@ -234,7 +242,7 @@ def settle(
     until: str | float | None = None,
     progress: Progress | None = None,
 ) -> Settling:
-    """Follow a robot from rest in its tube to where it comes to lie; floats are in SI units, rates in rad/s.
+    """Follow a robot from rest in its tube to its steady state; floats are in SI units, rates in rad/s.
 
     The run is that of `spirillum.simulate` with the model `tube`, from the robot's table, which is made first where
     there is none; it is followed until a turn of the tail no longer changes where the robot lies.
@@ -249,7 +257,7 @@ def settle(
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: `azimuth` of the start and `friction_coefficient`, see `spirillum.simulate`.
-        until: gap to which the draining of the film is timed, with its unit or a float in m; None: a fifth of that at
+        until: gap at the end of the drainage time, with its unit or a float in m; None: a fifth of that at
             the start.
         progress: told what is being computed, how much is done, and of how much.
 

@@ -84,9 +84,9 @@ def simulate(  # noqa: PLR0913 - the options of the command
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
-        posterior: file of a calibration's posterior: its middle replaces the robot's values, and mean speed and rates
+        posterior: posterior of a calibration: its median replaces the robot's values, and mean speed and rates
             have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
-        draws: how many draws of the posterior are run for the intervals, 20 to 1000; None: 100.
+        draws: number of draws of the posterior for the intervals, 20 to 1000; None: 100.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, of a free robot in a tube 20 s, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.

@@ -41,7 +41,7 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
 
 
 def start_phase(robot: Robot) -> float:
-    """Phase at which a tail is laid down, rad: a right-handed one at 0, a left-handed one as its mirror image lies.
+    """Initial phase of the tail, rad: 0 for a right-handed one, for a left-handed one its mirror image.
 
     A tail that is one piece with the body is at 0, whatever its hand.
     """
@@ -65,6 +65,7 @@ def _check(robot: Robot, placement: Placement) -> None:
 
 
 def _seat(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) -> Seat:
+    robot.check_body("motion beside the wall of a channel, with lubrication films,")
     radius, body, pitch = 0.5 * channel.diameter, outlines_of(robot)["body"], placement.pitch or 0.0
     if placement.eccentricity is not None:
         return Seat.of(placement, body, robot.body.diameter, radius)
@@ -131,7 +132,7 @@ def links_without_walls(steady: Prediction, roughness: float | None, *, weight: 
 
 
 def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Samples:
-    """The state of a robot at rest in its seat, (19,); a heavy one whose gap is open lies low."""
+    """The state of a robot at rest at its initial pose, (19,); a heavy one without a given gap starts low."""
     start = start_state(robot, placement, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     if not links.spots.size:
         return start

@@ -1,4 +1,4 @@
-"""What becomes of a robot that is laid down in its tube and swims on: the run itself, and where it leads.
+"""Asymptotic motion of a robot after release in its tube: the run, and its steady state.
 
 The run is followed turn by turn. Now and then the place that a turn brings back is looked for from where the run has
 come (`turn_map`); found and stable, it is what the run approaches, often for many minutes.
@@ -22,7 +22,7 @@ from spirillum.swimming.steady_state import State, SteadyState
 _MOST_TURNS = 300
 """Turns that are followed at most."""
 _BLOCK = 30
-"""Turns between two searches for the place that a turn brings back."""
+"""Turns between two searches for the fixed point of the return map."""
 STABLE = 1.0 + 1e-4
 """Largest multiplier of a motion that stays where it is."""
 _PLACES = {name: place for place, name in enumerate(STEPS)}
@@ -30,7 +30,7 @@ _PLACES = {name: place for place, name in enumerate(STEPS)}
 
 @dataclass
 class Path:
-    """Place and attitude at every step of a run, from where it was laid down."""
+    """Position and attitude at every step of a run, from release."""
 
     steps: list[Samples] = field(default_factory=list)
     """What is in `turn_map.STEPS`, turn after turn; time, x and roll count on, and the azimuth has no jumps."""
@@ -74,18 +74,18 @@ class Path:
 
 
 class LongRun(NamedTuple):
-    """A run and what it leads to."""
+    """A run and its asymptotic motion."""
 
     path: Path
     """The run that was followed."""
     turn: Turn
-    """The last turn: of the motion that it leads to, where one was found."""
+    """The last turn: of the asymptotic motion, where one was found."""
     start: Samples
     """The state at the start of `time`, (19,)."""
     time: float
     """Time from then on over which means are taken, s: that turn; around the tube, the last circuit."""
     lying: SteadyState
-    """Where it lies over that time."""
+    """Its pose over that time."""
 
 
 def long_run(

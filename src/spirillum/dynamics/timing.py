@@ -231,7 +231,7 @@ class Timing(Options):
         return Timetable(end, time, switches, self._unused(switches, end))
 
     def _unused(self, switches: Sequence[Switch], end: float) -> list[Note]:
-        """What of the schedule lies beyond the end of the run, a sentence each."""
+        """Parts of the schedule beyond the end of the run, a sentence each."""
         said = []
         if all(switch.duty == 0 for switch in switches):
             words = f"the remote switches nothing on before the run ends at {end:.4g} s"

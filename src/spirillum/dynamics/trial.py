@@ -7,14 +7,15 @@ by its defaults (`mean_..._on`). The steady motion is that of `spirillum.settle`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.dynamics.run_state import is_held, state_of
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.notes import Note, notes_in
+from spirillum.notes import notes_in
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
 from spirillum.swimming.model_choice import WALLED, has_table
@@ -36,7 +37,7 @@ _MOST_TURNS = 2000
 
 
 def why_not_released(held: Prediction, *, fitted: bool) -> str:
-    """Return why no released motion stands beside a held answer, in a sentence; empty where one does.
+    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one.
 
     Args:
         held: the answer.
@@ -88,7 +89,7 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     notes = notes_in(run.attrs)
     basis = {
         "assumption": ASSUMPTION,
-        "state": "standing" if _is_held(notes) else "swimming",
+        "state": "standing" if is_held(notes) else "swimming",
         "wait": quantity(float(run.attrs["wait"]), QUANTITIES["wait"].unit),
         "duration": quantity(length, "s"),
         "warnings": [str(note) for note in notes],
@@ -109,7 +110,7 @@ def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
     motion, lying = found.prediction, found.lying
     basis: dict[str, Any] = {
         "assumption": ASSUMPTION,
-        "state": _state_of(motion),
+        "state": state_of(lying, motion.warnings),
         "statement": lying.statement,
         "time_constant": quantity(lying.approach_time, "s"),
         "warnings": [str(note) for note in motion.warnings],
@@ -119,21 +120,3 @@ def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
     if lying.state != "changing":  # its means depend on when they are taken
         moving = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
     return ReleasedMotion({**moving, **pose}, basis)
-
-
-def _is_held(notes: Iterable[Note]) -> bool:
-    """Whether dry friction holds the robot."""
-    return any(note.code == "held-by-friction" for note in notes)
-
-
-def _state_of(motion: Prediction) -> str:
-    """What became of a released robot, in a word."""
-    lying = motion.lying
-    assert lying is not None  # noqa: S101 - a released motion has one
-    if _is_held(motion.warnings):
-        return "standing"
-    if lying.state == "steady" and np.cos(lying.azimuth) < 0.0:
-        return "ceiling"
-    if "the robot's table" in lying.ended:
-        return "left-table"
-    return {"steady": "steady", "orbits": "orbit", "goes around": "orbit", "changing": "changing"}[lying.state]

@@ -1,4 +1,4 @@
-"""A request for the released motions that stand beside a held answer: where they exist, and how they are computed."""
+"""A request for the released motions beside a held answer: where they exist, and how they are computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nobody knows of a trial, and the interval of its values over that: docs/unknowns.md.
+"""Unknowns of a trial, and the interval of its values over them: docs/unknowns.md.
 
 The same space-filling sample (Sobol' points with a fixed seed) serves all robots, so that differences between robots
 are not those of their samples. What a robot, a calibration or a request states is not varied.
@@ -27,7 +27,7 @@ _FEWEST = 0.5
 
 
 class TrialUnknown(NamedTuple):
-    """A number that nobody states, with an assumed distribution between two ends."""
+    """An unknown of a trial, with an assumed distribution between two bounds."""
 
     name: str
     """`wait`, or the field that it replaces."""
@@ -90,7 +90,7 @@ UNKNOWNS = (
 
 
 class TrialSample(NamedTuple):
-    """One run: what it takes in place of what nobody states; None where that is stated."""
+    """Settings of one run in place of unknown ones; None where the request states them."""
 
     robot: Robot
     wait: float | None
@@ -113,11 +113,21 @@ def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> 
     return tuple(one for one in UNKNOWNS if one.name in free)
 
 
-def samples_of(robot: Robot, weight: float, unknowns: Sequence[TrialUnknown]) -> list[TrialSample]:
-    """Return the runs over the unknowns of a robot with that weight in the fluid, N."""
-    values = {one.name: one.at(column) for one, column in zip(unknowns, _shares(unknowns).T, strict=True)}
+def samples_of(
+    robot: Robot, weight: float, unknowns: Sequence[TrialUnknown], shares: Samples | None = None
+) -> list[TrialSample]:
+    """Return the runs over the unknowns of a robot with that weight in the fluid, N.
+
+    Args:
+        robot: the robot.
+        weight: its weight in the fluid, N.
+        unknowns: what is open.
+        shares: of the distributions, (runs, unknowns), 0 to 1; None: the space-filling sample that serves all robots.
+    """
+    points = _shares(unknowns) if shares is None else shares
+    values = {one.name: one.at(column) for one, column in zip(unknowns, points.T, strict=True)}
     found = []
-    for number in range(RUNS):
+    for number in range(len(points)):
         own = {name: float(column[number]) for name, column in values.items()}
         fields = {name: value for name, value in own.items() if name == "fluid.cavitation_pressure"}
         if "weight" in own and robot.body.mass is not None:

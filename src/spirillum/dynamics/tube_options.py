@@ -1,4 +1,4 @@
-"""What a run in a tube is told beside the placement: azimuth, waiting time, dry friction, and a flow over time."""
+"""Settings of a run in a tube beside the placement: azimuth, waiting time, dry friction, and a flow over time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 
 TRIAL_WAIT = 60.0
-"""Time from laying a robot down until its motor is switched on, where none is given, s: nobody states it."""
+"""Default time from release until the motor is switched on, s; assumed."""
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
 _WHAT = "a flow file (CSV with the columns time_s and flow_mm_s)"
@@ -47,9 +47,10 @@ class InTube(Options):
     prefixed: ClassVar[bool] = True
 
     azimuth: Angle = 0.0
-    """Azimuth of the body's centre about +x from the lowest place; gap, pitch and yaw are against the wall there."""
+    """Azimuth of the body's centre about +x from the lowest point of the tube.
+    """
     wait: Time | None = None
-    """Time for which the robot lies with its drive off before the run; None: 60 s, as in a trial, in a flow none."""
+    """Waiting time after release with the drive off, before the run; None: 60 s, as in a trial, in a flow none."""
     friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
     flow: Annotated[str | Path | None, _file("a flow file; a constant flow is placement.flow")] = None
@@ -65,7 +66,7 @@ class InTube(Options):
 
 
 def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:
-    """Roughness and settings of a run, with what was fitted in place of what is not given.
+    """Roughness and settings of a run, with fitted values in place of those that are not given.
 
     Args:
         contact: roughness and dry friction of a calibration or of a draw.

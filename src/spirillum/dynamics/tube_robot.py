@@ -50,8 +50,9 @@ class TubeRobot(FreeRobot):
     """A robot in its tube: see `spirillum.kernels.tube_motion`."""
 
     tolerance: ClassVar[float] = 1e-7
-    """Path and place of a minute in contact are then good to some parts in 1e7, energies to 1e-6; a tenth of it takes
-    two and a half times as long."""
+    """Trajectory and pose of a minute in contact are then accurate to some parts in 1e7, energies to 1e-6; a tenth of
+    it takes two and a half times as long.
+    """
     observed: ClassVar[int] = rigid_links.SEEN
 
     tube: Samples
@@ -61,7 +62,7 @@ class TubeRobot(FreeRobot):
     sites: Samples
     """Sites of body and coupling that can touch (n, 5), see `kernels.contacts`."""
     stations: Samples
-    """Stations along the wire (m, 4), see `kernels.contacts`."""
+    """Stations along the wires (m, 5), see `kernels.contacts`."""
     flow: Samples
     """Imposed mean flow (k, 2)."""
     names: tuple[str, ...]
@@ -104,13 +105,13 @@ class TubeRobot(FreeRobot):
         name = _RANGES.get(int(seen[rigid_links.OUTSIDE]), "place")
         offset, pitch, yaw = seen[[kernel.OFFSET, kernel.WALL_PITCH, kernel.WALL_YAW]]
         return (
-            f"the range of the robot's table in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
+            f"{kernel.RANGE_LEFT} in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
             f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
         )
 
 
 _RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
-"""What `resistance_at` says was left."""
+"""How `resistance_at` reports that a pose is outside the table."""
 
 
 def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn: float, weight: bool) -> TubeRobot:
@@ -126,6 +127,11 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")
+    if not robot.tail.form.is_helix:
+        raise InputError(
+            "motion in the tube finds contacts of tail and wall only on helices of one wavelength and amplitude; "
+            "allowed: such a tail, or a prediction at a given pose"
+        )
     heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(steady.batch)
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
@@ -199,4 +205,6 @@ def _stations(robot: Robot, wire: Samples) -> Samples:
     r = wire[contacts.AMPLITUDE] * (1.0 - np.exp(-taper * xi) if taper > 0 else np.ones_like(xi))
     x = wire[contacts.ROOT] - xi
     angle = wire[contacts.HAND_K] * x
-    return np.ascontiguousarray(np.stack([xi, x, r * np.cos(angle), r * np.sin(angle)], axis=1))
+    wires = [(angle + turn, turn) for turn in tail.form.turns]
+    rows = [np.stack([xi, x, r * np.cos(at), r * np.sin(at), np.full(xi.size, turn)], axis=1) for at, turn in wires]
+    return np.ascontiguousarray(np.concatenate(rows))

@@ -1,4 +1,4 @@
-"""Swimming in a tube in time: from where a robot is laid down, with walls, film, contact, ends and flow."""
+"""Swimming in a tube in time: after release, with walls, film, contact, ends and flow."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNIT = 1e-6
 _MOST = 1e9
 """Largest number of a checkpoint that is taken, SI."""
 _ASIDE = 1e-3
-"""What a checkpoint's place may be aside of the samples around it, beyond the way of the run, m."""
+"""Largest distance of a checkpoint's position from the samples around it, beyond the path of the run, m."""
 
 
 def tube_run(
@@ -128,7 +128,7 @@ def _waited(
     if wait <= 0.0:
         return state, ()
     run = integrate(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
-    if run.time[-1] < 0.0:
+    if run.time[-1] < 0.0 and not run.events[-1].what.startswith(kernel.RANGE_LEFT):
         if run.events[-1].what == INTERRUPTED:
             raise KeyboardInterrupt
         raise InputError(
@@ -159,7 +159,7 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
 
 
 def _near(dataset: xr.Dataset, time: float, state: Samples) -> bool:
-    """Whether a checkpoint's place is near that of the samples around it: between them it was not noted."""
+    """Whether a checkpoint's position is near that of the samples around it."""
     positions, times = numbers_of(dataset, "position", ("axis",), (3,)), numbers_of(dataset, "time")
     there = np.array([np.interp(time, times, along) for along in positions.T])
     way = np.ptp(positions, axis=0) + _ASIDE

@@ -1,4 +1,4 @@
-"""A free run of a robot in its tube from what a user asks for: table, place, ends, flow, roughness, friction."""
+"""A free run of a robot in its tube from a user's request: table, pose, ends, flow, roughness, friction."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
+from spirillum.dynamics.run_state import end_state
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
@@ -22,7 +23,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import largest_yaw
+from spirillum.kernels.tube_table import MOTIONS, largest_yaw, range_of, resistance_at
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -88,7 +89,7 @@ def _changed(before: xr.Dataset, steady: Prediction, links: TubeRobot) -> str:
 
 
 def weight_words(links: TubeRobot) -> str:
-    """Whether weight and buoyancy act on a robot, as a run's attribute `weight` says it."""
+    """Whether weight and buoyancy act on a robot, as the attribute `weight` of a run."""
     return "acts" if links.weight.any() else "left out"
 
 
@@ -139,9 +140,9 @@ def _number(dataset: xr.Dataset, name: str) -> float:
 
 
 _STARTS = ("gap", "eccentricity", "pitch", "yaw")
-"""Fields of a placement that say where a robot is laid down."""
+"""Fields of a placement that define the initial pose."""
 _PLACES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
-"""Where a run says what a table is asked for."""
+"""Where a run names a missing table."""
 
 
 def run_in_tube(
@@ -196,6 +197,7 @@ def run_in_tube(
     said += stuck or (checked.said if np.isfinite(error) else [])
     return dataset.assign_attrs(
         **note_attributes(said),
+        state=end_state(dataset, said, float(links.tube[kernel.SLIDING])),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -213,7 +215,7 @@ def links_in_tube(
     *,
     weight: bool,
 ) -> tuple[TubeRobot, StartPlace]:
-    """What a robot's rates in its tube follow from, and where it is laid down.
+    """Coefficients of a robot's rates in its tube, and its initial pose.
 
     Args:
         steady: the steady prediction of the robot.
@@ -252,7 +254,7 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
-    """Refuse what a run in a tube cannot be told, before minutes go into a table."""
+    """Refuse requests that a run in a tube does not support, before minutes go into a table."""
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
@@ -308,20 +310,20 @@ def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | N
 
 
 class Checked(NamedTuple):
-    """What the stated error of a table says of a motion."""
+    """Effect of the stated error of a table on a motion."""
 
     known: bool
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
     """Whether it comes nearer to the glass than where the table was checked."""
     said: list[Note]
-    """What there is to say of both, a sentence each."""
+    """Cautions about both, a sentence each."""
 
 
 def held_against_check(
     table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
 ) -> Checked:
-    """Hold the places of a motion against those at which its table was checked.
+    """Compare the poses of a motion with those at which its table was checked.
 
     Args:
         table: the packed table.
@@ -334,7 +336,22 @@ def held_against_check(
     said = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
-    if beyond.size:
+    held = range_of(table)
+    doubtful = (
+        (np.abs(yaw) > checked) | (pitch > held.up.min(initial=np.inf)) | (-pitch > held.down.min(initial=np.inf))
+    )
+    outside = np.zeros(pitch.size, dtype=bool)
+    for row in np.flatnonzero(doubtful):
+        outside[row] = resistance_at(table, offset[row], pitch[row], yaw[row], 0.0, np.empty((MOTIONS, MOTIONS)))
+    if outside.any():
+        beyond = np.flatnonzero(outside)
+        up, aside = (np.degrees(np.abs(angle[beyond]).max()) for angle in (pitch, yaw))
+        words = (
+            f"{_from(time, beyond[0])}it tilts beyond its table (pitch {up:.3g} deg, yaw {aside:.3g} deg): the "
+            "resistance is that of the nearest pose inside, without error estimate"
+        )
+        said.append(Note("table-not-checked", words, ("wall_pitch", "wall_yaw", "error_estimate")))
+    elif beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
         words = (
             f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "

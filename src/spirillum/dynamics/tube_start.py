@@ -1,4 +1,4 @@
-"""Where a robot is laid down in its tube."""
+"""Initial pose of a robot in its tube."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from spirillum.units import show
 
 @dataclass(frozen=True)
 class StartPlace:
-    """A place in the tube; SI, angles in rad."""
+    """A pose in the tube; SI, angles in rad."""
 
     gap: float | None = None
     """Smallest distance of the body to the wall; None: that of the eccentricity, or 1/18 of the body's radius."""
     eccentricity: float | None = None
     """Offset of the body's mid-length over R - a instead."""
     pitch: float = 0.0
-    """Angle of the nose away from the nearest wall: up, at the lowest place."""
+    """Angle of the nose away from the nearest wall: up, at the lowest point of the tube."""
     yaw: float = 0.0
-    """Angle of the nose across the plane of tube and body, to +y at the lowest place."""
+    """Angle of the nose across the plane of tube and body, to +y at the lowest point of the tube."""
     azimuth: float = 0.0
-    """Azimuth of the body's mid-length about +x from the lowest place."""
+    """Azimuth of the body's mid-length about +x from the lowest point of the tube."""
     phase: float = 0.0
-    """Phase of the tail against the body, which has not rolled from where it lies."""
+    """Phase of the tail relative to the body, which has not rolled since release."""
 
 
 def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
-    """The state of a robot at rest at a place, (19,)."""
+    """The state of a robot at rest at a pose, (19,)."""
     radius, a = float(links.tube[kernel.RADIUS]), 0.5 * robot.body.diameter
     if start.eccentricity is not None:
         state = state_at(start, start.eccentricity * (radius - a))

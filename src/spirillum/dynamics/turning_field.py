@@ -18,7 +18,7 @@ _A = TypeVar("_A", bound=FreeRobot)
 
 
 class Field(Options):
-    """What coils are asked for from now on; what is not given stays as it was."""
+    """Settings of the coils from now on; what is not given stays as it was."""
 
     argument: ClassVar[str] = "field"
     prefixed: ClassVar[bool] = True
@@ -26,9 +26,9 @@ class Field(Options):
     rotation_rate: Rate | None = None
     """Rotation rate of the field about its axis."""
     yaw: Yaw | None = None
-    """Angle to +y, up to 45 degrees, of the axis about which the field turns; along the lab's +x without it."""
+    """Angle to +y of the field's axis of rotation, up to 45 degrees; along the lab's +x without it."""
     pitch: Pitch | None = None
-    """Angle of that axis upwards, from the horizontal."""
+    """Elevation of that axis from the horizontal."""
     strength: MagneticField | None = None
     """Flux density, at right angles to the axis."""
 
@@ -82,7 +82,7 @@ class TurningField:
 
 
 def in_tilted_field(links: _A, asked: Field) -> _A:
-    """A robot in the field of its file, which turns about the axis that is asked for.
+    """A robot in the field of its file, which rotates about the given axis.
 
     Args:
         links: what its rates follow from.

@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.costs import check_memory
 from spirillum.files import MARK, scratch_folder
 from spirillum.formats.vtk_image import add_comment
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import STRIPE_COLOURS, RobotMesh
 from spirillum.robot.surface import Faces, mass_properties
 
@@ -51,6 +52,7 @@ def _write(
     path: Path, place: tuple[Samples, ...], corners: np.ndarray, ends: np.ndarray, cells: Mapping[str, Any]
 ) -> None:
     """The file as the library writes it: first what is where, then the data in the same order."""
+    import_optional("pyevtk", "a file for ParaView")
     from pyevtk.vtk import VtkFile, VtkPolyData
 
     file = VtkFile(str(path.with_suffix("")), VtkPolyData)  # the library adds the suffix
@@ -105,6 +107,7 @@ class UnitedBody(NamedTuple):
 
 def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
     """Union of closed pieces, without interior surfaces."""
+    import_optional("manifold3d", "one watertight body for printing")
     from manifold3d import Manifold, Mesh64, OpType
 
     chosen = list(pieces)

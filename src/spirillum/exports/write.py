@@ -27,6 +27,7 @@ from spirillum.exports.meshes import (
 )
 from spirillum.files import MARK, atomic_write_all, guard_inputs, output_folder, output_target
 from spirillum.notes import Note, notes_in_answer
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
@@ -51,6 +52,7 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
         pieces: at phase 0 of the tail.
         phase: phase of the tail, rad, to which the node of the rotor is turned.
     """
+    import_optional("trimesh", "a coloured scene")
     from trimesh import Scene, Trimesh
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
@@ -124,6 +126,7 @@ class ExportFile(NamedTuple):
 
 def check_masses(robot: Robot, target: Path) -> None:
     """Require the masses that a robot description needs."""
+    robot.check_body(target.suffix)
     for table, name in (("body", "mass"), ("tail", "density")):
         if getattr(getattr(robot, table), name) is None:
             raise InputError(

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
+from spirillum.errors import InputError
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
 from spirillum.fluid.tube.domain import seat_of
@@ -346,4 +347,6 @@ def tube_flow_field(
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     held = held_robot(batch, 0, phase)
     solids = tuple(RobotGeometry.of(batch).outlines.items())
+    if not solids:
+        raise InputError("the flow around a bare tail in a tube is not computed; allowed: model slender, or a body")
     return TubeFlowField(held, seat_of(batch), solids, twists, float(mean_flow), float(batch.viscosity[0]))

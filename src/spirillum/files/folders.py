@@ -55,7 +55,7 @@ def _missing(folder: Path) -> list[Path]:
 def claim_folder(
     folder: Path, mark: str, content: Mapping[str, Any], what: str, results: Collection[str] | None = None
 ) -> None:
-    """Mark a folder as the place of one question's results: a rerun resumes there, another question is refused.
+    """Mark a folder as that of one request's results: a rerun resumes there, another request is refused.
 
     Args:
         folder: the folder, new, empty, or marked before.

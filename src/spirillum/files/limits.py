@@ -17,7 +17,7 @@ MOST_CELLS = 5_000_000
 LONGEST_CELL = 10_000
 """A text in a cell of a Parquet file, characters."""
 LARGEST_NETCDF = 512 << 20
-"""A run or a posterior, bytes: on disk, and as its arrays declare. A study is held against what it should hold."""
+"""A run or a posterior, bytes: on disk, and as its arrays declare."""
 MOST_VARIABLES = 2000
 """Groups and variables in a NetCDF file."""
 MOST_PIXELS = 50_000_000
@@ -32,3 +32,5 @@ LONGEST_PATH = 4096
 """A file's name with its folders, characters."""
 LONGEST_NAME = 255
 """A file or folder by itself, bytes: what the usual file systems hold."""
+MOST_POINTS = 2000
+"""Points of a tail's centre line or of a body's outline."""

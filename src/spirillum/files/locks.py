@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 LEFTOVER = ".spirillum-part-"
-"""Beginning of the names of hidden folders in which files are made before they take their place."""
+"""Prefix of the hidden folders in which files are made before they are renamed."""
 _TRIES = 20
 _held: set[int] = set()
 _swept: set[Path] = set()

@@ -1,4 +1,4 @@
-"""Names of the user's that become part of a path, of a table's cell, or of a label: checked in one place."""
+"""User's names that become part of a path, of a table's cell, or of a label: checked here only."""
 
 from __future__ import annotations
 

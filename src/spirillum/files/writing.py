@@ -1,4 +1,4 @@
-"""The one way to write: made beside its place, synced, renamed; never over a file that is not this program's own.
+"""Atomic writing: made in a hidden folder, synced, renamed; files of other programs are never replaced.
 
 A file is made in a hidden folder beside its place that only this user can enter (`locks.private_folder`), written to
 the disk, and renamed: a kill or a full disk leaves the old file or the new one, whole. What the program writes says so
@@ -23,9 +23,9 @@ from spirillum.files.names import checked_path
 PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""
 MARK = "written by spirillum"
-"""Stands in every file that may be replaced: at its end (`_AT_THE_END`), or in its title, comment or head."""
+"""Ownership mark of every file that may be replaced: at its end (`_AT_THE_END`), or in its title, comment or head."""
 Replace: TypeAlias = Literal["own", "any", "none"]
-"""What a new file may take the place of: this program's own files, any regular file, or nothing."""
+"""What a new file may replace: this program's own files, any regular file, or nothing."""
 
 _XML = f"<!-- {MARK} -->\n".encode()
 _FREE_BOX = (8 + len(MARK)).to_bytes(4, "big") + b"free" + MARK.encode()
@@ -75,7 +75,7 @@ def guard_inputs(*inputs: str | Path | None) -> Iterator[None]:
 
 
 def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"") -> Path:
-    """The file behind a path, links followed, which a new one may take the place of.
+    """The target of a path, links followed, which a new file may replace.
 
     Args:
         path: where a file is to be written.
@@ -121,7 +121,7 @@ def _same(path: Path, source: Path) -> bool:
 
 @contextmanager
 def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", sync: bool = True) -> Iterator[Path]:
-    """Give a temporary path; when the block ends well, what was written there takes the place of `path`.
+    """Give a temporary path; when the block ends without an error, it replaces `path`.
 
     Args:
         path: the file; its folder has to be there.
@@ -141,7 +141,7 @@ def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", s
 def atomic_write_all(
     paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
 ) -> Iterator[dict[Path, Path]]:
-    """Give temporary paths of files that belong together; all are made before the first takes its place.
+    """Give temporary paths of files that belong together; all are made before the first is renamed.
 
     Args:
         paths: the files in the order in which they take their places; perhaps with what they begin with.
@@ -186,7 +186,7 @@ def atomic_write_all(
 
 @contextmanager
 def _named(temporary: Mapping[Path, Path]) -> Iterator[None]:
-    """Say want of space of the file that is being made, for a user does not know the hidden ones."""
+    """Report a full disk for the file that is being made, since a user does not know the hidden ones."""
     try:
         yield
     except OSError as error:
@@ -208,7 +208,7 @@ def holds_own_only(folder: Path) -> bool:
 
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
-    """Give a temporary folder; when the block ends well it takes the place of `path`, with all that is in it.
+    """Give a temporary folder; when the block ends without an error it replaces `path`, with all its content.
 
     Args:
         path: a new folder, or one that holds files of this program only, which go.
@@ -237,7 +237,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
 
 
 def _unwritable(path: Path, error: OSError) -> Exception:
-    """A sentence on a place that cannot be written to; want of space stays what it is, and names the place."""
+    """A sentence on a location that cannot be written to; a full disk stays that error, with the location named."""
     if error.errno in _NO_SPACE:
         return OSError(error.errno, error.strerror, str(path))
     return InputError(f"{path} cannot be written ({error.strerror}); allowed: a folder you may write to")
@@ -256,7 +256,7 @@ def _finish(part: Path, *, sync: bool) -> None:
 
 
 def synced(folder: Path) -> None:
-    """Wait until the disk knows the names in a folder, where that can be asked for."""
+    """Sync the names in a folder to disk, where the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -275,7 +275,7 @@ def netcdf_target(path: str | Path) -> Path:
 
 
 _FEW = 4
-"""Endings up to which their meanings stand in a sentence without them."""
+"""Suffixes up to which their meanings are listed in a sentence without them."""
 
 
 def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:

@@ -30,7 +30,7 @@ _CHECKSUM = 4
 """Bytes of the checksum at the end of a chunk."""
 
 Place = Sequence[tuple[int, int]]
-"""First place, and that behind the last, along each dimension."""
+"""First index, and the one behind the last, along each dimension."""
 
 
 class Stored(NamedTuple):
@@ -59,7 +59,7 @@ def store_target(path: str | Path) -> Path:
 def store_files(
     variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], attributes: Mapping[str, Any]
 ) -> dict[str, bytes]:
-    """Files of a store without its regions: what is in it, and the variables that stand in it whole.
+    """Files of a store without its regions: its metadata, and the variables that are written whole.
 
     Args:
         variables: name to variable.
@@ -166,7 +166,7 @@ def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
-    """Write files that belong together into a claimed folder: all are on the disk before the first takes its place.
+    """Write files that belong together into a claimed folder: all are on the disk before the first is renamed.
 
     Args:
         folder: the folder, claimed and locked by this process.
@@ -205,7 +205,7 @@ def _make_folder(folder: Path, inner: Path) -> None:
 
 
 def opened_store(folder: Path) -> xr.Dataset:
-    """A store as a dataset, whose values are read where they are asked for.
+    """A store as a dataset, whose values are read on access.
 
     Raises:
         InputError: if it cannot be read.

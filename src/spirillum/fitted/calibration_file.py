@@ -92,7 +92,7 @@ class FittedFriction(Section):
 
 
 class FittedPlace(Section):
-    """Where in a channel the robot lies, for a model that computes the walls."""
+    """Pose of the robot in its channel, for a model that computes the walls."""
 
     channel_diameter: Length
     """Channel diameter."""
@@ -101,10 +101,10 @@ class FittedPlace(Section):
 
 
 class FittedContact(Section):
-    """What lies between robot and channel, for a model that computes the walls."""
+    """Pose and contact of the robot in its channel, for a model that computes the walls."""
 
     roughness: Length | None = None
-    """Height of the asperities on which the robot lies."""
+    """Height of the asperities under the robot."""
     friction_coefficient: Annotated[float | None, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)] = None
     """Coefficient of dry friction where they carry its weight."""
 
@@ -126,10 +126,12 @@ class Provenance(Section):
     """Method of the fit."""
     free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
     """Parameters that were free."""
+    answer: Literal["held", "trial"] = "held"
+    """What was fitted."""
     friction_reading: Literal["", "rotor", "paper"] = ""
     """Reading of the friction under which B_eff was inferred."""
     synthetic: Annotated[bool, Field(strict=True)] = False
-    """Whether the observations said that a program made them."""
+    """Whether the observations state that they are synthetic."""
     uncertainty: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
     """Fitted values with their uncertainty, for people."""
     versions: _Word = ""
@@ -146,7 +148,7 @@ class CalibrationFile(Section):
     friction: Annotated[tuple[FittedFriction, ...], Field(max_length=100_000)] = ()
     """B_eff, tail by tail."""
     placement: Annotated[tuple[FittedPlace, ...], Field(max_length=1000)] = ()
-    """Where the robot lies, channel by channel."""
+    """Pose of the robot, channel by channel."""
     contact: FittedContact = FittedContact()
     """Asperities and dry friction under the robot."""
     provenance: Provenance = Provenance()
@@ -219,7 +221,7 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
 
 
 def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:
-    """Where a calibration places a robot in its channel; None where it says nothing of that channel."""
+    """Pose of a robot in its channel by a calibration; None where the file has none for that channel."""
     diameter = robot.channel.diameter if robot.channel else float("inf")
     own = [place.placement for place in file.placement if _alike(diameter, place.channel_diameter)]
     return own[0] if own else None
@@ -230,11 +232,11 @@ def _alike(value: float, fitted: float) -> bool:
 
 
 _OPEN = 1e3
-"""Diameter that stands for an unbounded fluid, m: the widest channel is the nearest to it."""
+"""Diameter that represents an unbounded fluid, m: the widest channel is the nearest to it."""
 
 
 def nearest_channel(robot: Robot, channels: Sequence[float]) -> int:
-    """Place of the channel that is nearest to a robot's own; an open robot is nearest to the widest.
+    """Index of the channel that is nearest to a robot's own; an open robot is nearest to the widest.
 
     Args:
         robot: the robot.
@@ -276,7 +278,7 @@ _FIELDS = {
     "tangential_factor": ("model", "rft", "tangential_factor"),
     "friction": ("friction", "effective"),
 }
-"""Field of `FittedValues` to the place in a robot."""
+"""Field of `FittedValues` to the field of a robot."""
 
 
 def _with_fitted(robot: Robot, fitted: FittedValues) -> Robot:

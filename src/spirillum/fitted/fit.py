@@ -34,12 +34,12 @@ FITTED_HELD = Note(
     "the posterior was fitted to robots held at a pose, and this one moves freely: its intervals need not contain the "
     "fitted observations",
 )
-"""Said of a free motion in the tube over a posterior."""
+"""Caution of a free motion in the tube with a posterior."""
 CALIBRATED_HELD = Note(
     "fit-other-motion",
     "the calibration was fitted to robots held at a pose, and this one moves freely: it need not swim as observed",
 )
-"""Said of a free motion in the tube with a calibration file."""
+"""Caution of a free motion in the tube with a calibration file."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Fit:
     reading: str = ""
     """Friction model with which it was inferred."""
     synthetic: str = ""
-    """Name of the observations, if they say that they are synthetic."""
+    """Name of the observations, if they are synthetic."""
     model: str = ""
     """Model whose torque B_eff was inferred with."""
     posterior: PosteriorFile | None = None
@@ -61,7 +61,7 @@ class Fit:
     name: str = ""
     """Name of the file, with the observations of a posterior."""
     channels: tuple[float, ...] = ()
-    """Diameters of the channels in which it was fitted, m; none where the file does not say."""
+    """Diameters of the channels in which it was fitted, m; none where the file does not state them."""
     friction_coefficient: float | None = None
     """Coefficient of dry friction under a robot that was fitted; None: none was."""
 
@@ -93,7 +93,7 @@ class Fit:
         return None if self.file is None else placement_in(self.file, robot)
 
     def dry_friction(self, model: SwimmerModel) -> float | None:
-        """Coefficient of dry friction under a robot with a model: only one that places it knows of any."""
+        """Coefficient of dry friction under a robot with a model: only one that computes the walls has any."""
         return self.friction_coefficient if model.placed else None
 
     def serves(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> bool:
@@ -179,7 +179,7 @@ class Fit:
         return [Note("friction-other-fit", words, ("friction.effective",))]
 
     def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
-        """All that has to be said beside a steady motion.
+        """All notes beside a steady motion.
 
         Args:
             robot: the robot.
@@ -194,7 +194,7 @@ class Fit:
         return [*idle, *self.origin_warnings([robot], [model], friction=acts)]
 
     def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[Note]:
-        """All that has to be said of a robot that is driven by its own motor."""
+        """All notes of a robot that is driven by its own motor."""
         return [
             *self.tail_warnings(robot),
             *self.reading_warnings([reading]),

@@ -1,4 +1,4 @@
-"""What a posterior's file says besides its draws, checked: a file may come from anywhere."""
+"""Content of a posterior's file besides its draws, checked: a file may come from anywhere."""
 
 from __future__ import annotations
 

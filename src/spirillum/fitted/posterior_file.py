@@ -89,7 +89,7 @@ class PosteriorFile:
 
     @property
     def places_robots(self) -> bool:
-        """Whether the place of a robot in its channel is among the draws."""
+        """Whether the pose of a robot in its channel is among the draws."""
         return any(name in self.draws for name in (*_PLACE, "roughness"))
 
     @property
@@ -146,7 +146,7 @@ class PosteriorFile:
         return found
 
     def central(self, robot: Robot) -> Robot:
-        """The robot with the middle of the posterior in place of its own values."""
+        """The robot with the posterior median in place of its own values."""
         factors = [name for name in ("body_drag", "body_rotation") if name in self.draws]
         entries = []
         for place, diameter in enumerate(self.channels if factors else ()):
@@ -171,7 +171,7 @@ class PosteriorFile:
         return calibrated_robot(robot, file)
 
     def drawn(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
-        """The robot with the values of some draws in place of its own, evenly among them.
+        """The robot with the values of some draws in place of its own, evenly spaced among them.
 
         Args:
             robot: the robot.
@@ -190,7 +190,7 @@ class PosteriorFile:
         return replace(self, draws=draws, discrepancy=discrepancy, error=error)
 
     def places(self, count: int) -> list[int]:
-        """Places of some draws, evenly among them."""
+        """Indices of some draws, evenly spaced among them."""
         found: list[int] = np.linspace(0, self.count - 1, min(count, self.count)).round().astype(int).tolist()
         return found
 
@@ -230,7 +230,7 @@ class PosteriorFile:
         return columns[..., min(channel, columns.shape[-1] - 1)]
 
     def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
-        """Draws for one robot: those of the nearest channel, of which `central` takes the middle, its place, and B_eff.
+        """Draws for one robot: those of the nearest channel, with their median (`central`), its pose, and B_eff.
 
         That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
         with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
@@ -252,9 +252,9 @@ class PosteriorFile:
 
 
 _ALONE = 0.3
-"""Standard deviation of log B_eff from tail to tail where a single tail tells nothing of it; assumed."""
+"""Standard deviation of log B_eff from tail to tail where a single tail does not constrain it; assumed."""
 _FACTOR = 20.0
-"""Factor from the middle within which B_eff of another tail is taken to lie."""
+"""Factor from the median within which B_eff of another tail is assumed."""
 
 
 def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generator) -> Samples:
@@ -272,7 +272,7 @@ def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generato
 
 
 def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Samples]) -> str:
-    """Checksum over a posterior's draws and all that its file says of them."""
+    """Checksum over a posterior's draws and metadata."""
     found = hashlib.sha256()
     for name in sorted(set(attributes) - {"checksum"}):
         found.update(f"{name}={attributes[name]}\n".encode(errors="surrogatepass"))
@@ -284,7 +284,7 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
 
 
 def _possible(name: str, values: Samples) -> bool:
-    """Whether draws of a parameter lie where it is defined."""
+    """Whether draws of a parameter are inside its domain."""
     least = 0.0 if name in _MAY_BE_ZERO else _SMALLEST
     return bool(values.size and np.all((values >= least) & (values < _GREATEST)))
 
@@ -311,6 +311,11 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0; "
             "`spirillum calibrate` with more --doublings samples for longer"
+        )
+    if attributes.get("answer") == "trial":
+        raise InputError(
+            f"{path} is of trials, whose draws no held motion follows; allowed: the calibration.toml beside it, as "
+            "--calibration"
         )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)

@@ -82,6 +82,17 @@ class Resistance(DisplayMixin):
         return envelope("resistance", content, self.warnings)
 
 
+def _with_accuracy(
+    resolution: Resolution | Mapping[str, Any] | None, accuracy: str | None
+) -> Resolution | Mapping[str, Any] | None:
+    """The resolution of a request that may name its accuracy alone."""
+    if accuracy is None:
+        return resolution
+    if resolution is not None:
+        raise InputError("accuracy and resolution are mutually exclusive; allowed: resolution with its own accuracy")
+    return {"accuracy": accuracy}
+
+
 def resistance(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
@@ -89,6 +100,7 @@ def resistance(
     model: str = "rft",
     about: str = "body",
     phase: str | float = 0.0,
+    accuracy: str | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> Resistance:
@@ -102,6 +114,7 @@ def resistance(
         model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
+        accuracy: short for `resolution` with this `accuracy` alone: `standard` or `high`.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
@@ -110,7 +123,7 @@ def resistance(
         InputError: for wrong input, or a part that the model cannot do.
     """
     ready, chosen = load(robot), find_model(model)
-    ready = with_resolution(ready, resolution, model)
+    ready = with_resolution(ready, _with_accuracy(resolution, accuracy), model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in (*PARTS, _BOTH):
@@ -119,6 +132,8 @@ def resistance(
     known = (*chosen.parts, _BOTH) if isinstance(chosen, SwimmerModel) else chosen.parts
     if part not in known:
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(known)}")
+    if part == "body" and not ready.has_body:
+        raise InputError("part = 'body': this robot has none (body = 'none'); allowed: tail or robot")
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
     angle = parse_option("phase", phase, KINDS["angle"])

@@ -20,7 +20,7 @@ _BATCH = 4096
 
 
 def parquet_table(path: Path, what: str, largest: int = LARGEST_TABLE) -> list[tuple[int, list[str]]]:
-    """Header and rows as text, each with its number as it would stand in a CSV file: the header is line 1."""
+    """Header and rows as text, each with the line number that it would have in a CSV file: the header is line 1."""
     try:
         from pyarrow import ArrowException, parquet
     except ImportError as error:
@@ -87,7 +87,7 @@ _WORD = re.compile(r"[^\W_]+")
 _ALIKE = 0.8
 """Likeness of two words, from 0 to 1, from which on one may be a misspelling of the other."""
 _NOTES = ("note", "comment", "remark")
-"""With what the name of a column begins that is nobody's but the user's."""
+"""Prefix of the columns that are the user's own."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class TableRow:
         return f"{self.path}, row {self.line}"
 
     def text(self, column: int | str) -> str:
-        """A cell, by the place or the name of its column; empty where there is no such column."""
+        """A cell, by the index or the name of its column; empty where there is no such column."""
         if isinstance(column, int):
             return self.cells[column]
         return self.cells[self.header.index(column)] if column in self.header else ""
@@ -160,7 +160,7 @@ class Table:
         return self.headers[0]
 
     def column(self, name: str) -> int | None:
-        """Place of a column of the first header row."""
+        """Index of a column of the first header row."""
         return self.header.index(name) if name in self.header else None
 
     def free_columns(self, known: Collection[str]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spirillum.files import atomic_write
+from spirillum.optional_dependencies import import_optional
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +23,7 @@ def write_vti(dataset: xr.Dataset, path: Path) -> None:
     Point arrays `velocity` (3 components, m/s), `pressure` (Pa), both NaN inside solids, and `inside` (0 or 1); lengths
     in m. The dataset's attributes stand in a comment at the head of the file, as JSON.
     """
+    import_optional("pyevtk", "a flow for ParaView")
     from pyevtk.hl import imageToVTK
 
     ordered = dataset.transpose(*_AXES)

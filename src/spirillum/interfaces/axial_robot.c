@@ -1,13 +1,6 @@
 /*
- * A robot in axial motion, as a co-simulation FMU (FMI 3.0): the equations of `spirillum.dynamics.axial_robot`.
- *
- * With duty d, imposed mean flow U, polarity p and joint torque tau = K_m I:
- *
- *     L dI/dt = p d V(|I|) - R(|I|) I - K_b (omega - Omega)
- *     (U_x, Omega, omega) = (a, b, c)_torque tau + (a, b, c)_flow U
- *
- * Path, angles and charge are integrals. Inputs stay constant over a step, which is integrated by the pair of
- * Dormand and Prince, orders 5 and 4 (J. Comput. Appl. Math. 6, 1980), with steps of its own.
+ * A robot in axial motion, as a co-simulation FMU (FMI 3.0), on the equations and the integrator of `spirillum.simulate`:
+ * drive.c and axial.c are those of the package. Inputs stay constant over a step.
  *
  * robot.h, written with this file, holds the robot: TOKEN, FLOW_INPUT, and VALUES, in the order of the enumerations.
  */
@@ -19,13 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core.h"
 #include "robot.h"
 
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 #define JOINED_(a, b) a##b
 #define JOINED(a, b) JOINED_(a, b)
 #if defined(FMI3_FUNCTION_PREFIX)
@@ -46,8 +35,8 @@ enum {
     TORQUE, EMF, INDUCTANCE, CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE, VOLTAGE, INTERNAL, POLARITY,
     SPEED, BODY, TAIL, SPEED_FLOW, BODY_FLOW, TAIL_FLOW, PARAMETERS
 };
-/* The state. */
-enum { CURRENT, POSITION, TAIL_ANGLE, BODY_ANGLE, CHARGE, STATES };
+/* The state, and integrals of I^2 and R I^2. */
+enum { CURRENT, POSITION, TAIL_ANGLE, BODY_ANGLE, CHARGE, SQUARE, HEAT, STATES };
 /* Value references: time, inputs, outputs from FIRST_OUTPUT on in this order, parameters from FIRST_PARAMETER on. */
 enum { TIME = 0, REMOTE = 1, DUTY = 2, FLOW = 3, FIRST_OUTPUT = 10, FIRST_PARAMETER = 100 };
 enum {
@@ -81,20 +70,13 @@ static fmi3Status failed(Robot *robot, const char *message) {
 
 /* ---------------------------------------------------------------- equations */
 
-static double winding(const double *p, double size) {
-    return p[CONSTANT] + p[DECAY] * exp(-p[DECAY_RATE] * size) + p[GROWTH] * exp(fmin(p[GROWTH_RATE] * size, 600.0)) +
-           p[SLOPE] * size;
-}
+/* See axial.c; pieces of a step as in a run of `simulate`. */
+void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
+                   double fineness, int64_t count);
+static const double FINENESS = 16.0;
 
 static double moved(const double *p, int per_torque, int per_flow, double current, double flow) {
     return p[per_torque] * p[TORQUE] * current + p[per_flow] * flow;
-}
-
-static double current_rate(const Model *m, double current, double duty) {
-    const double *p = m->p, size = fabs(current);
-    double slip = moved(p, TAIL, TAIL_FLOW, current, m->flow) - moved(p, BODY, BODY_FLOW, current, m->flow);
-    double supply = p[POLARITY] * duty * (p[VOLTAGE] - p[INTERNAL] * size);
-    return (supply - winding(p, size) * current - p[EMF] * slip) / p[INDUCTANCE];
 }
 
 static double duty_of(const Model *m) { return m->remote ? fmin(fmax(m->duty, 0.0), 1.0) : 0.0; }
@@ -118,59 +100,11 @@ static double output(const Model *m, int which) {
     }
 }
 
-/* Current and its integral over a time, inputs constant; false where that does not succeed. */
-static bool integrate(Model *m, double length, double duty, double *charge) {
-    static const double A[7][6] = {
-        {0},
-        {1.0 / 5},
-        {3.0 / 40, 9.0 / 40},
-        {44.0 / 45, -56.0 / 15, 32.0 / 9},
-        {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
-        {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
-        {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
-    static const double ERROR[7] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
-                                    -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
-    const double *p = m->p;
-    double at_rest = p[CONSTANT] + p[DECAY] + p[GROWTH];
-    double current = m->state[CURRENT], done = 0.0, h = fmin(length, 0.1 * p[INDUCTANCE] / at_rest);
-    /* The last term keeps a robot without voltage and current from dividing nothing by nothing. */
-    double allowed = 1e-10 * fmax(fmax(p[VOLTAGE] / at_rest, fabs(current)), 1e-9), integral = 0.0;
-    for (long step = 0; step < 100000000L && done < length; step++) {
-        double k[7], at[7], error = 0.0, error_of_integral = 0.0, sum = 0.0;
-        bool last = done + h >= length;
-        if (last) h = length - done;
-        for (int stage = 0; stage < 7; stage++) {
-            at[stage] = current;
-            for (int j = 0; j < stage; j++) at[stage] += h * A[stage][j] * k[j];
-            k[stage] = current_rate(m, at[stage], duty);
-            error += h * ERROR[stage] * k[stage];
-            error_of_integral += ERROR[stage] * at[stage];
-        }
-        for (int j = 0; j < 6; j++) sum += h * A[6][j] * at[j];
-        double size = fmax(fabs(error), fabs(error_of_integral)) / allowed;
-        if (size <= 1.0) {
-            current = at[6];
-            integral += sum;
-            done = last ? length : done + h;
-        }
-        if (!isfinite(size)) h *= 0.1;
-        else h *= fmin(5.0, fmax(0.2, 0.9 * pow(size + 1e-10, -0.2)));
-    }
-    if (done < length || !isfinite(current)) return false;
-    m->state[CURRENT] = current;
-    *charge = integral;
-    return true;
-}
-
+/* One step; false where the numbers have no motion. */
 static bool advance(Model *m, double length) {
-    double duty = duty_of(m), charge = 0.0;
-    const double *p = m->p;
-    if (!integrate(m, length, duty, &charge)) return false;
-    m->state[POSITION] += moved(p, SPEED, SPEED_FLOW, charge, m->flow * length);
-    m->state[TAIL_ANGLE] += moved(p, TAIL, TAIL_FLOW, charge, m->flow * length);
-    m->state[BODY_ANGLE] += moved(p, BODY, BODY_FLOW, charge, m->flow * length);
-    m->state[CHARGE] += p[POLARITY] * duty * charge;
-    return true;
+    const double duty = duty_of(m);
+    advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
+    return isfinite(m->state[CURRENT]) && isfinite(m->state[CHARGE]);
 }
 
 /* ---------------------------------------------------------------- life of an instance */

@@ -11,7 +11,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, TaskEnvironment
 
 _LEAD = 0.17
-"""How far ahead `lead` looks, s: the usual latency of camera and remote together."""
+"""Look-ahead of `lead`, s: the usual latency of camera and remote together."""
 _GAIN = 1.0
 """Of `integral`: change of the duty per second for a relative error of 1."""
 

@@ -21,8 +21,9 @@ from spirillum.virtual.live_camera import VirtualCamera
 VIRTUAL = "virtual"
 """Port of a remote that is made for the run, on a pseudo-terminal."""
 _TRIES = 3
-"""How often a virtual remote is asked before it counts as gone: a busy machine may keep it waiting, but not the robot,
-whose time stands still."""
+"""How often a virtual remote is polled before it counts as gone: a busy machine may delay it, but not the robot, whose
+time stands still.
+"""
 _LEARN = 3.0
 """Time from which the tracker learns the robot's look, s."""
 
@@ -85,7 +86,7 @@ class Bench(Senses):
         return self._reason if self._tracker is not None and not self._tracker.learnt else ""
 
     def sight(self, moment: Snapshot) -> Detection | None:
-        """What the tracker says of the next picture; None while it learns, and where frame or robot are lost."""
+        """Observation of the next picture by the tracker; None while it learns, and where frame or robot are lost."""
         modelled = super().sight(moment)
         if self._eye is None or self._tracker is None:
             return modelled

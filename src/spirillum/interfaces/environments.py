@@ -76,7 +76,7 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
 
 
 class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Many robots that step as one; one that is at its end begins anew in the step after."""
+    """Many robots that step together; one that is at its end restarts in the next step."""
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 

@@ -13,6 +13,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Mapping
 from importlib.resources import files
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -56,7 +57,9 @@ def base_units(unit: str) -> dict[str, int]:
 
 
 SOURCE = "axial_robot.c"
-"""Name of the C source."""
+"""Name of the C source with the functions of FMI."""
+_EQUATIONS = ("axial.c", "drive.c", "core.h", "drive.h")
+"""Files of csrc/ with its equations."""
 _REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
 """Value references, which the C source knows too."""
 
@@ -79,10 +82,18 @@ def identifier_of(axial: AxialRobot) -> str:
     return re.sub(r"\W", "_", f"robot_{axial.robot.name}", flags=re.ASCII)[:100]
 
 
-def token_of(axial: AxialRobot, source: bytes) -> str:
-    """What an importer has to know to instantiate the FMU: a checksum of its numbers and its source."""
+def sources() -> dict[str, bytes]:
+    """The C sources by name, those of csrc/ among them."""
+    packaged = files(__package__).joinpath("csrc")
+    csrc = packaged if packaged.is_dir() else Path(__file__).parents[3] / "csrc"
+    own = {SOURCE: files(__package__).joinpath(SOURCE).read_bytes()}
+    return own | {name: csrc.joinpath(name).read_bytes() for name in _EQUATIONS}
+
+
+def token_of(axial: AxialRobot, written: Mapping[str, bytes]) -> str:
+    """What an importer has to know to instantiate the FMU: a checksum of its numbers and its sources."""
     said = repr((axial.robot.name, axial.values, axial.flow, axial.duty)).encode()
-    return "{" + hashlib.sha256(said + source).hexdigest()[:32] + "}"
+    return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
 
 
 def header_text(axial: AxialRobot, token: str) -> str:
@@ -101,8 +112,10 @@ def build_text(identifier: str) -> str:
     """How the source is compiled: `sources/buildDescription.xml`."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
-    files = ET.SubElement(configuration, "SourceFileSet", language="C99")
-    ET.SubElement(files, "SourceFile", name=SOURCE)
+    compiled = ET.SubElement(configuration, "SourceFileSet", language="C11")
+    for name in (SOURCE, *_EQUATIONS):
+        if name.endswith(".c"):
+            ET.SubElement(compiled, "SourceFile", name=name)
     return _text(root)
 
 
@@ -193,7 +206,7 @@ def _text(root: ET.Element) -> str:
 
 
 _COMPILERS = ("cc", "gcc", "clang")
-_OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden")
+_OPTIONS = ("-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden")
 _LONGEST = 120.0
 """Time after which a compiler is given up, s."""
 _LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
@@ -215,17 +228,16 @@ def compiler() -> str:
 
 def fmu_bytes(axial: AxialRobot) -> bytes:
     """The FMU of a robot: a zip archive with description, source and library."""
-    source = files(__package__).joinpath(SOURCE).read_bytes()
-    token, name = token_of(axial, source), identifier_of(axial)
-    header = header_text(axial, token).encode()
+    written, name = sources(), identifier_of(axial)
+    token = token_of(axial, written)
+    written["robot.h"] = header_text(axial, token).encode()
     system, ending = _LIBRARIES.get(sys.platform, ("linux", ".so"))
     machine = platform.machine().lower()
     contents = {
         "modelDescription.xml": description_text(axial, token).encode(),
         "sources/buildDescription.xml": build_text(name).encode(),
-        f"sources/{SOURCE}": source,
-        "sources/robot.h": header,
-        f"binaries/{_PROCESSORS.get(machine, machine)}-{system}/{name}{ending}": _compiled(source, header),
+        **{f"sources/{file}": text for file, text in written.items()},
+        f"binaries/{_PROCESSORS.get(machine, machine)}-{system}/{name}{ending}": _compiled(written),
     }
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as target:
@@ -237,20 +249,21 @@ def fmu_bytes(axial: AxialRobot) -> bytes:
     return archive.getvalue()
 
 
-def _compiled(source: bytes, header: bytes) -> bytes:
+def _compiled(written: Mapping[str, bytes]) -> bytes:
     with scratch_folder() as here:
-        (here / SOURCE).write_bytes(source)
-        (here / "robot.h").write_bytes(header)
-        command = [compiler(), *_OPTIONS, "-o", "robot.library", SOURCE, "-lm"]
+        for name, text in written.items():
+            (here / name).write_bytes(text)
+        units = [name for name in written if name.endswith(".c")]
+        command = [compiler(), *_OPTIONS, "-o", "robot.library", *units, "-lm"]
         try:
             done = subprocess.run(  # noqa: S603 - a compiler of the system and a source of our own
                 command, cwd=here, capture_output=True, text=True, timeout=_LONGEST, check=False
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise InputError(
-                f"{command[0]} does not build the .fmu ({error}); allowed: a C compiler for C99"
+                f"{command[0]} does not build the .fmu ({error}); allowed: a C compiler for C11"
             ) from error
         if done.returncode != 0:
             said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)[:200]
-            raise InputError(f"{command[0]} does not build the .fmu ({said}); allowed: a C compiler for C99")
+            raise InputError(f"{command[0]} does not build the .fmu ({said}); allowed: a C compiler for C11")
         return (here / "robot.library").read_bytes()

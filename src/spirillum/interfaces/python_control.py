@@ -97,7 +97,7 @@ def control_system(
     )
     axial.check_steady(1.0, axial.flow or 0.0)
     return library.nlsys(
-        lambda _t, x, u, params: rates(_numbers(params), float(x[0]), *_inputs_of(u)),
+        lambda _t, x, u, params: rates(_numbers(params), float(x[0]), *_inputs_of(u))[: len(STATES)],
         lambda _t, x, u, params: outputs(_numbers(params), x, *_inputs_of(u)),
         name=axial.robot.name,
         inputs=_inputs(axial),

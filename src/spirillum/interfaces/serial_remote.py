@@ -121,7 +121,7 @@ class SerialRemote:
 
     @validate_arguments
     def __init__(self, port: str, *, baud: int = _BAUD) -> None:
-        """Open the port, and ask the far end for its name.
+        """Open the port, and request the name of the far end.
 
         Args:
             port: such as ``/dev/ttyUSB0`` or ``COM3``.

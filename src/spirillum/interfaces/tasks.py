@@ -138,7 +138,7 @@ class TaskEnvironment(ABC):
 
     @property
     def position(self) -> Samples:
-        """True places, m."""
+        """True positions, m."""
         return self.plants.states[:, kernel.POSITION]
 
     @property
@@ -200,7 +200,7 @@ class TaskEnvironment(ABC):
         """The numbers of `observed`, each (count,), before they are cut off at their bounds."""
 
     def _duty(self, actions: Any) -> Samples:
-        """The duties that actions ask for."""
+        """The commanded duties."""
         try:
             values = np.asarray(actions, dtype=np.float64).reshape(-1)
         except (TypeError, ValueError, OverflowError):
@@ -227,7 +227,7 @@ class TaskEnvironment(ABC):
         self._frames.append(np.where(lost, self._frames.ago(0), place))
 
     def _seen(self) -> tuple[Samples, Samples]:
-        """Place and speed as the camera tells them now, m and m/s."""
+        """Position and speed as the camera measures them now, m and m/s."""
         last = self._frames.ago(self._late)
         return last, (last - self._frames.ago(self._late + self._slow)) / (self._slow * self.dt)
 
@@ -236,7 +236,7 @@ class TaskEnvironment(ABC):
 
 
 class StopAt(TaskEnvironment):
-    """Stop at a place, whose distance in m is drawn, with a remote that knows on and off."""
+    """Stop at a goal, whose distance in m is sampled, with a remote that is on or off."""
 
     observed = (
         ObservedNumber("distance", "mm", -100.0, 100.0),
@@ -260,7 +260,7 @@ class StopAt(TaskEnvironment):
 
 
 class HoldSpeed(TaskEnvironment):
-    """Swim at a speed, drawn as a share of the steady speed of the robot as its file says, by the drive's duty."""
+    """Swim at a speed, sampled as a share of the steady speed of the robot of the file, by the drive's duty."""
 
     observed = (
         ObservedNumber("target", "mm/s", -20.0, 20.0),

@@ -39,6 +39,11 @@ def advance(
     """
 
 
+@native("out", symbol="axial_rates")
+def rates(parameters: Float64[Array, "18"], current: float, duty: float, flow: float, out: Float64[Array, "7"]) -> None:
+    """Fill d/dt of the state of one robot at a current, A, a duty and an imposed mean flow, m/s."""
+
+
 @native("out")
 def contact_drag(
     r: Float64[Array, "count 3 3"],

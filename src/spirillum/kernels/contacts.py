@@ -15,9 +15,9 @@ SITE = 5
 WIRE_RADIUS, AMPLITUDE, TAPER, HAND_K, ROOT, LENGTH = 0, 1, 2, 3, 4, 5
 WIRE = 6
 
-# A station along the wire: distance from the root, m, and its place at phase 0, m.
-STATION_XI, STATION_X, STATION_Y, STATION_Z = 0, 1, 2, 3
-STATION = 4
+# A station along a wire: distance from the root, m, its place at phase 0, m, and the angle of its wire, rad.
+STATION_XI, STATION_X, STATION_Y, STATION_Z, STATION_TURN = 0, 1, 2, 3, 4
+STATION = 5
 
 
 @native()

@@ -26,12 +26,13 @@ SEEN = 31  # places of all that is observed, wherever the robot swims
 KIND, FIXED, DUTY = 0, 1, 2  # one of the kinds below; whether the joint is fixed; duty of the remote
 GIVEN = 3  # prescribed torque, N m, or rate, rad/s
 MOMENT, FIELD, FIELD_RATE = 3, 6, 7  # magnetic moment (3), A m^2; field, T; its rotation rate, rad/s
-POLARITY, TORQUE_CONSTANT, BACK_EMF, INDUCTANCE = 8, 9, 10, 11  # sign; K_m, N m/A; K_b, V s/rad; L, H
-CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE = 12, 13, 14, 15, 16, 17  # of R(I), Table II
-VOLTAGE, INTERNAL_RESISTANCE = 18, 19  # of the battery, V and ohm
+TORQUE_CONSTANT, BACK_EMF, INDUCTANCE = 8, 9, 10  # K_m, N m/A; K_b, V s/rad; L, H
+CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE = 11, 12, 13, 14, 15, 16  # of R(I), Table II
+VOLTAGE, INTERNAL_RESISTANCE, POLARITY = 17, 18, 19  # of the battery, V and ohm; sign of the driven rate
 AXIS_Y, AXIS_Z, FIELD_PHASE = 20, 21, 22  # of the field's axis, a unit vector, across the lab's x; at time 0, rad
-DRIVE = 23
-MOTOR, TORQUE, RATE, MAGNETIC = 0.0, 1.0, 2.0, 3.0  # kinds
+CURVE_POINTS, CURVE_AT, MOST_POINTS = 23, 24, 12  # of torque against rate: their number; rate, rad/s, and torque, N m
+DRIVE = 48
+MOTOR, TORQUE, RATE, MAGNETIC, CURVE = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds
 
 
 # Weight: submerged weight of body and rotor, N, and first moments of the rest, N m, at phase 0.
@@ -40,5 +41,5 @@ WEIGHT = 8
 
 
 @native("out")
-def field_at(time: float, drive: Float64[Array, "23"], out: Float64[Array, "3"]) -> None:
+def field_at(time: float, drive: Float64[Array, "48"], out: Float64[Array, "3"]) -> None:
     """Fill the field in the lab at a time, s, in T: it turns about its axis, at right angles to it."""

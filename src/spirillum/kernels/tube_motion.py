@@ -28,6 +28,8 @@ VISCOSITY, ENDS, LENGTH = 5, 6, 7  # Pa s; one of the kinds below; L_eff, m
 CAVITATION = 8  # the film's pressure is not below -p_c, Pa; infinite: without a bound
 SITES, STATIONS = 9, 10  # their numbers
 TUBE = 11
+RANGE_LEFT = "the range of the robot's table"
+"""How the event begins of a robot that tilts farther than its table is followed."""
 CLOSED, OPEN, IMPOSED = 0.0, 1.0, 2.0  # kinds of ends
 
 
@@ -46,7 +48,7 @@ def packed(
     Args:
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
         weight: submerged weight of body and rotor, and its first moments, (8,).
-        drive: drive and motor, (23,).
+        drive: drive and motor, (48,).
         tube: the tube, (9,) up to the numbers of sites and stations.
         wire: the wire, see `contacts`, (6,).
         sites: sites of body and coupling, see `contacts`, (n, 5).

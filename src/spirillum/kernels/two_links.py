@@ -27,7 +27,7 @@ def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spo
         weight: submerged weight of body and rotor, and its first moments, (8,).
         wall: the wall, (4,); an infinite radius means none.
         spots: rings that may near the wall, (n, 6). A film of thickness h resists with c ((H/h)^p - 1).
-        drive: drive and motor, (23,).
+        drive: drive and motor, (48,).
     """
     return np.concatenate([np.ravel(part) for part in (np.zeros(SEEN), friction, weight, drive, drag, wall, spots)])
 

@@ -1,4 +1,4 @@
-"""A robot that is known, followed frame by frame, and what is said of each frame."""
+"""A detected robot, followed frame by frame, and the observation of each frame."""
 
 from __future__ import annotations
 
@@ -176,14 +176,14 @@ class Following:
         self.restarts = (0, 0)
 
     def _roll(self) -> tuple[float, tuple[Flag, ...]]:
-        """Angle of the channel to the rows of the picture where no ruler tells it, by the first look."""
+        """Angle of the channel to the rows of the picture from the initial detection, where there is no ruler."""
         path = self.learnt.known.start.path
         time, pose = np.array([at for at, _ in path]), np.array([one for _, one in path])
         along = align_with_path(time, self._places(pose[:, :2]), pose[:, 2])
         return float(np.median(pose[:, 2] - along.heading)), along.flags
 
     def _places(self, xy: np.ndarray) -> np.ndarray:
-        """Places in the camera's frame at the stated scale, from the middle of the picture, m, (n, 2)."""
+        """Positions in the camera's frame at the stated scale, from the middle of the picture, m, (n, 2)."""
         sight = self.learnt.sight.optics
         return places_seen_by(sight, self.learnt.known.start.body.optics, xy) - sight.origin[:2]
 
@@ -227,7 +227,7 @@ class Following:
         return _without_spoiled(seen)
 
     def _magnified(self, found: PoseFit) -> float:
-        """Standard error of the place at the stated scale, m."""
+        """Standard error of the position at the stated scale, m."""
         known, sight = self.learnt.known.start.body.optics, self.learnt.sight.optics
         return found.error.x * known.focal / sight.focal
 
@@ -328,7 +328,7 @@ class Following:
 
 
 def _synthetic(video: Video) -> tuple[Flag, ...]:
-    """That the pictures are computed, where they say so."""
+    """Note that the pictures are synthetic, where they say so."""
     sentence = "the pictures say of themselves that they are synthetic: nothing here is measured"
     return (Flag(SYNTHETIC, sentence),) if says_synthetic(video.words) else ()
 

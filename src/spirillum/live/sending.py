@@ -21,7 +21,7 @@ def line_of(answer: Mapping[str, Any]) -> str:
 
 
 class Datagrams:
-    """Sends each line as one datagram; one that nobody takes is lost, as the next one is newer."""
+    """Sends each line as one datagram; a lost one is not repeated, as the next one is newer."""
 
     def __init__(self, address: str) -> None:
         """Find the receiver."""

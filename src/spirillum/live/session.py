@@ -1,4 +1,4 @@
-"""From a source to observations: pictures come, the tracker looks, and what it says goes out."""
+"""From a source to observations: reads pictures, tracks, sends observations."""
 
 from __future__ import annotations
 
@@ -207,7 +207,7 @@ class _Log:
             self.stopped = "" if self.interrupted else str(error)
 
     def take(self, frame: Arrived) -> tuple[Observation, float | None]:
-        """What the tracker says of a frame, and after how long, s."""
+        """The tracker's observation of a frame, and its latency, s."""
         missed = frame.number - self._next
         self._next = frame.number + 1
         self.dropped += missed

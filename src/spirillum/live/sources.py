@@ -64,7 +64,7 @@ class Source:
     options: Mapping[str, Any] = field(repr=False)
     """How it is opened: see `source_of`."""
     words: str = ""
-    """What a video says of itself, such as that it is synthetic."""
+    """Metadata of a video, such as that it is synthetic."""
     flags: list[Flag] = field(default_factory=list, repr=False)
     """What was odd about its pictures while they were read."""
 
@@ -170,7 +170,7 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
 
 
 def _shown(source: Source, stream: Any, frame: Any) -> Callable[[Any], np.ndarray]:
-    """What gives pictures as they are shown, by the first one; flags of the source say what is done to them."""
+    """The decoder of shown pictures, by the first one; flags of the source state its corrections."""
     stated, given = float(stream.sample_aspect_ratio or 0.0) or None, source.options["aspect"]
     display, slant = frame_display(frame, stated_aspect(source.name, stated, given))
     source.flags.extend(display_flags(display, (frame.width, frame.height), stated, given, slant))

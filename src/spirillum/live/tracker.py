@@ -1,4 +1,4 @@
-"""The tracker frame by frame: it learns the robot from the first seconds, then says of each frame what it shows."""
+"""The tracker frame by frame: it learns the robot from the first seconds, then returns an observation of each frame."""
 
 from __future__ import annotations
 

@@ -36,9 +36,9 @@ class Tracked(DisplayMixin):
     trial: Trial | None = field(repr=False)
     """Speed and rates over all frames; None if the robot was never learnt."""
     source_notes: tuple[Note, ...] = ()
-    """What to be careful about that lies in the source."""
+    """Cautions about the source."""
     stopped: str = ""
-    """Why it ended before its time, in a sentence; empty for a video that ended, or a time that was asked for."""
+    """Why it ended early, in a sentence; empty for a video that ended, or a requested duration."""
     interrupted: bool = False
     """Whether it was interrupted."""
 

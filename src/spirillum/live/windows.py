@@ -22,7 +22,7 @@ _FEWEST = 8
 _LEAST_SPAN = 0.5
 """Least share of the window that readings have to span."""
 _LARGEST = 0.95
-"""Largest autocorrelation from frame to frame that a window can tell."""
+"""Largest autocorrelation from frame to frame that a window resolves."""
 
 
 class Window:
@@ -116,7 +116,7 @@ class CausalAngle:
         """Begin."""
         self.period = period
         self.restarts = 0
-        """How often it was begun anew, so that angles before and after do not hang together."""
+        """How often tracking restarted, so that angles before and after are not comparable."""
         self._times: list[float] = []
         self._angles: list[float] = []
         self._value = self._at = math.nan

@@ -25,7 +25,7 @@ _AROUND = 2
 """Pixels on each side of a click over which a colour is averaged."""
 
 _RIGHT = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}
-"""Where, in (u, v), the right-hand side of a robot lies whose nose points there."""
+"""Direction, in (u, v), of a robot's right-hand side, given that of its nose."""
 
 
 def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, float], length: float) -> float:

@@ -39,7 +39,7 @@ _EDGE_CORRELATION = 20.0
 _FEWEST = 4
 """Fewest frames that give a rate."""
 _FOREVER = 1e9
-"""Stands for the infinite time in view of a robot at rest, s."""
+"""Represents the infinite time in view of a robot at rest, s."""
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Sizes at which the tracker passes its tests with a margin, pixels."""
 _NEEDED = {"robot": 20.0, "spacing": 3.0}

@@ -85,8 +85,8 @@ IMPORTED = "imported"
 """Name of the flag of a track from another program."""
 SYNTHETIC = "synthetic"
 """Word in the metadata of computed videos, and name of the flag."""
-_MANY_OUTLIERS = 0.02
-"""Share of outliers above which a flag is raised."""
+_MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
+"""Share and number of outliers above which a flag is raised: a good video may show one or two."""
 _FEWEST_FRAMES = 4
 """Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
@@ -112,10 +112,10 @@ _IMPLIED = {
     },
     "mirrored": {"stripe-order", "handedness"},
 }
-"""Flags that say nothing more beside another one that withholds a number, by its name; it withholds what they do."""
+"""Flags that are redundant beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
-"""Flags that say nothing more where the robot does not move one way throughout."""
+"""Flags that are redundant where the robot does not move one way throughout."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
@@ -134,6 +134,8 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
     for name in SEEN:  # what is not given has no mean, and no frames left out of it
         if any(name in flag.spoils for flag in flags):
             implied |= {f"{kind}-{name.replace('_', '-')}" for kind in ("not-steady", "stray-frames")}
+    if "robot-stands-still" in names:
+        implied.add("short-turn")
     if _CHANGES & names:
         implied |= _OF_CHANGES
     count = track.time.size
@@ -168,10 +170,8 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
         if not rate.steady:
             sentence = f"the {words} changes along the video{_how(rate, name)}; given is its mean from end to end"
             flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
-        if rate.outliers > _MANY_OUTLIERS * (rate.frames + rate.outliers):
-            far = "1 frame lies far from its neighbours and was"
-            far = far if rate.outliers == 1 else f"{rate.outliers} frames lie far from their neighbours and were"
-            sentence = f"{far} left out of the {words}"
+        if rate.outliers > max(_FEW_OUTLIERS, _MANY_OUTLIERS * (rate.frames + rate.outliers)):
+            sentence = f"{rate.outliers} frames lie far from their neighbours and were left out of the {words}"
             flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
     stripes = stripes_of(track.setup, robot)
     turned = _range(track.body_angle)

@@ -1,4 +1,4 @@
-"""From videos to speeds and rates: what is asked, one trial after the other, and all of them together."""
+"""From videos to speeds and rates: the request, each trial, and all of them together."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class Measurement(DisplayMixin):
     interrupted: bool = False
     """Whether it was interrupted before the last video."""
     left: tuple[str, ...] = ()
-    """Datasets of other measurements that lie in the same folder."""
+    """Datasets of other measurements in the same folder."""
 
     @property
     def warnings(self) -> tuple[Note, ...]:
@@ -184,7 +184,7 @@ class Measurement(DisplayMixin):
 
 
 def _notes(trial: Trial) -> list[Note]:
-    """Flags of a trial, and why a rate is missing where no flag says it."""
+    """Flags of a trial, and why a rate is missing where no flag states it."""
     flags = [flag.note for flag in trial.flags]
     reasons: dict[str, list[str]] = {}
     for name in RATE_NAMES:
@@ -208,7 +208,7 @@ class MeasurementRequest(NamedTuple):
     readings: tuple[Marks | None, ...]
     """Readings by hand of each video."""
     setup: Setup
-    """The setup, with the times that were asked for."""
+    """The setup, with the requested times."""
     setup_file: str
     """The setup file."""
     robot: Robot

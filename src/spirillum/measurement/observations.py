@@ -66,7 +66,7 @@ class ObservationRow:
     trials: int
     """1 for a trial, more for a mean."""
     intervals: tuple[float, float, float, float]
-    """Half widths of 95 % intervals in the same order: what a trial says of its own error, or of a mean over trials."""
+    """Half widths of 95 % intervals in the same order: of a trial, or of a mean over trials."""
     trial: str = ""
     """Number or name of the trial, where the file gives one."""
     motor_derived: bool = False
@@ -74,7 +74,7 @@ class ObservationRow:
 
     @property
     def tail(self) -> tuple[float, float, float]:
-        """Channel diameter, wavelength, amplitude, rounded to 1 nm: what tells robots of a study apart."""
+        """Channel diameter, wavelength, amplitude, rounded to 1 nm: the key of a robot in a study."""
         return (round(self.channel_diameter, 9), round(self.wavelength, 9), round(self.amplitude, 9))
 
 

@@ -33,7 +33,7 @@ series' own scatter is no outlier, however smooth its neighbours are."""
 def outlying_frames(
     time: Samples, values: Samples, error: Samples | None = None, *, straight: bool = True
 ) -> np.ndarray:
-    """Frames that lie more than six standard deviations (from the median absolute deviation) from their neighbours.
+    """Frames that differ by more than six standard deviations from their neighbours.
 
     First from the median of nine neighbours about a robust line, which finds single frames; then from the line
     itself, which finds short bursts, unless the series bends away from it as a whole.
@@ -106,13 +106,13 @@ _FEWEST = 40
 _BESIDE = 20
 """Frames that the first one is compared with."""
 _AHEAD = 1.5
-"""Standard errors by which place and angles together are ahead then. Chance alone leaves them out 14 times in 100."""
+"""Standard errors by which position and angles together have to lead. Chance alone leaves them out 14 times in 100."""
 _MOST = 4.0
 """Standard errors that one of them counts at most."""
 
 
 def without_lead(track: Track) -> Track:
-    """The track without its first frames, where the first one is ahead of what the next ones say."""
+    """The track without its first frames, where the first one leads the next ones (codec lag)."""
     if track.time.size < _FEWEST or not _leads(track):
         return track
     first = np.arange(track.time.size) < LEADING
@@ -125,7 +125,7 @@ def without_lead(track: Track) -> Track:
 
 
 def _leads(track: Track) -> bool:
-    """Whether place and angles on the first frame are ahead of a line through the next ones."""
+    """Whether position and angles on the first frame lead a line through the next ones."""
     near, ahead = slice(LEADING, LEADING + _BESIDE), []
     time = track.time - track.time[0]
     for series in (track.position[:, 0], track.body_angle, track.tail_phase):

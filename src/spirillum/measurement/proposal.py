@@ -1,4 +1,4 @@
-"""From a video to a setup file: what the video tells is filled in, what only the experimenter knows is marked."""
+"""From a video to a setup file: detected values are filled in, those that only the experimenter knows are marked."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ _OUTER = 1.1
 _USUAL_RATE = 30.0
 """Frames a second at which a folder of images is looked at until its rate is known."""
 _SPACING = (0.8, 1.4)
-"""A ruler's spacing over what the robot's size says of it at the robot's own depth, where nothing is wrong: the ruler
-may be farther away, or a little nearer. Assumed."""
+"""A ruler's spacing over that from the robot's size at the robot's own depth, where nothing is wrong: the ruler may be
+farther away, or a little nearer. Assumed.
+"""
 _AT_REST = 0.2
-"""Speed below which a robot is said to rest, pixels a second."""
+"""Speed below which a robot counts as resting, pixels a second."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a video tells."""
+    """One finding from a video."""
 
     name: str
     """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `appearance`, `stripes` or `walls`."""
@@ -67,7 +68,7 @@ class Finding:
 
 @dataclass(frozen=True, repr=False)
 class Proposal(DisplayMixin):
-    """A setup as far as a video tells it."""
+    """A setup as far as a video determines it."""
 
     film: str
     """Name of the video."""
@@ -180,7 +181,7 @@ def propose_setup(
 
 
 def _beside(file: Path, target: Path) -> str:
-    """A robot file as the setup file names it: relative to its own folder, where it lies in there."""
+    """A robot file as the setup file names it: relative to its own folder, if it is inside."""
     folder = target.resolve().parent
     return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else file.as_posix()
 
@@ -323,7 +324,7 @@ def _walls(found: SetupFreeDetection, robot: Robot) -> Finding:
 
 
 def _toml(finding: Finding) -> tuple[str, str]:
-    """A finding's value as it stands in the file, and the comment beside it."""
+    """A finding's value as written in the file, and the comment beside it."""
     value = finding.value
     text = f"{value:.9g}" if isinstance(value, float) else toml_value(value)
     return text, f"found in the film, {finding.confidence}"

@@ -1,4 +1,4 @@
-"""Plausibility of the rows of an observations file, judged together: a single row is noisy, a convention is shared."""
+"""Plausibility of the rows of an observations file together: a single row is noisy, a convention is shared."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _check_contradictions(path: str | Path, rates: RateTriples) -> None:
 
 
 def wrong_signs(values: Samples, expected: float, stated: Samples, groups: Sequence[Hashable]) -> np.ndarray:
-    """Places of values whose sign is not the expected one by more than their error.
+    """Indices of values whose sign differs from the expected one by more than their error.
 
     The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
 

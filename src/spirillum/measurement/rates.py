@@ -28,7 +28,7 @@ _TIMES = 8
 _SIZES = (0.25, 1.0)
 """Variances of the periodic errors on the grid, over the expected ones; weighted by their likelihood."""
 _FEWEST_BLOCKS = 24
-"""Fewest blocks from which a change of the rate is told."""
+"""Fewest blocks from which a change of the rate is detected."""
 _WHITE = 3.0
 """Prior odds of white noise against all correlated noises."""
 _FEWEST = 8

@@ -133,7 +133,7 @@ _SEEN = {
     "tail_rotation_rate": "tail_rate_Hz",
     "body_rotation_rate": "body_rate_Hz",
 }
-"""What a camera sees. The motor's rate follows from two of them; a column of its own would count them twice."""
+"""Observed series. The motor's rate follows from two of them; a column of its own would count them twice."""
 
 
 def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str | None:

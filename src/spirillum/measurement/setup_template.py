@@ -1,4 +1,4 @@
-"""A template of a setup file, and what a filled one says."""
+"""A template of a setup file, and reading of a filled one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _HEAD = """\
 # (view "side": its far wall). Every *_uncertainty is a standard uncertainty; 0 claims that the number is exact.
 """
 OPEN = "FILL IN"
-"""Stands for a number that only the experimenter knows: no file with it is valid."""
+"""Placeholder of a number that only the experimenter knows: no file with it is valid."""
 _YOURS = "CHECK: a usual standard uncertainty, not yours"
 _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "": (
@@ -90,7 +90,7 @@ KNOWN = {
 
 
 def toml_value(value: str | float | list[str]) -> str:
-    """A text, number or list of texts as it stands in TOML: quoted as in JSON, whose escapes TOML shares."""
+    """A text, number or list of texts in TOML: quoted as in JSON, whose escapes TOML shares."""
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -163,7 +163,7 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
 
 
 def setup_remarks(setup: Setup) -> list[Note]:
-    """What a setup says of its uncertainties that whoever uses its lengths has to know."""
+    """Notes on the uncertainties of a setup for users of its lengths."""
     found = []
     if not depth_shares(setup):
         words = (
@@ -196,7 +196,7 @@ def _as_in_example(setup: Setup) -> list[str]:
 
 
 def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
-    """What the tracker's first look at a video tells with a setup, and all that is odd about it."""
+    """Findings of the initial detection with a setup, and its cautions."""
     video = opened(film, setup)
     frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)

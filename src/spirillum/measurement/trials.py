@@ -55,7 +55,7 @@ _FEWEST = 12
 _UNSTEADY = 0.5
 """Largest root mean square residual of that polynomial, rad."""
 _TENTHS = 10
-"""Parts of a track whose mean residuals tell how its errors wander."""
+"""Parts of a track whose mean residuals estimate slow errors."""
 _TOO_FEW = "it was read on too few frames"
 
 

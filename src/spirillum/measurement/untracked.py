@@ -23,9 +23,9 @@ class Untracked:
     ruled: Ruled | None
     """Turns pixels into lengths; None where nothing gives a scale."""
     time_of: Callable[[Samples], Samples] | None = field(repr=False)
-    """Takes numbers of frames to times, s; None where nothing tells."""
+    """Maps frame numbers to times, s; None where no times are known."""
     words: str = ""
-    """What the video says of itself."""
+    """Metadata of the video."""
     duration: float | None = None
     """Length of the video, s; None where it is not known."""
     seen: bool = True
@@ -68,7 +68,7 @@ def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) ->
 
 
 class _Stamps:
-    """Times of frames by their numbers: at a given rate, else the video's own, read once when they are asked for."""
+    """Times of frames by their numbers: at a given rate, else the video's own, read once on first use."""
 
     def __init__(self, video: Video | None, rate: float | None) -> None:
         self._video, self._rate = video, rate

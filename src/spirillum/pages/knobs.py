@@ -17,7 +17,7 @@ from spirillum.robot.toml_writer import robot_text
 from spirillum.units import KINDS, parse_option, parse_quantity
 
 _SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
-"""Reference to the robot in messages about a field, which the page shows at the knob."""
+"""Reference to the robot in messages about a field, which the page shows at its control."""
 
 
 def robot_tables(source: Any) -> dict[str, Any]:
@@ -68,7 +68,7 @@ _LONGEST = 80
 
 @dataclass(frozen=True)
 class Knob:
-    """One knob."""
+    """One control of a field."""
 
     field: str
     """Dotted field of the robot file, or of the run (`run.gap`)."""
@@ -166,7 +166,7 @@ class Settings:
         return Placement.of(dict(self.run))
 
     def changed(self, name: str, value: str) -> Settings:
-        """With another value of one knob."""
+        """With another value of one control."""
         if len(value) > _LONGEST:
             raise InputError(f"a value of {len(value)} characters; allowed: at most {_LONGEST}")
         value = value.strip()
@@ -231,7 +231,7 @@ _UNIT_KINDS = {
     "Hz": "rate",
 }
 _SMALL = {"mm": (2e-5, "um"), "Pa s": (0.02, "mPa s")}
-"""Unit of a knob to the SI size below which it is shown in another, as a bacterium's."""
+"""Unit of a control to the SI size below which it is shown in another, as a bacterium's."""
 
 
 def _unit_of(unit: str, si: float) -> str:
@@ -240,7 +240,7 @@ def _unit_of(unit: str, si: float) -> str:
 
 
 def _range(knob: Knob, value: float) -> tuple[float, float]:
-    """Ends of the slider: the knob's own, or those around a value that is near or beyond them."""
+    """Ends of the slider: the control's own, or those around a value that is near or beyond them."""
     if value <= 0 or 1.5 * knob.low <= value <= knob.high:
         return knob.low, knob.high
     return _around(value)

@@ -121,7 +121,7 @@ def bench_routes(bench: MeasurementSession, theatre: SimulationThread, uploads: 
 
 
 async def _received(request: Request, bench: MeasurementSession) -> str:
-    """A film is written to the place that the bench gives it, piece by piece; its name."""
+    """Store an uploaded video under a name chosen here, in chunks; return its name."""
     kind, size = request.query_params.get("kind", ""), stated_size(request)
     path: Path = await run_in_background(bench.films.room_for, kind, size)
     try:

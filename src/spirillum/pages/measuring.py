@@ -1,4 +1,4 @@
-"""Measurement of videos, or calibration, in a process of its own; run by `spirillum.pages.job`."""
+"""Measurement of videos, or calibration, in a separate process; run by `spirillum.pages.job`."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ if __name__ == "__main__":
 
 
 _ONE_TURN = 1.0
-"""Changes of one knob within this time are one step of undo, s."""
+"""Changes of one control within this time are one step of undo, s."""
 _MOST_UNDO = 200
 
 
@@ -191,7 +191,7 @@ class PageRobot:
         return cls(Settings(source), robot, duty=own)
 
     def set(self, name: str, value: str) -> None:
-        """Turn one knob."""
+        """Change one field."""
         self._become(self.settings.changed(name, value), name)
 
     def preset(self, name: str, own: Any) -> None:

@@ -200,7 +200,7 @@ def application(
 
 
 async def _said(request: Request, error: Exception) -> Response:
-    """What was wrong, in a sentence. A client that leaves while it sends is told nothing, nor is the terminal."""
+    """The error as a sentence. Nothing is reported to a client that disconnects while it sends, or in the terminal."""
     with suppress(ClientDisconnect, RuntimeError):  # RuntimeError: all has been read
         async for _ in request.stream():  # browsers listen to the answer when they have sent everything
             pass

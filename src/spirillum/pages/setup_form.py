@@ -28,7 +28,7 @@ class Entry:
     number: bool = False
     """Whether it is a bare number, without a unit."""
     uncertain: bool = False
-    """Whether it has a standard uncertainty beside it, in a field of its own."""
+    """Whether it has a standard uncertainty in a field of its own."""
 
 
 FORM: tuple[Entry, ...] = (

@@ -107,7 +107,7 @@ class SimulationThread:
             thread.join(timeout=2.0)
 
     def ask(self, command: Mapping[str, Any], refuse: Callable[[str], None]) -> None:
-        """Ask for a change; it is made in the thread of the simulation."""
+        """Queue a change; it is made in the thread of the simulation."""
         try:
             self._inbox.put_nowait((command, refuse))
         except queue.Full:

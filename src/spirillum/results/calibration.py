@@ -93,6 +93,7 @@ def _head(found: Calibrated) -> list[str]:
         f'model = "{problem.model.name}"',
         f'method = "{found.method}"',
         f"free = [{', '.join(_quoted(name) for name in problem.free)}]",
+        *(['answer = "trial"'] if problem.trials is not None else []),
         f'friction_reading = "{found.reading}"',
         f"synthetic = {'true' if experiment.synthetic else 'false'}",
         "uncertainty = [  # 95 % intervals",
@@ -206,7 +207,7 @@ _HEADER = ",".join(_COLUMNS)
 
 
 def earlier_results(folder: Path) -> list[Path]:
-    """Files of an earlier calibration in a folder, which a new one takes the place of."""
+    """Files of an earlier calibration in a folder, which a new one replaces."""
     named = [folder / name for name in _RESULTS if (folder / name).is_file()]
     return named + [
         path
@@ -225,7 +226,7 @@ def _begins(path: Path) -> bytes:
     return _HEADER.encode() if path.name == "predictions.csv" else b""
 
 
-def calibrate(
+def calibrate(  # noqa: PLR0913 - the options of the command
     observations: str | Path,
     robots: RobotSource | Sequence[RobotSource],
     output: str | Path | None = None,
@@ -237,6 +238,7 @@ def calibrate(
     assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
     prepare: bool = False,
+    answer: str = "held",
     figures: bool = True,
     progress: Progress | None = None,
 ) -> Calibrated:
@@ -258,6 +260,8 @@ def calibrate(
             taken as exact.
         sampling: how the posterior is sampled.
         prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
+        answer: what is fitted: `held`, or `trial`, released in the tube as `predict` has it (free:
+            `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
         figures: draw figures too, which takes some seconds.
         progress: told what is being done.
 
@@ -283,6 +287,7 @@ def calibrate(
             assume_uncertainty=assume_uncertainty,
             sampling=sampling,
             prepare=prepare,
+            answer=answer,
             progress=progress,
         )
         return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)

@@ -27,7 +27,7 @@ def check_targets(plane: Path | None, volume: Path | None) -> None:
 
 
 def write_flow(flow: Flow, dataset: xr.Dataset, path: Path) -> None:
-    """Write a plane or a box in the form that the file's ending asks for."""
+    """Write a plane or a box in the format of the file's suffix."""
     if path.suffix == ".nc":
         write_dataset(dataset, path)
     elif path.suffix == ".vti":

@@ -63,7 +63,7 @@ def report_lines(answer: Mapping[str, Any]) -> Iterator[str]:
 
 
 def report() -> InstallationReport:
-    """Return versions, platform, processor count and extras of this installation, as issues ask for them.
+    """Return versions, platform, processor count and extras of this installation, as text for an issue.
 
     Nothing is imported: versions are those that the installed packages state. The report names no file, host or user.
     """

@@ -109,7 +109,7 @@ def _flag_with_frame(trial: Trial) -> Flag | None:
 
 
 def _aliasing(measurement: Measurement) -> str:
-    """What no camera can tell of a rate, with the numbers of these films where all have the same."""
+    """Limits of a camera for a rate, with the numbers of these videos where all have the same."""
     angles = ("body_rotation_rate", "tail_rotation_rate")
     seen = [trial for trial in measurement.trials if any(trial.fits[name].frames > 2 for name in angles)]
     seen = [trial for trial in seen if all(flag.name != BY_HAND for flag in trial.flags)]

@@ -1,4 +1,4 @@
-"""What reports have in common: figures drawn into a folder and embedded in a page from a template."""
+"""Common parts of reports: figures written into a folder and embedded in a page from a template."""
 
 from __future__ import annotations
 

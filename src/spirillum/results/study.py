@@ -145,6 +145,8 @@ def study(  # noqa: PLR0913 - the options of the command
     band: bool | None = None,
     predicted: bool | None = None,
     settled: bool | None = None,
+    trial: bool | None = None,
+    interval: bool | None = None,
     workers: int | str = 1,
     store: str | Path | None = None,
     calibration: str | Path | None = None,
@@ -168,6 +170,10 @@ def study(  # noqa: PLR0913 - the options of the command
             roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
         settled: let the robots go in their tubes and follow each to its steady motion too (some seconds a robot), or
             not; None: what the study says.
+        trial: make a trial of each robot in its tube too, as `spirillum.predict` has it (some seconds a robot), or
+            not; None: what the study says.
+        interval: of each trial the 90 % interval over what nobody states too (half a minute a robot; a rerun resumes),
+            or not; None: what the study says.
         workers: number of processes, or the address of a Dask scheduler, as `tcp://192.168.1.5:8786`. The results do
             not depend on it.
         store: instead of `output`, a Zarr store (`study.zarr`), written a region after the other: for more robots than
@@ -196,6 +202,8 @@ def study(  # noqa: PLR0913 - the options of the command
         band=band,
         predicted=predicted,
         settled=settled,
+        trial=trial,
+        interval=interval,
         calibration=calibration,
         posterior=posterior,
         largest=LARGEST_STUDY if store is None else LARGEST_STORED,

@@ -1,4 +1,4 @@
-"""What stands in a report besides its pictures and claims, read from the dataset alone."""
+"""Content of a report besides its pictures and claims, read from the dataset alone."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from spirillum.results.study_content import shown_ranking
 from spirillum.studies.ranking import can_be_ranked, ranking_of
 
 _SIZES = ("channel_diameter", "wavelength", "amplitude")
-"""Sizes that tell the robots of a study apart."""
+"""Sizes that identify the robots of a study."""
 
 
 # xarray leaves __init_subclass__ without types.

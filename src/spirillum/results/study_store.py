@@ -56,7 +56,7 @@ def stored_study(
 ) -> xr.Dataset:
     """Compute what a store lacks of a study, and open it."""
     import_optional("zarr", "a store", "cluster")
-    option = next((name for name in ("band", "predicted", "settled") if getattr(loaded.study, name)), None)
+    option = next((name for name in ("band", "predicted", "settled", "trial") if getattr(loaded.study, name)), None)
     if option is not None:
         raise InputError(f"{option} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
@@ -88,7 +88,7 @@ class _Work(NamedTuple):
 
 
 class _Note(NamedTuple):
-    """What a region has to say, until the study is finished."""
+    """Notes of a region, until the study is finished."""
 
     cautions: list[Caution]
     unanswered: int
@@ -126,7 +126,7 @@ def _has_note(path: Path) -> bool:
 
 
 def _note_of(path: Path) -> _Note:
-    """What a region has to say."""
+    """Notes of a region."""
     what = "a note of a study"
     found = read_json(path, what)
     try:
@@ -146,7 +146,7 @@ def _outcome_of(folder: Path) -> _Outcome | None:
 
 
 def _write_headers(plan: Plan, folder: Path, attributes: Mapping[str, Any]) -> None:
-    """Write what is in the store, except its regions, where it does not stand there yet."""
+    """Write the store, except its regions, where it does not exist yet."""
     files = store_files(plan.variables, plan.coordinates, attributes)
     changed = {key: content for key, content in files.items() if not _holds(folder / key, content)}
     if changed:
@@ -162,7 +162,7 @@ def _holds(path: Path, content: bytes) -> bool:
 def _write_regions(
     work: _Work, missing: Sequence[RobotBlock], crew: WorkerPool, tell: Tell, estimate: CostEstimate | None
 ) -> None:
-    """Compute and write regions; what that takes is told once their pace is known."""
+    """Compute and write regions; the remaining time is reported once their pace is known."""
     plan, total = work.plan, work.plan.layout.count
     models = ", ".join(work.loaded.study.models)
     done, here = total - len(missing), [""]
@@ -185,7 +185,7 @@ def _write_regions(
 
 
 def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
-    """Regions in an order in which the first ones stand for all: long tails cost more than short ones."""
+    """Regions in an order in which the first ones are representative: long tails cost more than short ones."""
     step = max(round(len(regions) * _GOLDEN), 1)
     while gcd(step, len(regions)) > 1:
         step += 1
@@ -193,7 +193,7 @@ def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
 
 
 def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
-    """What the notes of all regions say together."""
+    """The merged notes of all regions."""
     warnings = warnings_of(loaded)
     warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
     warnings += warnings_of_calibrations(loaded)

@@ -15,8 +15,10 @@ from spirillum.errors import InputError, clipped
 from spirillum.robot import geometry
 from spirillum.robot.geometry import End, Shape
 from spirillum.robot.model_options import ModelOptions
+from spirillum.robot.outline import profile_outline
 from spirillum.robot.placement import Placement
-from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables
+from spirillum.robot.tables import DriveKind, FrictionReading, RobotTables, TorqueCurve
+from spirillum.robot.tail_form import TailForm
 
 
 class Column(NamedTuple):
@@ -68,6 +70,24 @@ class Electrics:
     duty: Annotated[PerRobot, Column("drive.duty", unset=1.0)]
     gear_ratio: Annotated[PerRobot, Column("motor.gear_ratio", unset=1.0)]
     polarity: PerRobot
+
+    @property
+    def columns(self) -> tuple[Values, ...]:
+        """The numbers of a motor in the order of the compiled equations, torques and rates at the joint."""
+        return (
+            self.joint_torque_constant,
+            self.joint_back_emf_constant,
+            self.inductance,
+            self.constant,
+            self.decay,
+            self.decay_rate,
+            self.growth,
+            self.growth_rate,
+            self.slope,
+            self.voltage,
+            self.internal_resistance,
+            self.polarity,
+        )
 
     @property
     def joint_torque_constant(self) -> Values:
@@ -133,10 +153,13 @@ class RobotBatch:
     tail_density: Annotated[PerRobot, Column("tail.density", optional=True)]
     hand: PerRobot
     electrics: Electrics | None
+    curve: TorqueCurve | None
     calibration: Mapping[str, CalibrationFactors]
     shape: Shape
     front: End | None
     rear: End | None
+    profile: geometry.ProfilePoints
+    form: TailForm
     options: ModelOptions
     drive: DriveKind | None
     joint: Literal["revolute", "fixed"]
@@ -170,13 +193,16 @@ class RobotBatch:
             **{name: _column(items, source) for name, source in _columns("RobotBatch").items()},
             hand=hand,
             electrics=_electrics(items, hand),
+            curve=first.drive and first.drive.curve,
             calibration={name: _factors(items, name) for name in first.calibration},
             shape=first.body.shape,
             front=first.body.front_end,
             rear=first.body.rear_end,
+            profile=first.body.profile or (),
+            form=first.tail.form,
             options=first.model,
             drive=first.drive.kind if first.drive else None,
-            joint=first.drive.joint if first.drive else "revolute",
+            joint=first.drive.joint if first.drive else "revolute" if first.has_body else "fixed",
             friction=first.friction.reading,
             placement=placement or Placement(),
         )
@@ -226,10 +252,19 @@ class RobotBatch:
         unknown = [path for path in values if path not in known]
         if unknown:
             raise InputError(f"{unknown[0]} cannot vary in a batch; allowed: {', '.join(known)}")
+        for path in values:
+            if (source := self._source_of(path)) is not None:
+                raise InputError(f"{path} follows from {source}; allowed: fields that it leaves open")
         arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
+
+    def _source_of(self, path: str) -> str | None:
+        """The points from which a number follows; None for a number of its own."""
+        if self.form.curve and path in _OF_CURVE:
+            return "tail.curve"
+        return "body.profile" if self.profile and path in ("body.diameter", "body.length") else None
 
     @validate_arguments
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
@@ -269,8 +304,10 @@ class RobotBatch:
 
     @cached_property
     def arc_fraction(self) -> PerRobot:
-        """alpha, axial over arc length of the plain helix."""
-        return geometry.arc_fraction(self.wavelength, self.amplitude)
+        """alpha, axial over arc length of the helix without its root, or of the centre line."""
+        if self.form.is_helix:
+            return geometry.arc_fraction(self.wavelength, self.amplitude)
+        return self.tail_length / self.form.arc_length(self.amplitude, self.wavelength, self.tail_length)
 
     @cached_property
     def arc_length(self) -> PerRobot:
@@ -282,12 +319,27 @@ class RobotBatch:
         """x_r = L_b/2 + L_c: distance of the tail's root behind the origin, m."""
         return 0.5 * self.body_length + self.coupling_length
 
+    @property
+    def pose(self) -> Placement:
+        """The placement; a bare tail, which no body lays on the floor, is on the tube's axis where no gap is given."""
+        given = self.placement
+        if self.shape != "none" or given.gap is not None or given.eccentricity is not None:
+            return given
+        return given.model_copy(update={"eccentricity": 0.0})
+
     @cached_property
     def body_volume(self) -> PerRobot:
         """Volume of the body, m^3."""
+        if self.profile:
+            _, square, dx = profile_outline(self.profile).sections()
+            return np.full(1, np.pi * np.sum(square * dx))
         return geometry.body_volume(
             self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear
         )
+
+
+_OF_CURVE = ("tail.wavelength", "tail.amplitude", "tail.length", "tail.taper")
+"""Fields that follow from a centre line through points."""
 
 
 _S = TypeVar("_S", RobotBatch, Electrics, CalibrationFactors)
@@ -363,8 +415,10 @@ def _shared(robot: RobotTables) -> tuple[object, ...]:
         robot.body.shape,
         robot.body.front_end,
         robot.body.rear_end,
+        robot.body.profile,
+        robot.tail.form,
         robot.model.model_dump_json(exclude={"rft": {"axis_height"}}),
-        drive and (drive.kind, drive.joint),
+        drive and (drive.kind, drive.joint, drive.curve),
         robot.friction.reading,
         robot.motor is None or robot.battery is None,
         tuple(sorted(robot.calibration)),

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from spirillum.arrays import Values, Vectors
-from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Pressure, Section, Viscosity
+from spirillum.robot.fields import (
+    NONE,
+    AlsoReads,
+    Angle,
+    Density,
+    Length,
+    LengthOrZero,
+    Mass,
+    Pressure,
+    Section,
+    SignedLength,
+    Viscosity,
+)
+from spirillum.robot.shape_input import read_along, read_profile, read_tail
+from spirillum.robot.tail_form import PLAIN, Along, CurvePoints, TailForm
 
 
 def _read_taper(value: Any) -> float | None:
@@ -51,27 +67,50 @@ Taper = Annotated[
 ]
 
 
-def _read_end(value: Any) -> Any:
+ProfilePoints = tuple[tuple[float, float], ...]
+"""Points (x, r) along a body's outline, mm."""
+
+
+def _read_none(value: Any) -> Any:
     return None if value == "none" else value
 
 
-Shape = Literal["capsule", "sphere", "spheroid", "cylinder"]
+Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
     End | None,
-    BeforeValidator(_read_end),
+    BeforeValidator(_read_none),
     WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]}),
 ]
 
 _DEFAULT_END: dict[str, End] = {"capsule": "hemisphere", "cylinder": "flat"}
 
 
+class CenterOfMass(Section):
+    """Where the mass of the body is centred, without coupling and tail: a battery is seldom in the middle."""
+
+    x: SignedLength | None = None
+    """Place along the motor axis from the body's mid-length, positive towards the nose; unset: of uniform density."""
+    radial: LengthOrZero = 0.0
+    """Distance from the motor axis; the body then rights itself."""
+    angle: Angle = 0.0
+    """Its angle about +x from the lowest place (-z of the body), as an azimuth."""
+
+
+CenterOfMassOrNone = Annotated[CenterOfMass | None, BeforeValidator(_read_none), NONE]
+
+_NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+ProfileOrNone = Annotated[
+    ProfilePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})
+]
+
+
 class Body(Section):
     """The robot's body, a solid of revolution about the motor axis."""
 
     shape: Shape = "capsule"
-    """Outline of the body."""
+    """Outline of the body; `profile` is that of `body.profile`, `none`, as `body = "none"`, a bare tail."""
     diameter: Length
     """Largest diameter D_b (Table I)."""
     length: Length
@@ -84,6 +123,17 @@ class Body(Section):
     """Edge radius of an end that is a `fillet`."""
     mass: Mass | None = None
     """Mass of body and coupling together (Table I), measured."""
+    center_of_mass: CenterOfMassOrNone = None
+    """Centre of mass of the body alone, or `none` (here None) for a body of uniform density."""
+    profile: ProfileOrNone = None
+    """Outline from pole to pole: a CSV file beside this one, or points (x, r) in mm; it gives diameter and length."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, raw: Any) -> Any:
+        if not isinstance(raw, Mapping) or raw.get("profile") in (None, "none"):
+            return raw
+        return read_profile(dict(raw))
 
     @property
     def front_end(self) -> End | None:
@@ -99,6 +149,22 @@ class Body(Section):
         """Radius of the rounding of an end of this body, m: 0 where it is flat."""
         return {"hemisphere": 0.5 * self.diameter, "fillet": self.fillet or 0.0}.get(end or "", 0.0)
 
+
+def _read_body(value: Any) -> Any:
+    none = value == "none" or (isinstance(value, Mapping) and value.get("shape") == "none")
+    if not none:
+        return value
+    given = [] if value == "none" else [name for name, item in value.items() if name != "shape" and _is_size(item)]
+    if given:
+        raise ValueError(f"'none' without body.{given[0]}")
+    return Body.model_construct(shape="none", diameter=0.0, length=0.0)
+
+
+def _is_size(value: Any) -> bool:
+    return value is not None and not (isinstance(value, str) and re.match(r"[+-]?0(\.0*)?\s", value))
+
+
+BodyOrNone = Annotated[Body, BeforeValidator(_read_body), NONE]
 
 StripeColour = Literal["red", "yellow", "green", "blue", "white", "black", "orange", "magenta", "cyan"]
 
@@ -132,13 +198,40 @@ class Coupling(Section):
     """Axial clearance on both sides; its solid is `length - 2 clearance` long. Assumed: the paper does not say."""
 
 
-class Tail(Section):
-    """The rigid helical tail, a wire along eq. (10)."""
+_SIZE = {
+    "anyOf": [
+        {"type": "object", "properties": {"from": {"type": "string"}, "to": {"type": "string"}}},
+        {"type": "array"},
+    ]
+}
+_VARYING = AlsoReads(lambda _: _SIZE)
+"""A length from the root to the tip, or points (distance from the root, value)."""
 
-    wavelength: Length
-    """Wavelength lambda of the helix."""
-    amplitude: Length
-    """Amplitude B_o: radius of the helix's centreline."""
+AlongOrNone = Annotated[
+    Along | None, BeforeValidator(read_along), WithJsonSchema({"anyOf": [_NUMBERS, {"const": "none"}]})
+]
+CurveOrNone = Annotated[CurvePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})]
+
+
+def _with_curve(schema: dict[str, Any]) -> None:
+    """A tail needs its sizes, or a centre line from which they follow."""
+    needed = schema.pop("required")
+    derived = ("wavelength", "amplitude", "length")
+    schema["required"] = [name for name in needed if name not in derived]
+    schema |= {"if": {"required": ["curve"]}, "else": {"required": list(derived)}}
+
+
+class Tail(Section):
+    """The rigid tail: wires along eq. (10), or along a centre line through points."""
+
+    model_config = ConfigDict(json_schema_extra=_with_curve)
+
+    starts: Annotated[int, Field(strict=True, ge=1, le=12)] = 1
+    """Number of identical wires, evenly spaced around the axis."""
+    wavelength: Annotated[Length, _VARYING]
+    """Wavelength lambda of the helix; `{ from = "20 mm", to = "30 mm" }` or a list of points where it varies."""
+    amplitude: Annotated[Length, _VARYING]
+    """Amplitude B_o: radius of the helix's centreline; `{ from = "1 mm", to = "3 mm" }` or points."""
     length: Length
     """Axial length L_t (Table I; the wire itself is longer)."""
     wire_diameter: Length
@@ -149,6 +242,25 @@ class Tail(Section):
     """Shape constant c of the amplitude's rise from the root in eq. (10); `none` (here None) for a plain helix."""
     density: Density | None = None
     """Density of the wire."""
+    amplitude_along: AlongOrNone = None
+    """Local over largest amplitude at shares of the length, written by an amplitude that varies."""
+    wavelength_along: AlongOrNone = None
+    """Local over mean wavelength at shares of the length, written by a wavelength that varies."""
+    curve: CurveOrNone = None
+    """A centre line in place of the helix: a CSV file beside this one, or points (x, y, z) in mm from the root on."""
+    curve_tolerance: LengthOrZero | None = None
+    """Root mean square distance by which smoothing may move the curve's points; unset: it passes through them."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, raw: Any) -> Any:
+        return read_tail(raw)
+
+    @property
+    def form(self) -> TailForm:
+        """What makes the tail of its sizes."""
+        along = self.amplitude_along or (), self.wavelength_along or ()
+        return TailForm(self.starts, *along, self.curve or (), self.curve_tolerance or 0.0)
 
 
 class Channel(Section):
@@ -163,11 +275,7 @@ class Channel(Section):
 ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
 
 
-def _read_pressure(value: Any) -> Any:
-    return None if value == "none" else value
-
-
-PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_pressure), NONE]
+PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_none), NONE]
 
 
 class Fluid(Section):
@@ -238,15 +346,26 @@ def centreline(
     taper: Values,
     hand: Values,
     phase: Values,
+    form: TailForm = PLAIN,
 ) -> Centreline:
     """The wire of eq. (10): x = -x_r - xi, y = r cos(h k x + phi), z = r sin(h k x + phi).
 
-    All arguments broadcast; `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left).
+    All arguments broadcast; `root` is x_r = L_b/2 + L_c, `hand` is h = +1 (right) or -1 (left). Where the wavelength
+    varies, k x is an integral from the root; on a centre line through points xi/L_t is its parameter, from 0 to 1.
     """
+    if form.curve:
+        return _through_points(xi / length, root, length, hand, phase, form)
     wavenumber = 2.0 * np.pi / wavelength
     x = -root - xi
     r, slope = amplitude_envelope(xi, amplitude, length, taper)
     angle = hand * wavenumber * x + phase
+    if form.amplitude:
+        factor, change = form.amplitude_at(xi / length)
+        r, slope = r * factor, slope * factor + r * change / length
+    if form.wavelength:
+        factor, turned = form.wavenumber_at(xi / length)
+        angle = -hand * wavenumber * (root + length * turned) + phase
+        wavenumber = wavenumber * factor
     cos, sin = np.cos(angle), np.sin(angle)
     turning = -hand * wavenumber * r  # r d(angle)/dxi
     stretch = np.sqrt(1.0 + slope**2 + turning**2)
@@ -255,6 +374,20 @@ def centreline(
         np.broadcast_arrays(-np.ones_like(x), slope * cos - turning * sin, slope * sin + turning * cos), axis=-1
     )
     return Centreline(position, direction / stretch[..., None], stretch)
+
+
+def _through_points(
+    share: Values, root: Values, length: Values, hand: Values, phase: Values, form: TailForm
+) -> Centreline:
+    """A centre line in the tail's frame, half a turn about y from the body's axes; mirrored for the other hand."""
+    point, rate = form.centre.at(share)
+    cos, sin, side = np.cos(phase), np.sin(phase), -hand * np.sign(form.centre.winding or 1.0)
+    y, z = point[..., 1], side * point[..., 2]
+    dy, dz = rate[..., 1], side * rate[..., 2]
+    speed = np.linalg.norm(rate, axis=-1)
+    position = np.stack(np.broadcast_arrays(-root - point[..., 0], y * cos - z * sin, y * sin + z * cos), axis=-1)
+    direction = np.stack(np.broadcast_arrays(-rate[..., 0], dy * cos - dz * sin, dy * sin + dz * cos), axis=-1)
+    return Centreline(position, direction / speed[..., None], speed / length)
 
 
 def coil_spacing(wavelength: Values, amplitude: Values) -> Values:
@@ -308,6 +441,8 @@ def body_volume(
 ) -> Values:
     """Volume of the body, m^3."""
     radius = 0.5 * diameter
+    if shape == "none":
+        return 0.0 * radius
     if shape in ("sphere", "spheroid"):
         return 4.0 / 3.0 * np.pi * radius**2 * (0.5 * length)
     straight = length - shortest_body(diameter, fillet, front, rear)

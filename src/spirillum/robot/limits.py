@@ -12,6 +12,7 @@ from spirillum.arrays import Flags, PerRobot
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
+from spirillum.robot.tail_form import ROOT_SHARE, closest_strands, strand_spacing
 from spirillum.units import show, show_apart
 
 
@@ -180,7 +181,7 @@ def _body_limits(b: RobotBatch) -> list[Limit]:
         "it is left free on both sides within coupling.length",
         "clearance-too-large",
     )
-    if b.shape == "spheroid":
+    if b.shape in ("spheroid", "profile", "none"):
         return [clearance]
     if b.shape == "sphere":
         why = "a sphere is as long as its diameter"
@@ -198,16 +199,37 @@ def _body_limits(b: RobotBatch) -> list[Limit]:
     ]
 
 
+def _spacing_and_curvature(b: RobotBatch) -> tuple[PerRobot, PerRobot]:
+    """Least distance between neighbouring wires or turns, and largest curvature of each tail's centre lines."""
+    form = b.form
+    if form.curve:
+        radius = float(0.5 * np.max(b.wire_diameter))
+        line = form.centre
+        strands = [line.samples @ turn.T for turn in form.rotations]
+        clear = line.arc > (ROOT_SHARE * line.length if form.starts > 1 else -1.0)
+        nearest = closest_strands([strand[clear] for strand in strands], line.arc[clear], radius)
+        return np.full(1, nearest), np.full(1, line.curvature)
+    amplitude, wavelength = (b.amplitude, b.wavelength) if form.is_helix else form.widths(b.amplitude, b.wavelength)
+    spacing = coil_spacing(wavelength, amplitude)
+    if form.starts > 1:
+        spacing = np.minimum(spacing, strand_spacing(wavelength, amplitude, form.starts))
+    curvature = coil_curvature(wavelength, amplitude)
+    return (spacing, curvature) if form.is_helix else (np.min(spacing, axis=-1), np.max(curvature, axis=-1))
+
+
 def _tail_limits(b: RobotBatch) -> list[Limit]:
-    curvature = coil_curvature(b.wavelength, b.amplitude)
+    spacing, curvature = _spacing_and_curvature(b)
+    whose = "" if b.form.curve else " of the coil (tail.wavelength, tail.amplitude)"
+    between = " or wires (tail.starts)" if b.form.starts > 1 else ""
+    bend = "curve's" if b.form.curve else "coil's"
     return [
         Limit.of(
             "tail.wire_diameter",
             b.wire_diameter,
             "less than",
-            coil_spacing(b.wavelength, b.amplitude),
+            spacing,
             "mm",
-            "neighbouring turns of the coil (tail.wavelength, tail.amplitude) would touch",
+            f"neighbouring turns{whose}{between} would touch",
             "turns-touch",
         ),
         Limit.of(
@@ -216,7 +238,7 @@ def _tail_limits(b: RobotBatch) -> list[Limit]:
             "less than",
             2.0 / curvature,
             "mm",
-            "the wire's radius has to stay below the coil's radius of curvature",
+            f"the wire's radius has to stay below the {bend} radius of curvature",
             "wire-too-thick-for-coil",
         ),
         Limit.of(

@@ -18,11 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Samples, Tensors, Vectors
+from spirillum.arrays import Tensors, Vectors
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
-from spirillum.robot.outline import Arc, Outline, Segment, body_outline, solid_outlines
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.tables import RobotTables
+from spirillum.robot.tail_form import PLAIN, TailForm
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4
@@ -39,6 +40,10 @@ class HomogeneousSolid(NamedTuple):
     """Centroid of the volume, m, (3,)."""
     inertia: Tensors
     """Inertia about the centroid at density 1, m^5, (3, 3)."""
+
+
+_NOTHING = HomogeneousSolid(0.0, np.zeros(3), np.zeros((3, 3)))
+"""A solid that is not there, at the origin."""
 
 
 class Link(NamedTuple):
@@ -68,16 +73,22 @@ class Links(NamedTuple):
 def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
-    `body.mass` is that of body and coupling together, assumed to be of uniform density. The wire has
-    `tail.density`.
+    `body.mass` is that of body and coupling together, assumed to be of uniform density; where `body.center_of_mass`
+    is given, the body's mass is displaced there as a whole. The wire has `tail.density`.
     """
     solids = robot_solids(robot) if solids is None else solids
-    body, wire = solids["body"], solids["tail"]
+    body, wire = solids.get("body", _NOTHING), solids["tail"]
     main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)
     density = np.nan if robot.body.mass is None else robot.body.mass / main
+    density = density if main > 0 else 0.0
     wire_density = np.nan if robot.tail.density is None else robot.tail.density
     rotor = [(solids["coupling"], density)] if "coupling" in solids else []
-    return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
+    found = _link([(body, density)])
+    if (center := robot.body.center_of_mass) is not None:
+        x = float(found.centre[0]) if center.x is None else center.x
+        side, up = center.radial * np.sin(center.angle), -center.radial * np.cos(center.angle)
+        found = found._replace(centre=np.array([x, side, up]))
+    return Links(found, _link([*rotor, (wire, wire_density)]))
 
 
 def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
@@ -92,37 +103,30 @@ def robot_solids(robot: RobotTables) -> dict[str, HomogeneousSolid]:
         wire_diameter=robot.tail.wire_diameter,
         taper=float(batch.taper[0]),
         hand=robot.hand,
+        form=batch.form,
     )
     return found
 
 
 def outlines_of(robot: RobotTables) -> dict[str, Outline]:
-    """Outlines of `body` and, where there is one, `coupling`."""
+    """Outlines of `body` and `coupling`, where they are."""
     body, coupling = robot.body, robot.coupling
-    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    if not robot.has_body:
+        return solid_outlines(None, 0.0, coupling.diameter, coupling.length, coupling.clearance)
+    outline = body_outline(
+        body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end, body.profile or ()
+    )
     return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
 
 
 def revolution_solid(outline: Outline) -> HomogeneousSolid:
     """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding."""
-    t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
-    x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
+    x, square, dx = outline.sections()
     volume = float(np.pi * np.sum(square * dx))
     middle = float(np.pi * np.sum(square * x * dx)) / volume
     about_axis = 0.5 * np.pi * float(np.sum(square**2 * dx))
     across = 0.5 * about_axis + float(np.pi * np.sum(square * (x - middle) ** 2 * dx))
     return HomogeneousSolid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
-
-
-def _run(piece: Segment | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
-    """x, rho^2 and the weighted -dx (the outline runs from front to rear) at t from 0 to 1."""
-    x, rho = piece.points(t)
-    if isinstance(piece, Segment):
-        slope = np.full_like(t, piece.end[0] - piece.start[0])
-    else:
-        turn = piece.angles[1] - piece.angles[0]
-        slope = -piece.semi_axes[0] * np.sin(piece.angles[0] + turn * t) * turn
-    return x, rho**2, -slope * weight
 
 
 def wire_solid(
@@ -134,8 +138,9 @@ def wire_solid(
     wire_diameter: float,
     taper: float,
     hand: float,
+    form: TailForm = PLAIN,
 ) -> HomogeneousSolid:
-    """A round wire along eq. (10) at phase 0, its ends cut square.
+    """Round wires along eq. (10) at phase 0, their ends cut square.
 
     Args:
         root: x_r, distance of the root behind the origin, m.
@@ -145,8 +150,10 @@ def wire_solid(
         wire_diameter: D_t, m.
         taper: c; infinite for a plain helix.
         hand: h, +1 (right) or -1 (left).
+        form: of the tail.
     """
-    panels = np.linspace(0.0, length, 1 + int(np.ceil(_PANELS_PER_TURN * length / wavelength)))
+    pieces = max(_PANELS_PER_TURN * length / wavelength, len(form.curve), 8 * len(form.amplitude + form.wavelength))
+    panels = np.linspace(0.0, length, 1 + int(np.ceil(pieces)))
     if np.isfinite(taper):
         rise = np.arange(0.0, min(_ROOT_LENGTHS, taper)) * length / taper
         panels = np.unique(np.concatenate([panels, rise]))
@@ -155,8 +162,8 @@ def wire_solid(
     numbers = {"wavelength": wavelength, "amplitude": amplitude, "length": length, "taper": taper, "hand": hand}
     columns = {name: np.full(1, value) for name, value in numbers.items()}
     # Relative to the root, so that a short tail far behind the origin loses no digits.
-    phase = np.full(1, -hand * 2.0 * np.pi * root / wavelength)
-    line = centreline(xi, root=np.zeros(1), phase=phase, **columns)
+    phase = np.full(1, 0.0 if form.curve else -hand * 2.0 * np.pi * root / wavelength)
+    line = centreline(xi, root=np.zeros(1), phase=phase, form=form, **columns)
     p, t = line.position, line.tangent
     ds = (half[:, None] * _WEIGHTS).ravel() * line.stretch[1:-1]
     square = 0.25 * wire_diameter**2  # a^2
@@ -168,7 +175,18 @@ def wire_solid(
     second = (inner * ds[:, None]).T @ inner
     second += 0.25 * square * (arc * np.eye(3) + (along * ds[:, None]).T @ along - (ends[1] - ends[0]))
     inertia = np.pi * square * (np.trace(second) * np.eye(3) - second)
-    return HomogeneousSolid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+    one = HomogeneousSolid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+    return _around(one, form.rotations) if form.starts > 1 else one
+
+
+def _around(one: HomogeneousSolid, copies: Tensors) -> HomogeneousSolid:
+    """Copies of a solid, turned about the x axis."""
+    centroids = copies @ one.centroid
+    centre = np.mean(centroids, axis=0)
+    arms = centroids - centre
+    shifted = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    inertia = np.sum(copies @ one.inertia @ np.swapaxes(copies, -1, -2), axis=0) + one.volume * shifted
+    return HomogeneousSolid(one.volume * len(copies), centre, inertia)
 
 
 def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:
@@ -177,10 +195,10 @@ def _link(parts: list[tuple[HomogeneousSolid, float]]) -> Link:
     masses = np.array([solid.volume * density for solid, density in parts])
     centroids = np.array([solid.centroid for solid, _ in parts])
     mass = float(np.sum(masses))
-    centre = masses @ centroids / mass
+    centre = masses @ centroids / mass if mass else centroids[0]
     inertia = np.zeros((3, 3))
     for (solid, density), own, centroid in zip(parts, masses, centroids, strict=True):
         arm = centroid - centre
         inertia += density * solid.inertia + own * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     volume = float(np.sum(volumes))
-    return Link(mass, centre, inertia, volume, volumes @ centroids / volume)
+    return Link(mass, centre, inertia, volume, volumes @ centroids / volume if volume else centroids[0])

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from copy import deepcopy
 from functools import cache, lru_cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from spirillum.notes import Note
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Derived, Robot
+from spirillum.robot.shape_input import DISPLACED, with_points_of_files
 from spirillum.units import show
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -26,7 +28,7 @@ _WEIGHED = {
     "coupling": ("diameter", "length", "clearance"),
 }
 # What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
-_SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's"}
+_SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's", "drive.torques": "the motor's"}
 _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
@@ -49,14 +51,25 @@ def is_preset(robot: Robot) -> bool:
 
 @lru_cache(maxsize=1)
 def preset_names() -> tuple[str, ...]:
-    """Names of the robots that come with the package."""
-    folder = files("spirillum.robot") / "presets"
-    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+    """Names of the presets."""
+    return tuple(sorted(_robots_in(files("spirillum.robot") / "presets")))
+
+
+@lru_cache(maxsize=1)
+def shipped_robots() -> Mapping[str, Traversable]:
+    """Robot files that come with the package, by name: the presets and the robots of `papers/NAME/robots`."""
+    folders = [paper / "robots" for paper in (files("spirillum") / "papers").iterdir() if (paper / "robots").is_dir()]
+    found = [_robots_in(folder) for folder in (files("spirillum.robot") / "presets", *folders)]
+    return {name: robots[name] for robots in found for name in sorted(robots)}
+
+
+def _robots_in(folder: Traversable) -> dict[str, Traversable]:
+    return {item.name.removesuffix(".toml"): item for item in folder.iterdir() if item.name.endswith(".toml")}
 
 
 def preset_text(name: str) -> str:
-    """Unmodified text of the preset's robot file."""
-    return (files("spirillum.robot") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    """Unmodified text of a robot file that comes with the package."""
+    return shipped_robots()[name].read_text(encoding="utf-8")
 
 
 def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> Robot:
@@ -79,9 +92,12 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
     table, source = raw_table(robot)
-    table, changes = _extended(table, source, _folder_of(robot))
+    folder = _folder_of(robot)
+    table, changes = _extended(with_points_of_files(table, folder), source, folder)
     for path, value in overrides.items():
+        _displace(table, _touched(_nested(path, value)))
         _put(table, path.split("."), value, path)
+    table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
     return _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
 
@@ -93,7 +109,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
             return deepcopy(dict(robot)), "the robot"
         except RecursionError as error:
             raise InputError(f"the robot's tables are nested without end; allowed: {_WHAT}") from error
-    if isinstance(robot, str) and robot in preset_names():
+    if isinstance(robot, str) and robot in shipped_robots():
         return deepcopy(_preset_table(robot)), f"preset {robot}"
     try:
         path = Path(robot)
@@ -103,7 +119,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         raise InputError(f"robot = ''; allowed: {_WHAT}")
     if _looks_like_a_name(robot) and not path.exists():
         presets = ", ".join(preset_names())
-        hint = did_you_mean(str(robot), preset_names())
+        hint = did_you_mean(str(robot), shipped_robots())
         raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
     return read_toml(path, _WHAT), str(path)
 
@@ -116,9 +132,9 @@ def _preset_table(preset: str) -> dict[str, Any]:
 
 def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) -> None:
     """Write a robot file to edit: a preset's own text, whole."""
-    if preset not in preset_names():
+    if preset not in shipped_robots():
         raise InputError(
-            f"preset {preset!r}{did_you_mean(preset, preset_names())}; allowed: {', '.join(preset_names())}"
+            f"preset {preset!r}{did_you_mean(preset, shipped_robots())}; allowed: {', '.join(shipped_robots())}"
         )
     path = Path(path)
     name = re.sub(r"[^\w-]+", "-", path.stem)[:100] or "robot"
@@ -193,8 +209,8 @@ def _extended(
     if base is None:
         return table, []
     own = isinstance(base, str) and base.endswith(".toml")
-    if not own and (not isinstance(base, str) or base not in preset_names()):
-        hint = did_you_mean(str(base), preset_names())
+    if not own and (not isinstance(base, str) or base not in shipped_robots()):
+        hint = did_you_mean(str(base), shipped_robots())
         allowed = f"{', '.join(preset_names())}, or a robot file (.toml) beside this one"
         raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {allowed}")
     changed = _touched(table)
@@ -207,7 +223,8 @@ def _extended(
             f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
-    below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, _resolved(path, source)))
+    under = with_points_of_files(read_toml(path, _WHAT), path.parent)
+    below, layers = _extended(under, str(path), path.parent, (*above, _resolved(path, source)))
     return _laid_over(below, base, table), [*layers, changed]
 
 
@@ -216,7 +233,17 @@ def _laid_over(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[
     changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
     if changed:
         below = {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
+    _displace(below, changed)
     return _merged(below, table)
+
+
+def _displace(table: dict[str, Any], changed: set[str]) -> None:
+    """Take out what fields of the layer above replace."""
+    for field in changed:
+        inner = table.get(field.partition(".")[0])
+        for name in DISPLACED.get(field, ()):
+            if isinstance(inner, dict):
+                inner.pop(name, None)
 
 
 def _resolved(path: Path, source: str) -> Path:
@@ -318,6 +345,14 @@ def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     return (Note("robot-file-doubtful", words, ("body.mass", "tail.density", "fluid.density")),)
 
 
+def _displaced(robot: Robot) -> tuple[Note, ...]:
+    """Warn that only released motion knows the righting torque of a centre of mass."""
+    if robot.body.center_of_mass is None:
+        return ()
+    words = "body.center_of_mass acts in released motion only; axial motion leaves its torque out: use motion 'free'"
+    return (Note("robot-file-doubtful", words, ("body.center_of_mass",)),)
+
+
 def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
     if robot.body.mass is None:
@@ -349,7 +384,12 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> 
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
         derived = problems.derived()  # once: it integrates the solids
-        doubts = (*_floating(derived), *_too_dense(problems, derived), *_too_smooth(problems))
+        doubts = (
+            *_floating(derived),
+            *_displaced(problems),
+            *_too_dense(problems, derived),
+            *_too_smooth(problems),
+        )
         problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)

@@ -119,7 +119,7 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
     fineness = _checked_fineness(fineness)
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
     outlines = outlines_of(robot)
-    pieces = [_body(robot, outlines["body"], around)]
+    pieces = [_body(robot, outlines["body"], around)] if robot.has_body else []
     for name, surface in _rotor(robot, outlines.get("coupling"), around, sides, fineness):
         cos, sin = np.cos(phase), np.sin(phase)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
@@ -183,7 +183,7 @@ def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
 def _check_seal(robot: Robot, seal: Seal) -> None:
     """The seal ends behind the nose."""
     body = robot.body
-    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid") else body.rounding(body.front_end)
+    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid", "profile") else body.rounding(body.front_end)
     longest = body.length - nose
     if seal.length > longest * (1.0 + 1e-12):
         raise InputError(
@@ -215,14 +215,24 @@ def _rotor(
         found.append(("shaft", rod(line[0], line[1], shaft, sides, round_start=False, round_end=False)))
         found.append(("coupling", revolved(profile_of(coupling, around), around)))
         before = back + min(2.0 * radius, 0.5 * (front - back))
-    found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
+    if before > root[0]:
+        found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
     wire = tail_line(robot, fineness=fineness)
     if np.linalg.norm(wire.points[0] - root) > 1e-9 * radius:
-        found.append(("arm", rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)))
+        bar = rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)
+        found += [("arm", copy) for copy in _around(bar, robot)]
     turns = robot.tail.length / robot.tail.wavelength
-    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", len(wire.points), sides)
-    found.append(("tail", swept(wire.points, wire.tangents, radius, sides)))
+    rings = robot.tail.starts * len(wire.points)
+    _check_triangles(f"a mesh of the tail with {turns:.4g} turns (fineness = {fineness:g})", rings, sides)
+    found += [("tail", copy) for copy in _around(swept(wire.points, wire.tangents, radius, sides), robot)]
     return found
+
+
+def _around(one: Surface, robot: Robot) -> list[Surface]:
+    """Copies of a surface, one for each start of the tail."""
+    if robot.tail.starts == 1:
+        return [one]
+    return [one._replace(vertices=one.vertices @ turn.T) for turn in robot.tail.form.rotations]
 
 
 def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
@@ -233,7 +243,9 @@ def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
     """
     tail = robot.tail
     wavenumber = 2.0 * np.pi / tail.wavelength
-    xi = np.linspace(0.0, tail.length, 2 + int(np.ceil(_PER_TURN * tail.length / tail.wavelength)))
+    form = tail.form
+    pieces = max(_PER_TURN * tail.length / tail.wavelength, 12 * len(form.curve))
+    xi = np.linspace(0.0, tail.length, 2 + int(np.ceil(pieces)))
     if tail.taper is not None:
         rise = np.arange(0.0, min(40.0, tail.taper), 0.05) * tail.length / tail.taper
         xi = np.unique(np.concatenate([xi, rise]))
@@ -266,4 +278,4 @@ def _along(robot: Robot, xi: Samples) -> Centreline:
         "hand": robot.hand,
         "phase": 0.0,
     }
-    return centreline(xi, **{name: np.full(1, value) for name, value in numbers.items()})
+    return centreline(xi, form=tail.form, **{name: np.full(1, value) for name, value in numbers.items()})

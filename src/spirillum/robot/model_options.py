@@ -109,7 +109,7 @@ class ModelOptions(Section):
     tube: TubeOptions = TubeOptions()
     """Resolved tail and body in their tube."""
     beyond_stokes: Switch = False
-    """Answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong."""
+    """Also answer at Reynolds numbers above 10, where inertia dominates and these models are wrong."""
 
     @property
     def resolution(self) -> str:
@@ -132,7 +132,7 @@ class Resolution(Options):
     tolerance: Annotated[float, BeforeValidator(in_range(1e-4, 0.05))] | None = None
     """Of `tube`: relative tolerance of the speed per turn, 0.0001 to 0.05."""
     phases: Annotated[int, BeforeValidator(whole(1, 64))] | None = None
-    """Of `tube`: number of phases of the tail that an answer is averaged over, 1 to 64."""
+    """Of `tube`: number of phases of the tail to average over, 1 to 64."""
     form: Annotated[TubeForm, BeforeValidator(one_of("auto", "table", "direct"))] | None = None
     """Of `tube`: from the robot's `table`, `direct`, or `auto`: from the table where there is one."""
 

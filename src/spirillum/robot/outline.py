@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.geometry import End, Shape
+from spirillum.robot.geometry import End, ProfilePoints, Shape
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 @dataclass(frozen=True)
@@ -21,6 +26,20 @@ class Segment:
         """(x, rho) at t from 0 to 1."""
         (x_a, rho_a), (x_b, rho_b) = self.start, self.end
         return x_a + (x_b - x_a) * t, rho_a + (rho_b - rho_a) * t
+
+    @property
+    def turn(self) -> float:
+        """Angle by which its tangent turns, rad."""
+        return 0.0
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Parameters between which it is analytic."""
+        return 0.0, 1.0
+
+    def slope(self, t: Samples) -> Samples:
+        """dx/dt."""
+        return np.full_like(t, self.end[0] - self.start[0])
 
     @property
     def length(self) -> float:
@@ -53,6 +72,22 @@ class Arc:
         )
 
     @property
+    def turn(self) -> float:
+        """Angle by which its tangent turns, rad."""
+        return abs(self.angles[1] - self.angles[0])
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Parameters between which it is analytic."""
+        return 0.0, 1.0
+
+    def slope(self, t: Samples) -> Samples:
+        """dx/dt."""
+        turn = self.angles[1] - self.angles[0]
+        slope: Samples = -self.semi_axes[0] * np.sin(self.angles[0] + turn * t) * turn
+        return slope
+
+    @property
     def length(self) -> float:
         """Length, m, by 64 chords; its accuracy suffices for subdividing the arc."""
         x, rho = self.points(np.linspace(0.0, 1.0, 65))
@@ -68,10 +103,77 @@ class Arc:
 
 
 @dataclass(frozen=True)
+class Smooth:
+    """A smooth line through points (x, rho), m: cubic splines over the length of chords."""
+
+    knots: tuple[tuple[float, float], ...]
+    """Points from front to rear."""
+    rounded: tuple[bool, bool]
+    """Whether it meets the axis at a right angle at its start and at its end."""
+
+    @cached_property
+    def _splines(self) -> tuple[Any, Any]:
+        from scipy.interpolate import CubicSpline
+
+        x, rho = np.array(self.knots).T
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(rho)))])
+        kinds = ((1, 0.0), (2, 0.0))  # on the axis, x has no slope there and rho no curvature
+        ends = [tuple(kind if pole else "not-a-knot" for pole in self.rounded) for kind in kinds]
+        return CubicSpline(chord / chord[-1], x, bc_type=ends[0]), CubicSpline(chord / chord[-1], rho, bc_type=ends[1])
+
+    @cached_property
+    def fine(self) -> tuple[Samples, Samples, Samples]:
+        """Parameters dense against its bends, and (x, rho) there."""
+        knots = self._splines[0].x
+        t = np.unique(np.linspace(knots[:-1], knots[1:], 33))
+        return t, *self.points(t)
+
+    @cached_property
+    def turned(self) -> Samples:
+        """Angle by which the tangent has turned up to the parameters of `fine`, rad."""
+        t = self.fine[0]
+        angle = np.unwrap(np.arctan2(self._splines[1](t, 1), self._splines[0](t, 1)))
+        return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angle)))])
+
+    def points(self, t: Samples) -> tuple[Samples, Samples]:
+        """(x, rho) at t from 0 to 1."""
+        along, out = self._splines
+        return along(t), np.maximum(out(t), 0.0)
+
+    @property
+    def turn(self) -> float:
+        """Angle by which its tangent turns, rad."""
+        return float(self.turned[-1])
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Parameters between which it is analytic."""
+        return tuple(self._splines[0].x.tolist())
+
+    def slope(self, t: Samples) -> Samples:
+        """dx/dt."""
+        return np.asarray(self._splines[0](t, 1))
+
+    @cached_property
+    def length(self) -> float:
+        """Length, m."""
+        _, x, rho = self.fine
+        return float(np.sum(np.hypot(np.diff(x), np.diff(rho))))
+
+    def radius(self, x: Samples) -> Samples:
+        """Radius at x, between samples linear; NaN off the piece."""
+        _, along, out = self.fine
+        return np.asarray(np.interp(x, along[::-1], out[::-1], left=np.nan, right=np.nan))
+
+
+Piece = Segment | Arc | Smooth
+
+
+@dataclass(frozen=True)
 class Outline:
     """A closed solid of revolution: pieces from its front pole to its rear pole."""
 
-    pieces: tuple[Segment | Arc, ...]
+    pieces: tuple[Piece, ...]
     corners: tuple[bool, ...]
     """Whether there is a sharp edge between each piece and the next."""
 
@@ -79,6 +181,17 @@ class Outline:
         """(x, rho) of the pieces one after the other, each at t from 0 to 1."""
         x, rho = zip(*(piece.points(t) for piece in self.pieces), strict=True)
         return np.concatenate(x), np.concatenate(rho)
+
+    def sections(self) -> tuple[Samples, Samples, Samples]:
+        """x, rho^2 and the weighted -dx (it runs from front to rear) of Gauss quadrature along it, to rounding."""
+        found = [(piece, low, high) for piece in self.pieces for low, high in pairwise(piece.edges)]
+        parts = []
+        for piece, low, high in found:
+            t = low + 0.5 * (high - low) * (1.0 + _NODES)
+            x, rho = piece.points(t)
+            parts.append((x, rho**2, -piece.slope(t) * 0.5 * (high - low) * _WEIGHTS))
+        x, square, dx = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return x, square, dx
 
     def contains(self, x: Samples, rho: Samples) -> np.ndarray:
         """Whether points are inside."""
@@ -120,9 +233,17 @@ def _reversed(pieces: list[Segment | Arc]) -> list[Segment | Arc]:
 
 
 def body_outline(
-    shape: Shape, diameter: float, length: float, fillet: float, front: End | None, rear: End | None
+    shape: Shape,
+    diameter: float,
+    length: float,
+    fillet: float,
+    front: End | None,
+    rear: End | None,
+    profile: ProfilePoints = (),
 ) -> Outline:
-    """Outline of a body about its mid-length; lengths in m."""
+    """Outline of a body about its mid-length; lengths in m, points of a profile in mm."""
+    if shape == "profile":
+        return profile_outline(profile)
     radius, half = 0.5 * diameter, 0.5 * length
     if shape in ("sphere", "spheroid"):
         return Outline((Arc((0.0, 0.0), (half, radius), (0.0, np.pi)),), ())
@@ -138,6 +259,49 @@ def body_outline(
     return Outline((*nose, *side, *tail), tuple(corners))
 
 
+_CORNER = np.radians(20.0)
+"""Angle from one chord to the next above which a profile has a sharp edge there."""
+_SQUARE = np.radians(30.0)
+"""Angle of a chord from the axis's normal below which the pole where it ends is rounded."""
+_STRAIGHT = 3.0
+"""Length of a chord over those of its neighbours above which it is a straight piece."""
+
+
+@lru_cache(maxsize=64)
+def profile_outline(points: tuple[tuple[float, float], ...]) -> Outline:
+    """Outline through points (x, rho) from pole to pole, mm, about its mid-length: smooth but at corners.
+
+    Chords between corners, those much longer than what they join without one, and flat ends are straight.
+    """
+    x, rho = 1e-3 * np.array(points).T
+    x = x - 0.5 * (x.max() + x.min())
+    if x[0] < x[-1]:
+        x, rho = x[::-1], rho[::-1]
+    length = np.hypot(np.diff(x), np.diff(rho))
+    angle = np.arctan2(np.diff(rho), np.diff(x))
+    turn = np.abs((np.diff(angle) + np.pi) % (2.0 * np.pi) - np.pi)
+    sharp = [False, *(bool(some > _CORNER) for some in turn), False]
+    straight = [bool(a == b) for a, b in pairwise(x)]
+    for i, own in enumerate(length):
+        joined = [k for k, edge in ((i - 1, i), (i + 1, i + 1)) if 0 <= k < length.size and not sharp[edge]]
+        straight[i] |= bool(own > _STRAIGHT * max((length[k] for k in joined), default=0.0))
+    cuts = [i for i in range(1, length.size) if sharp[i] or straight[i - 1] or straight[i]]
+    pieces: list[Piece] = []
+    for first, last in pairwise([0, *cuts, length.size]):
+        knots = tuple(zip(x[first : last + 1].tolist(), rho[first : last + 1].tolist(), strict=True))
+        if len(knots) == 2:
+            pieces.append(Segment(*knots))
+        else:
+            poles = (first == 0 and _meets_squarely(angle[0]), last == length.size and _meets_squarely(angle[-1]))
+            pieces.append(Smooth(knots, poles))
+    return Outline(tuple(pieces), tuple(sharp[i] for i in cuts))
+
+
+def _meets_squarely(angle: float) -> bool:
+    """Whether a chord from or to the axis is so nearly at right angles to it that the pole is rounded."""
+    return bool(abs(abs(angle) - 0.5 * np.pi) < _SQUARE)
+
+
 def cylinder_outline(diameter: float, front: float, rear: float) -> Outline:
     """Outline of a flat-ended cylinder from x = front to x = rear < front; lengths in m."""
     radius = 0.5 * diameter
@@ -150,18 +314,18 @@ def cylinder_outline(diameter: float, front: float, rear: float) -> Outline:
 
 
 def solid_outlines(
-    body: Outline, body_length: float, coupling_diameter: float, coupling_length: float, clearance: float
+    body: Outline | None, body_length: float, coupling_diameter: float, coupling_length: float, clearance: float
 ) -> dict[str, Outline]:
     """Outlines by part: the body, and the coupling behind it where there is one; lengths in m.
 
     Args:
-        body: outline of the body.
+        body: outline of the body; None for a bare tail.
         body_length: L_b.
         coupling_diameter: D_c, 0 for a bare gap.
         coupling_length: L_c, 0 for none.
         clearance: axial clearance on both sides of the coupling's solid.
     """
-    outlines = {"body": body}
+    outlines = {} if body is None else {"body": body}
     if coupling_diameter > 0 and coupling_length > 2.0 * clearance:
         rear = -0.5 * body_length
         outlines["coupling"] = cylinder_outline(coupling_diameter, rear - clearance, rear - coupling_length + clearance)

@@ -53,7 +53,7 @@ class Placement(Options):
     yaw: Yaw = 0.0
     """Angle by which the nose is turned to +y (left), about the vertical through the body's mid-length."""
     tail_drop: LengthOrZero = 0.0
-    """Distance by which the tail's axis is lowered: a surrogate, for no rigid tail on a revolute joint does it."""
+    """Distance by which the tail's axis is lowered: a surrogate, impossible with a rigid joint."""
     ends: Ends | None = None
     """Ends of the channel, `open` or `closed`; unset: `open` where the robot has a `channel.length`, else `closed`."""
     flow: Velocity | None = None

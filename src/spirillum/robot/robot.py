@@ -8,6 +8,8 @@ import numpy as np
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.kernels.axial_motor import CONSTANT, SLOPE
+from spirillum.kernels.drive import MOTOR, windings
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.limits import assembly_limits, broken
@@ -32,15 +34,12 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
     It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
     """
-    r = motor.resistance
     current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)
+    r, motors, found = motor.resistance, np.zeros((current.size, MOTOR)), np.empty((current.size, 2))
+    motors[:, CONSTANT : SLOPE + 1] = r.constant, r.decay, r.decay_rate, r.growth, r.growth_rate, r.slope
+    windings(motors, current, found)
+    resistance = found[:, 0]
     with np.errstate(over="ignore"):
-        resistance = (
-            r.constant
-            + r.decay * np.exp(-r.decay_rate * current)
-            + r.growth * np.exp(np.minimum(r.growth_rate * current, 600.0))
-            + r.slope * current
-        )
         drop = resistance * current + battery.internal_resistance * current
     stall = int(np.searchsorted(np.maximum.accumulate(drop), battery.voltage))
     upto = slice(0, min(stall + 2, current.size))
@@ -54,6 +53,10 @@ def motor_current_problem(motor: Motor, battery: Battery) -> str:
 
 def _in_words(value: Any, unit: str | None) -> str:
     """A field's value with the unit in which people read it."""
+    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+        return f"{len(value)} points"
+    if unit is not None and isinstance(value, tuple):
+        return ", ".join(_in_words(item, unit) for item in value)
     if unit is None or not isinstance(value, float):
         return str(value)
     si = unit.replace("**", "^")
@@ -86,7 +89,8 @@ class Robot(RobotTables):
 
     def __repr__(self) -> str:
         """The robot in a line: name, body, tail and channel."""
-        parts = [f"body {show(self.body.diameter, 'mm')}", f"tail {self._tail_size} mm"]
+        body = show(self.body.diameter, "mm") if self.has_body else "none"
+        parts = [f"body {body}", f"tail {self._tail_size} mm"]
         parts += [f"channel {show(self.channel.diameter, 'mm')}"] if self.channel is not None else []
         return f"Robot({self.name}, {', '.join(parts)})"
 
@@ -114,8 +118,8 @@ class Robot(RobotTables):
     def derived(self) -> dict[str, Derived]:
         """Derived quantities: lengths, volumes, weight, centre of mass.
 
-        Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. The
-        centre of mass assumes that the measured mass is spread evenly over body and coupling.
+        Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. Without
+        `body.center_of_mass` the measured mass is assumed to be spread evenly over body and coupling.
         """
         batch, tail = RobotBatch.of(self), self.tail
         alpha, arc = float(batch.arc_fraction[0]), float(batch.arc_length[0])
@@ -132,16 +136,19 @@ class Robot(RobotTables):
             "robot_length": Derived(
                 self.body.length + self.coupling.length + tail.length, "m", "body, coupling and tail together"
             ),
-            "body_volume": Derived(solids["body"].volume, "m^3", "volume of the body"),
+            "body_volume": Derived(links.body.volume, "m^3", "volume of the body"),
             "coupling_volume": Derived(coupling, "m^3", "volume of the coupling's solid"),
             "wire_volume": Derived(solids["tail"].volume, "m^3", "volume of the wire, its bend at the root included"),
             "displaced_volume": Derived(volume, "m^3", "volume of body, coupling and wire"),
         }
-        if self.body.mass is None or tail.density is None:
+        if (self.body.mass is None and (self.has_body or coupling)) or tail.density is None:
             return found
         masses = np.array([link.mass for link in links])
         mass = float(np.sum(masses))
         centre = masses @ np.array([link.centre[0] for link in links]) / mass
+        assumed = "assumes body.mass spread evenly over body and coupling"
+        if self.body.center_of_mass is not None:
+            assumed = "with body.center_of_mass"
         buoyancy = volumes @ np.array([link.centroid[0] for link in links]) / volume
         return found | {
             "tail_mass": Derived(tail.density * solids["tail"].volume, "kg", "mass of the wire"),
@@ -149,8 +156,11 @@ class Robot(RobotTables):
             "submerged_weight": Derived(
                 (mass - self.fluid.density * volume) * STANDARD_GRAVITY, "N", "weight less buoyancy"
             ),
-            "centre_of_mass": Derived(
-                float(centre), "m", "x of the centre of mass (assumes body.mass spread evenly over body and coupling)"
+            "submerged_weight_uncertainty": Derived(
+                0.01 * float(np.hypot(mass, self.fluid.density * volume)) * STANDARD_GRAVITY,
+                "N",
+                "of submerged_weight, a small difference, where mass and volume are each known to 1 %",
             ),
+            "centre_of_mass": Derived(float(centre), "m", f"x of the centre of mass ({assumed})"),
             "centre_of_buoyancy": Derived(float(buoyancy), "m", "x of the centre of buoyancy"),
         }

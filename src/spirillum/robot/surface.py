@@ -10,7 +10,7 @@ from jaxtyping import Int
 
 from spirillum.arrays import Samples
 from spirillum.costs import check_memory
-from spirillum.robot.outline import Arc, Outline, Segment
+from spirillum.robot.outline import Outline, Piece, Segment, Smooth
 
 if TYPE_CHECKING:
     _Integers = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
@@ -61,10 +61,9 @@ def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Out
     rho: list[Samples] = []
     flat: list[bool] = []
     for piece in outline.pieces:
-        if isinstance(piece, Segment):
-            count = 1
-        else:
-            count = max(2, int(np.ceil(around * abs(piece.angles[1] - piece.angles[0]) / (2.0 * np.pi))))
+        count = 1
+        if not isinstance(piece, Segment):
+            count = max(2, len(piece.edges) - 1, int(np.ceil(around * piece.turn / (2.0 * np.pi))))
         t: Samples = np.linspace(0.0, 1.0, count + 1)
         for cut in cuts:
             t = _with_cut(t, _parameter(piece, cut))
@@ -78,11 +77,14 @@ def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Out
     return OutlinePoints(np.concatenate(x), all_rho, tuple(flat))
 
 
-def _parameter(piece: Segment | Arc, x: float) -> float:
+def _parameter(piece: Piece, x: float) -> float:
     """Parameter (0 to 1) at which the piece passes x; NaN where it does not."""
     if isinstance(piece, Segment):
         run = piece.end[0] - piece.start[0]
         return (x - piece.start[0]) / run if run != 0 else float("nan")
+    if isinstance(piece, Smooth):
+        t, along, _ = piece.fine
+        return float(np.interp(x, along[::-1], t[::-1], left=np.nan, right=np.nan))
     cosine = (x - piece.centre[0]) / piece.semi_axes[0]
     if abs(cosine) > 1.0:
         return float("nan")

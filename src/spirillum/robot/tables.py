@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from math import pi
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.errors import InputError
+from spirillum.kernels.drive import MOST_POINTS
 from spirillum.notes import Note
 from spirillum.robot.fields import (
+    NONE,
     AlsoReads,
     BackEmfConstant,
     Charge,
@@ -31,28 +35,89 @@ from spirillum.robot.fields import (
     Voltage,
     quantity_schema,
 )
-from spirillum.robot.geometry import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
-from spirillum.units import KINDS
+from spirillum.units import KINDS, show
 
-DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
+DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
 
 FrictionReading = Literal["none", "rotor", "body", "paper"]
+
+
+class TorqueCurve(NamedTuple):
+    """Torque of a motor against its rate, straight between its points, in the motor's own sense; SI."""
+
+    rates: tuple[float, ...]
+    """Rates, rad/s: from 0, increasing."""
+    torques: tuple[float, ...]
+    """Torques, N m: not increasing, down to 0."""
+    sense: float
+    """1 where the motor turns the tail as its hand swims forward, else -1."""
+
+
+_UNSET = BeforeValidator(lambda value: None if value == "none" else value)
+"""A value that the word `none` takes away, also one of a preset."""
 
 
 class Drive(Section):
     """What turns the tail, and the joint between tail and body."""
 
     kind: DriveKind
-    """`dc-motor` (motor and battery of the file), `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
+    """`dc-motor` (motor and battery of the file), `torque-speed` (any other motor, by its torque against its rate),
+    `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
-    rate: Rate | None = None
+    rate: Annotated[Rate | None, _UNSET, NONE] = None
     """For `rate`: rotation rate of the tail about +x in the lab."""
-    torque: Torque | None = None
+    torque: Annotated[Torque | None, _UNSET, NONE] = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
+    rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"]] = None
+    """For `torque-speed`: rates of the tail against the body, 2 to 12 that increase from 0; three give a knee."""
+    torques: Annotated[tuple[Torque, ...] | None, KINDS["torque"]] = None
+    """For `torque-speed`: torque at each of these rates, straight between them: from the stall torque down to 0."""
+    polarity: Literal["forward", "reverse"] = "forward"
+    """For `torque-speed`: `forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
     duty: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
     """For `dc-motor`: pulse-width duty of the voltage controller; 1 is full throttle."""
+
+    @property
+    def curve(self) -> TorqueCurve | None:
+        """Torque against rate; None for another drive."""
+        if self.rates is None or self.torques is None:
+            return None
+        return TorqueCurve(self.rates, self.torques, 1.0 if self.polarity == "forward" else -1.0)
+
+    def curve_problems(self) -> list[str]:
+        """A sentence for each rule of a curve that is broken."""
+        is_curve = self.kind == "torque-speed"
+        problems = [
+            f"drive.{name} is {'missing' if is_curve else 'set'} with drive.kind = '{self.kind}'; "
+            f"allowed: drive.{name} exactly when drive.kind = 'torque-speed'"
+            for name in ("rates", "torques")
+            if (getattr(self, name) is not None) != is_curve
+        ]
+        if not is_curve:
+            if self.polarity != "forward":
+                problems.append("drive.polarity = 'reverse'; allowed: only with drive.kind = 'torque-speed'")
+            return problems
+        if self.joint == "fixed":
+            problems.append("drive.joint = 'fixed' with drive.kind = 'torque-speed'; allowed: 'revolute'")
+        if self.rates is None or self.torques is None:
+            return problems
+        if len(self.rates) != len(self.torques) or not 2 <= len(self.rates) <= MOST_POINTS:
+            return [
+                *problems,
+                f"drive.rates has {len(self.rates)} and drive.torques has {len(self.torques)} values; allowed: as many "
+                f"of both, from 2 to {MOST_POINTS}",
+            ]
+        if self.rates[0] != 0.0 or any(b <= a for a, b in pairwise(self.rates)):
+            problems.append("drive.rates must increase from 0; allowed: such as ['0 Hz', '170 Hz', '300 Hz']")
+        if self.torques[0] <= 0.0 or self.torques[-1] != 0.0 or any(b > a for a, b in pairwise(self.torques)):
+            problems.append(
+                "drive.torques must fall, or stay, from a positive stall torque to 0 at the last rate; "
+                "allowed: such as ['0.3 mN m', '0.28 mN m', '0 N m']"
+            )
+        return problems
 
 
 class MotorResistance(Section):
@@ -141,6 +206,22 @@ class Friction(Section):
     """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""
 
 
+def _center_problems(body: Body) -> list[str]:
+    """Problems of the body's centre of mass: it needs a mass, and lies inside the body."""
+    center = body.center_of_mass
+    if center is None:
+        return []
+    problems = [] if body.mass is not None else ["body.center_of_mass requires body.mass; set both, or neither"]
+    for name, value, most in (("x", abs(center.x or 0.0), body.length), ("radial", center.radial, body.diameter)):
+        if value > 0.5 * most:
+            size = "length" if name == "x" else "diameter"
+            problems.append(
+                f"body.center_of_mass.{name} = {show(value, 'mm')} lies outside the body; allowed: at most "
+                f"{show(0.5 * most, 'mm')}, half of body.{size}"
+            )
+    return problems
+
+
 class RobotTables(Section):
     """The tables of a robot file; SI inside, frozen. `Robot` adds what its geometry has to fulfil."""
 
@@ -150,8 +231,8 @@ class RobotTables(Section):
     """What it is, in a sentence."""
     reference: Text = Field(default="", max_length=2000)
     """Where its numbers come from."""
-    body: Body
-    """The body."""
+    body: BodyOrNone
+    """The body, or `none` for a bare tail."""
     seal: SealOrNone = None
     """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
     coupling: Coupling = Coupling()
@@ -196,15 +277,41 @@ class RobotTables(Section):
 
     @model_validator(mode="after")
     def _no_field_missing_or_idle(self) -> Self:
-        problems = [*self._end_problems(), *self._drive_problems()]
+        problems = [*self._end_problems(), *self._drive_problems(), *self._problems_without_body()]
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
 
+    @property
+    def has_body(self) -> bool:
+        """Whether there is a body, against which a joint can turn."""
+        return self.body.shape != "none"
+
+    def check_body(self, what: str) -> None:
+        """Refuse a bare tail for what takes a body.
+
+        Raises:
+            InputError: if there is none.
+        """
+        if not self.has_body:
+            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: a robot with a body")
+
+    def _problems_without_body(self) -> list[str]:
+        if self.has_body:
+            return []
+        problems = []
+        if self.seal is not None:
+            problems.append("seal is set with body = 'none'; allowed: seal = 'none'")
+        if self.drive is not None and self.drive.joint == "revolute":
+            problems.append(
+                "drive.joint = 'revolute' with body = 'none', against which nothing turns; allowed: 'fixed'"
+            )
+        return problems
+
     def _end_problems(self) -> list[str]:
         body, rft = self.body, self.model.rft
-        problems = []
-        if body.shape in ("sphere", "spheroid"):
+        problems = _center_problems(body)
+        if body.shape in ("sphere", "spheroid", "profile"):
             idle = [name for name in ("front", "rear", "fillet") if getattr(body, name) is not None]
             problems += [
                 f"body.{name} is set, but a {body.shape} has no ends; allowed: leave it out, or 'none'" for name in idle
@@ -233,6 +340,7 @@ class RobotTables(Section):
             problems.append(
                 f"drive.duty = {drive.duty:g} with drive.kind = '{drive.kind}'; allowed: only for 'dc-motor'"
             )
+        problems += drive.curve_problems()
         magnetic = drive.kind == "magnetic"
         if magnetic and drive.joint == "revolute":
             problems.append("drive.joint = 'revolute' with drive.kind = 'magnetic'; allowed: 'fixed'")

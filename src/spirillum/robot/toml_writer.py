@@ -45,6 +45,8 @@ def _fields(robot: Robot) -> Iterator[tuple[str, str]]:
                 yield path, '"none"'
         elif unit is None:
             yield path, json.dumps(list(value) if isinstance(value, (tuple, list)) else value, ensure_ascii=False)
+        elif isinstance(value, tuple):
+            yield path, json.dumps([_with_unit(item, unit) for item in value], ensure_ascii=False)
         else:
             yield path, f'"{_with_unit(float(value), unit)}"'
 

@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.outline import Arc, Outline, Segment
+from spirillum.robot.outline import Outline, Piece, Segment
 from spirillum.robot.placement import Placement
 
 GAP_SHARE = 1.0 / 18.0
@@ -203,7 +203,7 @@ class Seat:
 
 
 @lru_cache(maxsize=256)
-def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Arc, tuple[Samples, Samples]]]]:
+def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Piece, tuple[Samples, Samples]]]]:
     """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's."""
     ends = [end for piece in outline.pieces if isinstance(piece, Segment) for end in (piece.start, piece.end)]
     x, rho = np.array(ends, dtype=float).reshape(-1, 2).T

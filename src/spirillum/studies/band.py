@@ -1,4 +1,4 @@
-"""The band of a study: its robots at every place that the placement leaves open, each place kept as soon as it is done.
+"""The band of a study: its robots at every pose that the placement leaves open, each kept as soon as it is done.
 
 Robots of one channel that share a place come one after the other: what is solved for body and wall there serves them
 all.
@@ -36,18 +36,18 @@ AT_PLACES = (
     "hydrodynamic_efficiency",
     "plug_velocity",
 )
-"""Quantities that have a band, and a value at each of its places."""
+"""Quantities that have a band, and a value at each of its poses."""
 
 
 @dataclass(frozen=True)
 class BandTask(StudyTask):
-    """One model for the robots of one channel that share a place of their bands."""
+    """One model for the robots of one channel that share a pose of their bands."""
 
     model: str
     place: int
-    """Number of the place in the band of each robot."""
+    """Index of the pose in the band of each robot."""
     robots: tuple[RobotBatch, ...]
-    """The robots at that place, one by one."""
+    """The robots at that pose, one by one."""
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class BandTask(StudyTask):
 
     @property
     def where(self) -> str:
-        """The place in words."""
+        """The pose in words."""
         placement = self.robots[0].placement
         return f"gap {show(placement.gap or 0.0, 'mm')}, pitch {show(placement.pitch or 0.0, 'deg')}"
 
@@ -75,7 +75,7 @@ class BandTask(StudyTask):
         return self.size, readings
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Compute steady swimming at this place, (robots, friction readings); NaN where there is none."""
+        """Compute steady swimming at this pose, (robots, friction readings); NaN where there is none."""
         model = find_swimmer_model(self.model)
         there = [_quickly(robot, model) for robot in self.robots]
         found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
@@ -83,7 +83,7 @@ class BandTask(StudyTask):
 
 
 def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
-    """The tasks of the band, always in the same order, numbered from `first`; none where none is asked for."""
+    """The tasks of the band, always in the same order, numbered from `first`; none where it is not requested."""
     if not loaded.study.band:
         return
     number = first
@@ -104,7 +104,7 @@ def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, Swimme
 
 
 def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
-    """Number of a place of the band, and those of the robots that share it, by their number, at that place."""
+    """Index of a pose of the band, and the robots that share it, by their index, at that pose."""
     bands = {}
     for index, single in enumerate(robots):
         if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
@@ -120,7 +120,7 @@ def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tu
 
 
 def reference_place(settings: Mapping[str, Any]) -> str:
-    """Where the robots of a study lie for the models that compute the walls, in words.
+    """Poses of the robots of a study for the models that compute the walls, in words.
 
     Args:
         settings: the study's settings, as the attribute `settings` of its dataset holds them.
@@ -140,7 +140,7 @@ def reference_place(settings: Mapping[str, Any]) -> str:
 
 
 def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
-    """A sentence for each place at which robots have no answer, though they have one at the reference place."""
+    """A sentence for each pose at which robots have no answer, though they have one at the reference pose."""
     found = []
     for task, part in answers:
         missing = np.flatnonzero(np.isnan(part["forward_velocity"]).all(axis=-1))
@@ -154,7 +154,7 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
 
 
 def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
-    """`gap_at_place` and `pitch_at_place` of every robot, (robots, places), m and rad; NaN where it has no band."""
+    """`gap_at_place` and `pitch_at_place` of every robot, (robots, poses), m and rad; NaN where it has no band."""
     tasks = [task for task, _ in answers]
     places = max(task.place for task in tasks) + 1
     names = ("gap_at_place", "pitch_at_place")
@@ -168,7 +168,7 @@ def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str,
 def with_band(
     flat: dict[str, Values], answers: Iterable[tuple[BandTask, Part]], models: tuple[str, ...]
 ) -> dict[str, Values]:
-    """Quantities at all places, and the least and largest of all places and the reference place.
+    """Quantities at all poses, and the least and largest of all poses and the reference pose.
 
     Args:
         flat: the answers at the reference place, (models, robots, friction readings).

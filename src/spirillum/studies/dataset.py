@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.band import BandTask, placed_at, with_band
 from spirillum.studies.factorial import main_effects
+from spirillum.studies.motion_columns import HeldTask, TrialTask, column_variables
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.released_robots import (
     AT_RUNS,
@@ -120,21 +121,33 @@ _BAND = {
 }
 
 
-LetGo = tuple[Sequence[tuple[LaidDownTask, Part]], Sequence[tuple[SettledTask, Part]]]
-"""Answers of robots that made the runs of a design, and of those that were followed to their steady motions."""
+class BesideModels(NamedTuple):
+    """Answers of robots one by one, beside those of the models."""
+
+    laid_down: Sequence[tuple[LaidDownTask, Part]] = ()
+    """Of robots that made the runs of a design."""
+    settled: Sequence[tuple[SettledTask, Part]] = ()
+    """Of those that were followed to their steady motions."""
+    held: Sequence[tuple[HeldTask, Part]] = ()
+    """Of those that `tube` holds, in a study without that model."""
+    trials: Sequence[tuple[TrialTask, Part]] = ()
+    """Of those that made a trial."""
+
+
+_NOTHING_BESIDE = BesideModels()
 
 
 def assembled(
     loaded: LoadedStudy,
     answers: Iterable[tuple[ModelTask, Part]],
     band: Sequence[tuple[BandTask, Part]],
-    let_go: LetGo,
+    beside: BesideModels,
     observed: ObservedArrays | None,
     fingerprint: str,
     warnings: Sequence[Note],
 ) -> xr.Dataset:
-    """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots that were let go."""
-    dataset = laid_out(loaded, answers, band, let_go, observed)
+    """Collect all answers in one Dataset: at the reference pose, at the poses of a band, of robots one by one."""
+    dataset = laid_out(loaded, answers, band, beside, observed)
     dataset.attrs = described(loaded, observed, fingerprint, warnings)
     dataset.attrs["checksum"] = _checksum(dataset)
     return dataset
@@ -165,7 +178,7 @@ def laid_out(
     loaded: LoadedStudy,
     answers: Iterable[tuple[ModelTask, Part]],
     band: Sequence[tuple[BandTask, Part]] = (),
-    let_go: LetGo = ((), ()),
+    beside: BesideModels = _NOTHING_BESIDE,
     observed: ObservedArrays | None = None,
 ) -> xr.Dataset:
     """Answers as labelled arrays, without attributes of the whole."""
@@ -190,11 +203,11 @@ def laid_out(
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
     coordinates = coordinates_of(loaded)
-    laid_down, settled = let_go
-    if settled:
-        data |= settled_variables(settled, robots, shape)
-    if laid_down:
-        data |= laid_down_variables(laid_down, robots, shape)
+    data |= column_variables(beside.held, beside.trials, robots, shape)
+    if beside.settled:
+        data |= settled_variables(beside.settled, robots, shape)
+    if beside.laid_down:
+        data |= laid_down_variables(beside.laid_down, robots, shape)
         coordinates |= laid_down_coordinates(study.laid_down)
     return xr.Dataset(data, coords=coordinates)
 
@@ -204,7 +217,7 @@ _ANY = "surrogatepass"
 
 
 def _checksum(dataset: xr.Dataset) -> str:
-    """Of all values and attributes but itself: damage is noticed, and the dataset computed anew."""
+    """Checksum of all other values and attributes: damage is detected, and the dataset computed again."""
     found = hashlib.sha256()
     for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
         found.update(f"{name}={value}\n".encode(errors=_ANY))
@@ -311,7 +324,7 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
 
 
 _LARGEST_LEFT, _LARGEST_OF_A_ROBOT = 16 << 20, 1 << 16
-"""Bytes of a dataset: of its attributes, and of each of its robots with all models, readings, rates and places."""
+"""Bytes of a dataset: of its attributes, and of each of its robots with all models, readings, rates and poses."""
 
 
 def read_dataset(path: Path, robots: int) -> xr.Dataset | None:

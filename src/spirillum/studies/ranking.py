@@ -50,24 +50,30 @@ class QuantityRanking(NamedTuple):
 
 
 LET_GO = "forward_velocity_settled"
-"""The speed in steady motion, of robots that were let go."""
+"""The speed in steady motion after release."""
+HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
+"""The speed by `tube` where no model of the study computes walls, and that of a trial."""
+_BESIDE = (HELD, TRIAL, LET_GO)
+"""Speeds beside that of a model, where the study has them."""
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
-    LET_GO: QuantityRanking("settled", "fastest once settled", 1.0),
+    HELD: QuantityRanking("tube", "fastest held by tube", 1.0),
+    TRIAL: QuantityRanking("trial", "fastest in a trial", 1.0),
+    LET_GO: QuantityRanking("steady", "fastest once settled", 1.0),
     "hydrodynamic_efficiency": QuantityRanking("efficiency", "most efficient", 1.0),
     "motor_current": QuantityRanking("current", "least current", -1.0),
     "shaft_power": QuantityRanking("power", "least power", -1.0),
 }
 """Quantities that rank robots, in the order in which they are shown."""
-SETTLED_BASIS = "settled: by model tube, let go, in steady motion; all else: by the model above, not let go"
-"""What the speed of robots that were let go rests on, and the other quantities do not."""
+SETTLED_BASIS = "steady: by model tube, let go, in steady motion; all else: by the model above, not let go"
+"""Assumptions of the speed after release that the other quantities do not share."""
 ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
 
 def unit_of_ranked(name: str) -> str:
     """SI unit of a quantity that ranks robots."""
-    return unit_of("forward_velocity" if name == LET_GO else name)
+    return unit_of("forward_velocity" if name in _BESIDE else name)
 
 
 class RankedRobot(NamedTuple):
@@ -76,7 +82,7 @@ class RankedRobot(NamedTuple):
     name: str
     """Its name, or its channel and tail."""
     place: int
-    """Its place in the flat order of the study."""
+    """Its index in the flat order of the study."""
     values: Mapping[str, float]
     low: Mapping[str, float]
     """Least values of bands or lower limits of intervals; NaN without one."""
@@ -102,9 +108,9 @@ class Best(NamedTuple):
     quantity: str
     robot: RankedRobot
     places: int
-    """Number of places, the reference place one of them, at which it is the best; 0 without a band."""
+    """Number of poses, the reference pose one of them, at which it is the best; 0 without a band."""
     of_places: int
-    """Number of places at which the robots have answers."""
+    """Number of poses at which the robots have answers."""
     spread: float
     """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
     known: int
@@ -116,7 +122,7 @@ class Best(NamedTuple):
 
     @property
     def alike(self) -> bool:
-        """Whether there are several robots, and the quantity hardly tells them apart."""
+        """Whether there are several robots, and the quantity hardly differs between them."""
         return self.spread < _ALIKE
 
     def to_dict(self) -> dict[str, Any]:
@@ -147,7 +153,7 @@ class StudyRanking:
 
     @property
     def message(self) -> str:
-        """What the ranking says, in a sentence."""
+        """The ranking in a sentence."""
         if not self.robots:
             return "no robot has an answer"
         first = self.robots[0]
@@ -159,7 +165,7 @@ class StudyRanking:
 
     @property
     def settled(self) -> bool:
-        """Whether robots were let go, and are ordered by the speed in steady motion."""
+        """Whether robots were released, and are ordered by the speed in steady motion."""
         return LET_GO in self.quantities
 
     @property
@@ -198,7 +204,7 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
     chosen, indexes = ("model", "friction"), dataset.indexes
     named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
     over = {*chosen, *robot_dims(dataset)}
-    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED if name != LET_GO)
+    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED if name not in _BESIDE)
 
 
 def robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -217,7 +223,9 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     chosen = dataset.sel(model=model, friction=reading)
     names = list(_names(dataset))
     known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
-    if LET_GO in chosen and bool(np.isfinite(chosen[LET_GO].values).any()):
+    beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
+    known[1:1] = [name for name in beside if name != LET_GO]
+    if LET_GO in beside:
         known.insert(0, LET_GO)
     values = {name: _flat(chosen, name, names) for name in known}
     values[known[-1]] = np.abs(values[known[-1]])  # a motor that turns the other way draws no less
@@ -231,7 +239,8 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
         )
         for index in order
     }
-    best = tuple(_best(chosen, name, values[name], ranked) for name in known if np.isfinite(values[name][order]).any())
+    judged = sorted(known, key=(HELD, TRIAL).__contains__)  # the columns beside the model's own last
+    best = tuple(_best(chosen, name, values[name], ranked) for name in judged if np.isfinite(values[name][order]).any())
     left_out = walled and not SWIMMER_MODELS[model].placed
     return StudyRanking(model, reading, left_out, kind if ranked else "", tuple(ranked.values()), best)
 

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 _SOLVED_BLOCK, _PLACED_BLOCK = 128, 64
 """Robots of a region for a model that solves for the flow: some ten seconds of work; and for one that solves for body
-and walls once, for all tails at one place."""
+and walls once, for all tails at one pose.
+"""
 
 
 class RobotBlock(NamedTuple):
@@ -35,9 +36,9 @@ class RobotBlock(NamedTuple):
 
     number: int
     start: tuple[int, ...]
-    """First place along each dimension of the robots."""
+    """First index along each dimension of the robots."""
     stop: tuple[int, ...]
-    """First place behind it."""
+    """First index behind it."""
 
     @property
     def size(self) -> int:
@@ -118,7 +119,7 @@ def cut(
 
 
 _LAST = "outside"
-"""The variable whose chunk takes its place last: where it is, the region is."""
+"""The variable whose chunk is written last: it marks a complete region."""
 
 
 class Plan(NamedTuple):
@@ -127,7 +128,7 @@ class Plan(NamedTuple):
     layout: Layout
     variables: Mapping[str, Stored]
     coordinates: Mapping[str, np.ndarray[Any, Any]]
-    """Values that stand in it whole."""
+    """Variables that it holds whole."""
     others: tuple[str, ...]
     """Coordinates that are no dimension."""
 
@@ -143,16 +144,16 @@ class Plan(NamedTuple):
         return int(sum(np.prod(item.shape, dtype=float) * np.dtype(item.dtype).itemsize for item in items))
 
     def place(self, name: str, region: RobotBlock) -> list[tuple[int, int]]:
-        """Where a region of a variable lies: among the robots where it is, and whole along what comes behind them."""
+        """Slices of a region in a variable: its robots, and all of the dimensions behind them."""
         own = list(zip(region.start, region.stop, strict=True))
         return own + [(0, size) for size in self.variables[name].shape[len(own) :]]
 
     def note(self, region: RobotBlock) -> str:
-        """Path within the store of what a region has to say, while the study runs."""
+        """Path within the store of a region's notes, while the study runs."""
         return f"notes/{region.number:07d}.json"
 
     def pieces(self, region: RobotBlock) -> list[str]:
-        """Paths within the store of all files of a region, in the order in which they take their places."""
+        """Paths within the store of all files of a region, in the order in which they are written."""
         keys = [chunk_key(name, self.variables[name], self.place(name, region)) for name in self.regional]
         return [*keys[:-1], self.note(region), keys[-1]]
 
@@ -219,7 +220,7 @@ def region_jobs(
 
 
 def encoded_region(job: RegionJob) -> dict[str, bytes]:
-    """Compute a region: its files by their paths within the store, in the order in which they take their places."""
+    """Compute a region: its files by their paths within the store, in the order in which they are written."""
     region, loaded, observed, plan = job
     with one_thread_each(*loaded.study.models):
         answers = [(task, task.answer(loaded, observed)) for task in tasks(loaded)]

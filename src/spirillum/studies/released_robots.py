@@ -66,7 +66,7 @@ _SAMPLES_PER_TURN = 40
 
 
 class ReleasedRobot(NamedTuple):
-    """How a robot is laid down for one run, SI."""
+    """Release of a robot for one run, SI."""
 
     gap: float
     pitch: float
@@ -88,7 +88,7 @@ def levels_of_readings() -> Levels:
 
 
 def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
-    """How a robot is laid down in each run; its steepest pitch is what gap and tail allow."""
+    """Release of a robot in each run; its steepest pitch is what gap and tail allow."""
     batch, found = RobotBatch.of(robot), []
     for signs in levels():
         low_or_high = [getattr(ranges, name)[int(sign > 0)] for name, sign in zip(FACTORS, signs, strict=True)]
@@ -206,14 +206,14 @@ def inferred(robot: Robot, seen: Part) -> Part:
 
 
 def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[LaidDownTask]:
-    """One task for each robot, numbered from `first`; none where none is asked for."""
+    """One task for each robot, numbered from `first`; none where none is requested."""
     if loaded.study.predicted:
         for number, (index, robot) in enumerate(robots.items(), start=first):
             yield LaidDownTask(number, np.array([index]), robot, loaded.study.laid_down)
 
 
 def without_answer(parts: Iterable[Part]) -> list[Note]:
-    """A sentence on the runs of laid-down robots that tell nothing; none where all tell something."""
+    """A sentence on the runs after release without a result; none where all have one."""
     found = [np.isfinite(part["forward_velocity"]).any(axis=-1) for part in parts]
     known = np.concatenate([part.ravel() for part in found]) if found else np.ones(0, dtype=bool)
     if known.all():
@@ -237,17 +237,17 @@ SETTLED = (
 )
 """Quantities of a steady motion."""
 PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
-"""Where a robot lies in it, and how fast it comes there."""
+"""Pose of a robot in it, and its time constant."""
 STATES = ("not followed", "steady", "orbits", "goes around", "changing")
 """What became of a robot; the index in this list is the value in the dataset."""
 
 
 @dataclass(frozen=True)
 class SettledTask(OneRobot):
-    """One robot that is let go."""
+    """One released robot."""
 
     placement: Placement
-    """Where it is laid down."""
+    """Its initial pose."""
     contact: Contact
     """What it rests on."""
 
@@ -286,7 +286,7 @@ class SettledTask(OneRobot):
 
 
 def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[SettledTask]:
-    """One task for each robot, numbered from `first`; none where none is asked for."""
+    """One task for each robot, numbered from `first`; none where none is requested."""
     if loaded.study.settled:
         tails = loaded.count // len(loaded.robots)
         for number, (index, robot) in enumerate(robots.items(), start=first):

@@ -26,7 +26,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.cautions import cautions, summed
-from spirillum.studies.dataset import assembled
+from spirillum.studies.dataset import BesideModels, assembled
+from spirillum.studies.motion_columns import HeldTask, held_tasks, trial_notes, trial_tasks
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.released_robots import laid_down_tasks, not_settled, settled_basis, settled_tasks, without_answer
 from spirillum.studies.study_loader import LoadedStudy
@@ -71,7 +72,7 @@ _LARGEST_PART = 1 << 30
 
 
 def _as_kept(item: zipfile.ZipInfo) -> bool:
-    """Whether an array stands in the file as it is: what is compressed could be a thousand times as large."""
+    """Whether an array is stored uncompressed: what is compressed could be a thousand times as large."""
     return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
 
 
@@ -87,7 +88,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
-    """Hash of question and program: a dataset of another version is computed anew."""
+    """Hash of request and program: a dataset of another version is computed again."""
     question = [loaded.fingerprint, observed.question() if observed else None, own_version()]
     return hashlib.sha256(json.dumps(question).encode()).hexdigest()
 
@@ -112,11 +113,13 @@ def computed_study(
     """
     todo: list[ModelTask | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
-    followed = loaded.study.predicted or loaded.study.settled
+    followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
     with_table = _with_table(loaded) if followed else {}
     runs = list(laid_down_tasks(loaded, with_table, len(todo)))
     let_go = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
-    asked: list[StudyTask] = [*todo, *runs, *let_go]
+    holding = list(held_tasks(loaded, len(todo) + len(runs) + len(let_go)))
+    trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(let_go) + len(holding)))
+    asked: list[StudyTask] = [*todo, *runs, *let_go, *holding, *trials]
     found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in asked}
     missing = [task for task in asked if found[task.number] is None]
     done = len(asked) - len(missing)
@@ -134,18 +137,23 @@ def computed_study(
     parts_of = {number: part for number, part in found.items() if part is not None}
     answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
-    laid_down = [(task, parts_of[task.number]) for task in runs]
-    settled = [(task, parts_of[task.number]) for task in let_go]
+    beside = BesideModels(
+        laid_down=[(task, parts_of[task.number]) for task in runs],
+        settled=[(task, parts_of[task.number]) for task in let_go],
+        held=[(task, parts_of[task.number]) for task in holding],
+        trials=[(task, parts_of[task.number]) for task in trials],
+    )
     warnings = warnings_of(loaded)
     warnings += [settled_basis(loaded.study.contact)] if let_go else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
     if followed:
         warnings += _without_table(loaded, with_table)
-    warnings += without_answer(part for _, part in laid_down)
-    warnings += not_settled(settled)
+    warnings += without_answer(part for _, part in beside.laid_down)
+    warnings += not_settled(beside.settled)
+    warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
-    return assembled(loaded, answers, band, (laid_down, settled), observed, fingerprint, list(dict.fromkeys(warnings)))
+    return assembled(loaded, answers, band, beside, observed, fingerprint, list(dict.fromkeys(warnings)))
 
 
 _KEPT = "; what was answered is kept"
@@ -155,7 +163,10 @@ _SHORT = 600_000
 
 def _worth(missing: Sequence[StudyTask], crew: WorkerPool) -> WorkerPool:
     """Who computes: this process where the others would start longer than they work."""
-    quick = all(isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form for task in missing)
+    quick = all(
+        isinstance(task, HeldTask) or (isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form)
+        for task in missing
+    )
     short = quick and sum(task.size for task in missing) < _SHORT
     return WorkerPool() if short and crew.cluster is None else crew
 
@@ -185,7 +196,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
 
 
 def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
-    """What answers of robots that are held at places in their tube leave out."""
+    """Limits of answers for robots held at a pose in their tube."""
     walled = [model.name for model in models if model.placed]
     if not walled:
         words = "band = true has no effect: no model of the study includes walls; add model tube"
@@ -221,7 +232,7 @@ def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
     """Make the tables that robots lack in their tubes, where the study left the choice of the model to the program."""
     if not loaded.makes_tables:
         return
-    stage: StageName = "yaw" if loaded.study.predicted or loaded.study.settled else "straight"
+    stage: StageName = "yaw" if loaded.study.predicted or loaded.study.settled or loaded.study.trial else "straight"
     missing = dict.fromkeys(one for _, batch in groups(loaded) for one in missing_tables(batch, stage))
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
@@ -253,7 +264,7 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
 
 
 def _why_without_table(robot: Robot, placement: Placement) -> str:
-    """What robots have not that are not let go; a place for the name of the first."""
+    """What robots that are not released lack; a placeholder for the name of the first."""
     if robot.channel is None:
         return "have no channel in which they could be let go, the first: {}"
     if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):

@@ -41,14 +41,14 @@ _Coefficient = Annotated[float, BeforeValidator(in_range(0.0, 10.0)), Field(ge=0
 
 
 class LaidDown(Section):
-    """Between what robots are laid down and let go, each factor from its low to its high level; all of it assumed."""
+    """Factors of release, each with its low and its high level; all of it assumed."""
 
     gap: tuple[Length, Length] = (1e-4, 1e-3)
-    """Smallest distance of body and glass where it is laid down, low and high."""
+    """Smallest distance of body and glass at release, low and high."""
     pitch: tuple[_Share, _Share] = (0.0, 0.5)
     """Nose up, over the steepest pitch that gap and tail allow, at which the tail is at the glass."""
     wait: tuple[Time, Time] = (0.0, 60.0)
-    """Time for which it lies there before its motor is switched on."""
+    """Waiting time until the motor is switched on."""
     roughness: tuple[Length, Length] = (1e-6, 3e-5)
     """Height of the asperities: of a smooth hull, and of glued and printed stripes."""
     friction_coefficient: tuple[_Coefficient, _Coefficient] = (0.0, 0.3)
@@ -88,8 +88,8 @@ class Contact(Section):
     """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
 
 
-_READ_BY = {"laid_down": "predicted", "contact": "settled"}
-"""Tables of a study and the switch without which nothing reads them."""
+_READ_BY = {"laid_down": ("predicted",), "contact": ("settled", "trial")}
+"""Tables of a study and the switches without which nothing reads them."""
 _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 
 
@@ -117,17 +117,21 @@ class Study(Section):
     """Fields of the robot file with their values, such as `"tail.length" = ["40 mm", "60 mm"]`: every combination, for
     each of `robots`."""
     placement: Placement = Placement()
-    """Where in their channels the robots lie, for models that compute the walls."""
+    """Poses of the robots in their channels, for models that compute the walls."""
     band: Annotated[bool, Field(strict=True)] = False
-    """Compute such models over the places that `placement` leaves open too: seconds with tables, else many minutes."""
+    """Compute such models over the poses that `placement` leaves open too: seconds with tables, else many minutes."""
     predicted: Annotated[bool, Field(strict=True)] = False
-    """Lay the robots down in their tubes and let them go too, with nothing fitted: minutes."""
+    """Also simulate release from rest in the tubes, with nothing fitted: minutes."""
     laid_down: LaidDown = LaidDown()
-    """Between what they are laid down."""
+    """Levels of the factors of release."""
     settled: Annotated[bool, Field(strict=True)] = False
-    """Let the robots go in their tubes, and follow each of them to its steady motion too: some seconds a robot."""
+    """Also find the steady state of each robot after release in its tube: some seconds a robot."""
+    trial: Annotated[bool, Field(strict=True)] = False
+    """Make a trial of each robot in its tube too, as `spirillum predict` has it: some seconds a robot."""
+    interval: Annotated[bool, Field(strict=True)] = False
+    """Also give the 90 % interval of each trial over its unknowns: half a minute a robot; a rerun resumes."""
     contact: Contact = Contact()
-    """What these robots rest on."""
+    """What settled robots and those in trials rest on."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -164,10 +168,13 @@ class Study(Section):
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         problems += [
-            f"{table} without {switch}, which reads it; allowed: {switch} = true or false beside it, or no [{table}]"
-            for table, switch in _READ_BY.items()
-            if table in self.model_fields_set and switch not in self.model_fields_set
+            f"{table} without {' or '.join(by)}, which reads it; allowed: {by[0]} = true or false beside it, or no "
+            f"[{table}]"
+            for table, by in _READ_BY.items()
+            if table in self.model_fields_set and not self.model_fields_set.intersection(by)
         ]
+        if self.interval and not self.trial:
+            problems.append("interval without trial, of which it is; allowed: trial = true beside it")
         problems += self._problems_of_the_band()
         varied = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
         if self.vary and varied > _MOST_ROBOTS:

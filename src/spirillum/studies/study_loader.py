@@ -46,12 +46,12 @@ class LoadedStudy:
     fit: Fit = NO_FIT
     """Fitted values that act on the robots, or draws over which answers have intervals."""
     placements: tuple[Placement, ...] = ()
-    """Where each of `robots` lies by a calibration; none where the study says it."""
+    """Pose of each of `robots` by a calibration; none where the study states it."""
     model_reason: str = ""
     """Why the model in place of `auto` was taken; empty where all models are named."""
 
     def placement_of(self, number: int) -> Placement:
-        """Where one of `robots` lies."""
+        """Pose of one of `robots`."""
         return self.placements[number] if self.placements else self.study.placement
 
     @property
@@ -103,6 +103,8 @@ def load_study(
     band: bool | None = None,
     predicted: bool | None = None,
     settled: bool | None = None,
+    trial: bool | None = None,
+    interval: bool | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     largest: int = LARGEST_STUDY,
@@ -117,6 +119,8 @@ def load_study(
         predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
         settled: whether to follow the robots to their steady motions, instead of what the study says; None: what it
             says.
+        trial: whether to make a trial of each robot, instead of what the study says; None: what it says.
+        interval: whether to compute the intervals of trials, instead of what the study says; None: what it says.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot.
         largest: most results that it may ask for.
@@ -126,6 +130,8 @@ def load_study(
         "band": band,
         "predicted": predicted,
         "settled": settled,
+        "trial": True if interval and trial is None else trial,
+        "interval": interval,
     }
     study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
     if study.size > largest:
@@ -137,7 +143,7 @@ def load_study(
         _check_different(robots, entries, name)
     robots = _named_apart(robots, [varied for _, varied in entries])
     _check_drives(study, [entry for entry, _ in entries], robots, name)
-    for option in ("predicted", "settled"):
+    for option in ("predicted", "settled", "trial"):
         if getattr(study, option) and not (calibration is None and posterior is None):
             raise InputError(
                 f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
@@ -202,8 +208,8 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
 
 
 def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
-    """Refuse asperities on which robots that are let go would be pressed by more than their weight."""
-    if not study.settled or study.contact.roughness is None:
+    """Refuse asperities that would carry more than the weight of a released robot."""
+    if not (study.settled or study.trial) or study.contact.roughness is None:
         return
     from spirillum.dynamics.tube_start import check_roughness  # loads compiled loops
 
@@ -272,7 +278,7 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
 
 
 def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
-    """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks."""
+    """Pose of each robot by a calibration, as `predict` takes it; none where the study states it, or none is needed."""
     if fit.file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
         return ()
     if fit.friction_coefficient:
@@ -293,7 +299,7 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
 
 
 def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> tuple[Study, str]:
-    """The study with one model for all robots in place of `auto`, and why that was taken."""
+    """The study with one model for all robots in place of `auto`, and the reason."""
     if AUTO not in study.models:
         return study, ""
     afloat = [robot.name for robot in robots if robot.channel is None]

@@ -72,6 +72,9 @@ REASONS = (
     "gap-too-thin",
     "beyond-stokes",
     "other",
+    "several-starts",
+    "no-plain-helix",
+    "no-body",
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 
@@ -83,7 +86,7 @@ _PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
-"""Parts of a batch, their places in it, and the model that answers for each."""
+"""Parts of a batch, their indices in it, and the model of each."""
 
 Part = dict[str, Values]
 """Arrays of one task: (robots, friction readings) or (robots, friction readings, rates)."""
@@ -236,7 +239,7 @@ class ModelTask(StudyTask):
 
 @dataclass(frozen=True)
 class OneRobot(StudyTask):
-    """One robot that is followed in its tube, as a task of its own."""
+    """One robot that is followed in its tube, as a separate task."""
 
     robot: Robot
 

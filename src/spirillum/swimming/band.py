@@ -1,4 +1,4 @@
-"""Answers where nobody knows how a robot lies in its channel: a band over the places that are possible.
+"""Answers for an unknown pose in the channel: a band over the possible poses.
 
 Two things decide much of how a robot swims in its channel and are seldom reported: the gap under its body, and how near
 its tail comes to the floor. Where a placement leaves one of them open, the motion is computed at a few places, each a
@@ -27,7 +27,6 @@ from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
@@ -39,9 +38,10 @@ from spirillum.units import show
 PLACES_PER_FIELD = 3
 """Gaps, and pitches at each of them."""
 TOLERANCE = 0.25
-"""Tolerance `model.tube.tolerance` of the places: nominal, for waves to and from the tail are kept as at the default.
-At gaps of 0.3, 0.5 and 1 mm the level robot of the paper has its speed within 0.04 %, its body rate within 4 % of the
-default's; pitched by 2.5 degrees at 0.5 mm, within 0.2 % and 0.6 %. A band spans several times as much."""
+"""Tolerance `model.tube.tolerance` of the poses of a band: nominal, since waves to and from the tail are kept as at the
+default. At gaps of 0.3, 0.5 and 1 mm the level robot of the paper has its speed within 0.04 %, its body rate within 4 %
+of the default's; pitched by 2.5 degrees at 0.5 mm, within 0.2 % and 0.6 %. A band spans several times as much.
+"""
 _SLACK = 1.0 + 1e-6  # rounding must not carry the steepest place out of the domain
 _SWEPT = 129  # rings of what the tail sweeps in a turn
 
@@ -50,23 +50,23 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Band:
-    """Steady swimming of one robot at the places that its placement leaves open, SI."""
+    """Steady swimming of one robot at the poses that its placement leaves open, SI."""
 
     over: tuple[str, ...]
     """Fields of the placement that it goes over: `gap`, `pitch` or both."""
     gap: PerRobot
-    """Gap of each place, m."""
+    """Gap of each pose, m."""
     pitch: PerRobot
-    """Pitch of each place, rad."""
+    """Pitch of each pose, rad."""
     swimming: Swimming
-    """The quantities at each place; NaN where it has no answer."""
+    """The quantities at each pose; NaN where it has no answer."""
     reference: Swimming
-    """The quantities at the reference place, which belongs to the band."""
+    """The quantities at the reference pose, which belongs to the band."""
     left_out: tuple[Note, ...]
-    """Places without an answer, a sentence each."""
+    """Poses without an answer, a sentence each."""
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Least and largest value of a quantity over all places; NaN where it does not apply.
+        """Least and largest value of a quantity over all poses; NaN where it does not apply.
 
         Args:
             name: an attribute of `Swimming`.
@@ -81,7 +81,7 @@ class Band:
         return {"low": low, "high": high, "kind": "band"} if np.isfinite(low) else {}
 
     def placed(self, placement: dict[str, Any]) -> dict[str, Any]:
-        """A model's account of a placement, which also says over what the band goes."""
+        """A model's description of a placement, with the fields over which it has a band."""
         found = dict(placement)
         for name, unit in (("gap", "m"), ("pitch", "rad")):
             if name in self.over:
@@ -91,28 +91,28 @@ class Band:
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """All places with their answers, as quantities whose values are lists."""
+        """All poses with their answers, as quantities whose values are lists."""
         units = {item.name: item.unit for item in STEADY}
         found = {"gap": quantity(self.gap, "m"), "pitch": quantity(self.pitch, "rad")}
         return found | {name: quantity(getattr(self.swimming, name), unit) for name, unit in units.items()}
 
 
 def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
-    """Fields of a placement over which a model's answer has a band; none for a model that does not ask for it."""
+    """Fields of a placement over which a model's answer has a band; none where it is not requested."""
     if not model.placed or placement.eccentricity is not None:
         return ()
     return tuple(name for name in ("gap", "pitch") if getattr(placement, name) is None)
 
 
 def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
-    """The places of a robot's band, from wide gaps to narrow ones and from level to steep.
+    """The poses of a robot's band, from wide gaps to narrow ones and from level to steep.
 
     As many for every robot, so that the places of several robots compare: where a robot has no room, some are the same.
 
     Returns:
         `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
     """
-    over = left_open(batch.placement, model)
+    over = left_open(batch.pose, model)
     if not over:
         return []
     g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
@@ -130,7 +130,7 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
 
 def _gaps(g: RobotGeometry, radius: float, pitch: float, yaw: float) -> list[float]:
     room = largest_gap(g.body, radius, pitch, yaw)
-    ends = [min(share * 0.5 * g.body_diameter, room) for share in GAP_BAND]
+    ends = [min(share * 0.5 * g.width, room) for share in GAP_BAND]
     return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
 
 
@@ -140,13 +140,10 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: flo
 
     The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
     """
-    xi = g.tail_length * np.linspace(0.0, 1.0, _SWEPT)
-    reach, _ = amplitude_envelope(xi, *(np.full(1, value) for value in (g.amplitude, g.tail_length, g.taper)))
-    behind = -0.5 * g.body_length - g.coupling_length - xi
     wire = 0.5 * g.wire_diameter
     found = contact_pitch(
         g.body,
-        np.stack([behind, reach, np.zeros(_SWEPT)], axis=1),
+        g.swept(_SWEPT),
         wire,
         radius,
         gap,
@@ -171,7 +168,7 @@ def steepest_pitch(batch: RobotBatch, gap: float) -> float:
 
 
 def at_place(batch: RobotBatch, place: Placement) -> RobotBatch:
-    """Robots at a place of the band, with the resolution of a band."""
+    """Robots at a pose of the band, with the resolution of a band."""
     own: ModelOptions = batch.options
     tube = own.tube.model_copy(update={"tolerance": TOLERANCE})
     return replace(batch, placement=place, options=own.model_copy(update={"tube": tube}))
@@ -207,7 +204,7 @@ def band_of(
             left_out.append(Note("without-answer", f"the band leaves out {where}: {why}"))
     tell(model.name, len(places) + 1, len(places) + 1)
     return Band(
-        left_open(batch.placement, model),
+        left_open(batch.pose, model),
         np.array([place.gap for place in places], dtype=float),
         np.array([place.pitch for place in places], dtype=float),
         joined(found),

@@ -1,4 +1,4 @@
-"""What to be careful about in a predicted motion: its Reynolds number, its calibration, its place."""
+"""Cautions of a predicted motion: its Reynolds number, its calibration, its pose."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_WEIGHT = Note(
     "body.mass or tail.density is unset: the robot has no weight in the fluid; set both",
     ("body.mass", "tail.density"),
 )
-"""Said of a free motion of a robot whose masses are unknown."""
+"""Caution of a free motion of a robot whose masses are unknown."""
 
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
@@ -77,8 +77,8 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
 
 
 def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
-    """What an answer at one place of several lacks, and how to get it; nothing where its place is known."""
-    over = left_open(batch.placement, model)
+    """Limits of an answer at one pose of several, with the remedy; nothing where the pose is known."""
+    over = left_open(batch.pose, model)
     if not over:
         return []
     are = "is" if len(over) == 1 else "are"

@@ -23,7 +23,7 @@ PosteriorFor = Literal["new", "measured"]
 
 
 def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -> PosteriorFor:
-    """Whose discrepancy is asked for.
+    """The robot whose discrepancy is requested.
 
     Args:
         name: `new` or `measured`.

@@ -1,4 +1,4 @@
-"""Resistance of robots as a function of what is fitted or drawn: wire, RFT's coefficients, viscosity, place in a tube.
+"""Resistance of robots as a function of fitted or sampled values: wire, RFT's coefficients, viscosity, pose in a tube.
 
 Fits and posteriors ask for the resistance of a few robots at thousands of values of a few numbers. What does not change
 is computed once. Over the wire's diameter resistances are interpolated by polynomials through Chebyshev points; RFT is
@@ -58,12 +58,12 @@ def _weights(nodes: Samples, at: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class AxialTable:
-    """Resistance by a model that knows no place, over wire diameter, RFT's coefficients and viscosity."""
+    """Resistance by a model without a pose, over wire diameter, RFT's coefficients and viscosity."""
 
     parts: tuple[Samples, ...]
     """Summands (points, robots, 3, 3): the first with factor one, the others with those of RFT's coefficients."""
     wires: Samples
-    """Wire diameters of the points, m; a single one where the wire is not drawn."""
+    """Wire diameters of the points, m; a single one where the wire is not sampled."""
     viscosity: Samples
     """The robots' own, to which the parts belong, Pa s, (robots,) or (1,)."""
     coefficients: Mapping[str, float]
@@ -150,9 +150,9 @@ class TubeResistance:
     viscosity: PerRobot
     """The robots' own, Pa s."""
     gap: PerRobot
-    """Where it is not drawn, m."""
+    """Where it is not sampled, m."""
     pitch: PerRobot
-    """Where it is not drawn, rad."""
+    """Where it is not sampled, rad."""
     yaw: float = 0.0
     """Of all robots, rad."""
 
@@ -176,7 +176,7 @@ class TubeResistance:
         )
 
     def whole(self, draws: Draws) -> Samples:
-        """See `DrawnResistance.whole`; ends condensed, NaN where a place is outside a robot's table."""
+        """See `DrawnResistance.whole`; ends condensed, NaN where a pose is outside a robot's table."""
         full = self._full(draws)
         flow = full[..., -1, :-1] / (self.against + full[..., -1, -1])[..., None]
         found = full[..., :-1, :-1] - full[..., :-1, -1, None] * flow[..., None, :]

@@ -19,7 +19,7 @@ from spirillum.swimming.balance import (
     friction_torques,
     rates_per_torque,
 )
-from spirillum.swimming.motor import steady_current
+from spirillum.swimming.motor import steady_current, torque_on_curve
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,10 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
     body_per_torque, tail_per_torque = rates_per_torque(s, t)
     if batch.drive == "torque":
         torque, current = batch.drive_torque, none
+    elif batch.curve is not None:
+        sense, current = batch.curve.sense * batch.hand, none
+        slip, coasting = tail_per_torque - body_per_torque, sense * (tail_coasting - body_coasting)
+        torque = sense * torque_on_curve(batch.curve, coasting, slip)
     elif batch.drive == "dc-motor" and batch.electrics is not None:
         motor = batch.electrics
         slip = tail_per_torque - body_per_torque

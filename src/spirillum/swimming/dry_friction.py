@@ -1,4 +1,4 @@
-"""Dry friction of a robot that lies on its asperities and is held sideways, as an added resistance of its body.
+"""Dry friction of a robot that rests on its asperities, as an added resistance of its body.
 
 The floor carries the robot's weight in the fluid N through asperities at the body's lowest point, which slides along
 the tube at U and around it at a Omega, with the body's radius a. Coulomb friction acts against the sliding:
@@ -34,7 +34,7 @@ _SMOOTH = 1e-4
 _ROUNDS = 60
 _SETTLED = 1e-12
 _WHOLE = (0, 1, 3)
-"""Places of U, Omega and omega in the axial form of both parts, where the force on the whole stands with the body."""
+"""Indices of U, Omega and omega in the axial form of both parts, where the force on the whole belongs to the body."""
 
 
 def weights_in_fluid(robots: Sequence[Robot]) -> PerRobot:

@@ -1,4 +1,4 @@
-"""What is free to move: lateral motion and tilt held, as the channel's floor does, or released.
+"""What is free to move: lateral motion and tilt constrained, or released.
 
 Held, the whole robot has one velocity along x. Released, no force and no lateral torque acts on it, and the motion is
 a screw: seen from the tail, the velocity U of the origin and the rotation w = (omega, Omega_y, Omega_z) of the tail are

@@ -217,7 +217,7 @@ def _drawn(
 
 
 def _table(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples]) -> AxialTable:
-    """Resistances over what the draws change, of a model that knows no place."""
+    """Resistances over what the draws change, of a model without a pose."""
     wires = None
     if "wire_diameter" in draws:
         wires = chebyshev_points(_WIRE_POINTS, float(draws["wire_diameter"].min()), float(draws["wire_diameter"].max()))

@@ -1,4 +1,4 @@
-"""Which hydrodynamic model answers where nobody names one.
+"""Choice of the hydrodynamic model where none is named.
 
 One robot has one answer. What a calibration or a posterior was fitted with answers for what it has fitted. Else a robot
 with a channel is predicted in its channel, by `tube`, or refused there, and a robot without one is predicted by
@@ -35,7 +35,7 @@ class ModelChoice:
     model: str
     """Name of the model."""
     reason: str = ""
-    """Why it was taken, in half a sentence; empty where it was asked for."""
+    """Its reason, in half a sentence; empty where it was named."""
     fitted: bool = False
     """Whether it is the model of a calibration or a posterior."""
 
@@ -47,7 +47,7 @@ def choose_model(
     placement: Placement | None = None,
     fit: Fit = NO_FIT,
 ) -> ModelChoice:
-    """The model that is asked for, or with `auto` that of a fit, else the one with the walls of the robot's channel.
+    """The named model, or with `auto` that of a fit, else the one with the walls of the robot's channel.
 
     Args:
         asked: name of a model, or `auto`.
@@ -76,7 +76,7 @@ def choose_model(
 
 
 def models_without_answer(robot: Robot) -> list[str]:
-    """A sentence on each model whose domain a robot lies outside of, lying level in its channel."""
+    """A sentence on each model whose domain does not contain the robot, level in its channel."""
     batch = RobotBatch.of(robot)
     found = []
     for name, model in SWIMMER_MODELS.items():

@@ -1,4 +1,4 @@
-"""What the other models would say of a robot, and why: the paper's models and the unbounded fluid beside the answer."""
+"""Predictions of the other models for a robot: the paper's models and the unbounded fluid beside the answer."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class OtherModel:
     model: str
     """Name of the model."""
     calibrated: bool
-    """Whether the robot's calibration factors, which stand for the walls, were applied."""
+    """Whether the robot's calibration factors, which represent the walls, were applied."""
     forward_velocity: float
     """U, m/s."""
     ratio: float
@@ -36,7 +36,7 @@ class OtherModel:
 
 @dataclass(frozen=True)
 class OtherModels:
-    """What simpler models say to the same question."""
+    """Predictions of simpler models for the same request."""
 
     answers: tuple[OtherModel, ...]
     """One for each model, and one more for each that has calibration factors of this geometry."""
@@ -67,7 +67,7 @@ def other_models(
     motion: Motion,
     flow: float | None,
 ) -> OtherModels | None:
-    """What models say that leave out what the answering one knows; None where none can be held against it.
+    """Predictions of models that leave out effects which the answering one includes; None where none is comparable.
 
     Args:
         robot: the robot, with the resolution of the answer.

@@ -60,7 +60,7 @@ class Prediction(DisplayMixin):
     calibrated: bool
     """Whether calibration factors were applied."""
     batch: RobotBatch = field(repr=False)
-    """The robot in its place, as a batch of one."""
+    """The robot at its pose, as a batch of one."""
     swimming: Swimming = field(repr=False)
     """The quantities, as arrays of length one."""
     error_estimate: float
@@ -70,21 +70,21 @@ class Prediction(DisplayMixin):
     intervals: Intervals | None = field(default=None, repr=False)
     """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
-    """Band over the places that the placement leaves open; None where there are none, or none was asked for."""
+    """Band over the poses that the placement leaves open; None where there are none, or none was requested."""
     motion: Motion = "held"
     """Lateral motion and tilt held, or released."""
     interval_of: str = ""
     """Whose the intervals are, in half a sentence; empty without a posterior."""
     lying: SteadyState | None = None
-    """Where a free robot comes to lie in its tube, from where it was laid down (`placement`); None for others."""
+    """Steady state of a free robot in its tube after its release (`placement`); None for others."""
     choice: ModelChoice | None = None
-    """Why the model was taken; None where nobody asked."""
+    """Reason of the model; None where it was named."""
     tail_rate: float | None = None
-    """Lab rate of the tail that was asked for, rad/s; None: the robot's drive."""
+    """Requested lab rate of the tail, rad/s; None: the robot's drive."""
     fitted_by: str = ""
     """File of a calibration or a posterior whose values act on the answer; empty without one."""
     released: Mapping[str, Callable[[], ReleasedMotion]] = field(default_factory=dict, repr=False, compare=False)
-    """What gives `trial` and `steady`, in seconds; empty where the held motion alone, or a free one, was asked for."""
+    """Request for `trial` and `steady`, in seconds; empty where the held motion alone, or a free one, was requested."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -108,13 +108,13 @@ class Prediction(DisplayMixin):
 
     @cached_property
     def placement(self) -> dict[str, Any]:
-        """Where the model places the robot; what a band goes over has `low`, `high` and `kind` too."""
+        """Pose that the model takes; fields with a band have `low`, `high` and `kind` too."""
         found = self.model.placement_of(self.batch)
         return found if self.band is None else self.band.placed(found)
 
     @property
     def answered_by(self) -> dict[str, str]:
-        """The model, its `form` of several, `model_reason` where nobody named one, `fitted_by` where a file was."""
+        """The model, its `form` of several, `model_reason` where none was named, `fitted_by` where a file was."""
         form = {} if self.model.form is None else {"form": self.model.form}
         reason = {"model_reason": self.choice.reason} if self.choice is not None and self.choice.reason else {}
         fitted = {"fitted_by": self.fitted_by} if self.fitted_by else {}
@@ -122,7 +122,7 @@ class Prediction(DisplayMixin):
 
     @cached_property
     def other_models(self) -> OtherModels | None:
-        """What models say that leave out what this one knows; None where none can be held against it."""
+        """Predictions of models that leave out effects which this one includes; None where none is comparable."""
         if self.lying is not None and self.lying.state == "changing":
             return None
         return other_models(
@@ -150,7 +150,7 @@ class Prediction(DisplayMixin):
         return sorted({*super().__dir__(), *_QUANTITIES})
 
     def _shown(self) -> tuple[dict[str, Any], list[str]]:
-        """See `DisplayMixin`: the quantities that matter most, without what other models say."""
+        """See `DisplayMixin`: the headline quantities, without those of other models."""
         answer = self.to_dict(others=False)
         return answer, headline(answer)
 
@@ -251,9 +251,9 @@ def predict(
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        band: answer with the band over what the placement leaves open, or at the reference place alone; None: with it
+        band: answer with the band over unknown gap and pitch, or at the reference pose alone; None: with it
             where the robot has a table, without which it takes minutes.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `rft` or
+        motion: `held` (lateral motion and tilt constrained) or `free`. Free with `rft` or
             `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.
@@ -348,7 +348,7 @@ def free_in_tube(fitted_by: str) -> str:
     """What a free motion in the tube rests on."""
     computed = f"walls, weight and contact are computed, {what_is_fitted(fitted_by)}"
     where = " where it has none" if fitted_by else ""
-    return f"{computed}; roughness and dry friction are assumed{where}"
+    return f"{computed}; roughness and dry friction are assumed{where}; contact is not validated against an experiment"
 
 
 def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
@@ -378,12 +378,12 @@ def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Pos
 
 
 def _without_fitted_friction(robot: Robot) -> Robot:
-    """The robot as its user knows it: nobody set the B_eff that a calibration brought."""
+    """The robot of the user's file: without the B_eff of a calibration."""
     return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
 
 
 def _check_band(model: str) -> None:
-    """Refuse a band of a model that knows no places."""
+    """Refuse a band of a model without a pose."""
     walled = [name for name, known in SWIMMER_MODELS.items() if known.placed]
     if model not in walled:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Motion of a robot after release in its tube, as data: the columns that stand beside its held answer."""
+"""Motion of a robot after release in its tube, as data: the columns beside its held answer."""
 
 from __future__ import annotations
 
@@ -7,11 +7,27 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from spirillum.envelope import quantity
+from spirillum.errors import InputError, did_you_mean
 from spirillum.quantities import QUANTITIES
+
+HELD, RELEASED = "held", "trial"
+"""What a robot in its tube may be asked for, where one of both answers."""
+
+
+def check_released(answer: str) -> None:
+    """Refuse a word that is neither of both.
+
+    Raises:
+        InputError: if it is none.
+    """
+    if answer not in (HELD, RELEASED):
+        raise InputError(
+            f"answer = {answer[:40]!r}{did_you_mean(answer, (HELD, RELEASED))}; allowed: {HELD}, {RELEASED}"
+        )
 
 
 class TrialInterval(NamedTuple):
-    """A quantity of a trial over what nobody knows of it."""
+    """A quantity of a trial over its unknowns."""
 
     median: float
     low: float
@@ -32,7 +48,7 @@ class ReleasedMotion:
     basis: Mapping[str, Any] = field(default_factory=dict)
     """What the motion rests on, and what became of the robot, as entries of its JSON."""
     intervals: Mapping[str, TrialInterval] = field(default_factory=dict)
-    """Of the quantities, over what nobody knows; none where they were not asked for."""
+    """Intervals of the quantities over the unknowns; none where they were not requested."""
     reason: str = ""
     """Why there is none, in a sentence; empty where there is one."""
 

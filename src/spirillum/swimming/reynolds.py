@@ -22,7 +22,7 @@ from spirillum.units import show
 LOW_REYNOLDS = 0.1
 """Reynolds number above which an answer has a warning."""
 BEYOND_STOKES = 10.0
-"""Reynolds number above which inertia rules: an answer is refused unless asked for."""
+"""Reynolds number above which inertia dominates: an answer is refused unless `beyond_stokes` is set."""
 _INERTIA = "inertia is neglected (Stokes flow)"
 _BODY, _TAIL, _FLOW = "reynolds-number", "tail-reynolds-number", "flow-reynolds-number"
 

@@ -1,4 +1,4 @@
-"""A robot with its hydrodynamic model, loaded, in its place in the channel and inside the model's domain."""
+"""A robot with its hydrodynamic model, loaded, at its pose in the channel and inside the model's domain."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from spirillum.swimming.steady import requirements
 from spirillum.units import show
 
 _GAP_STEP = 1.02
-"""Ratio of gaps to which the least one that a model resolves is told."""
+"""Ratio of gaps to which the least one that a model resolves is determined."""
 
 
 def prepared(
@@ -35,7 +35,7 @@ def prepared(
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
-    """A loaded robot with its model and batch, in its place and inside the model's domain.
+    """A loaded robot with its model and batch, at its pose and inside the model's domain.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -58,7 +58,7 @@ def prepared(
 
 
 def check_domain(robot: Robot, model: SwimmerModel, batch: RobotBatch) -> None:
-    """Refuse a robot in its place, a batch of one, outside a model's domain."""
+    """Refuse a robot at its pose, a batch of one, outside a model's domain."""
     check_placement(batch.placement, model)
     outside = broken(requirements(batch, quickest(model, batch)))
     if outside:

@@ -58,7 +58,7 @@ class Scenario:
     """Whether the robot itself, before the fit, states its effective friction."""
 
     def swim(self, batch: RobotBatch, model: SwimmerModel | None = None) -> Swimming:
-        """Steady swimming of the robot in some places, by its model or by another."""
+        """Steady swimming of the robot at some poses, by its model or by another."""
         model = model or self.model
         return swim_on_floor(
             batch,
@@ -72,7 +72,7 @@ class Scenario:
         )
 
     def checked(self) -> list[Swimming]:
-        """Steady swimming at other resolutions, which tell the error; none where the model is checked by none."""
+        """Steady swimming at other resolutions, for the error estimate; none where the model has none."""
         return [self.swim(self.batch, other) for other in self.model.checked_by(self.batch)]
 
     def error_estimate(self, result: Swimming, checks: Sequence[Swimming]) -> float:

@@ -101,7 +101,7 @@ def swim(
         motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
         friction: reading of the friction; None: the robots' own.
         calibrated: apply the robots' calibration factors for this model.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free` (released; without weight).
+        motion: `held` (lateral motion and tilt constrained) or `free` (released; without weight).
 
     Returns:
         One value for each robot; NaN and `valid = False` where a robot cannot be built, is outside the model's

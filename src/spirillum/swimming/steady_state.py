@@ -1,4 +1,4 @@
-"""Where a robot comes to lie that is free to move in its tube, as data."""
+"""Steady state of a free robot in its tube, as data."""
 
 from __future__ import annotations
 
@@ -9,13 +9,25 @@ from typing import Any, Literal
 from spirillum.envelope import quantity
 
 State = Literal["steady", "orbits", "goes around", "changing"]
-"""A place that every turn of the tail brings back; that but for the azimuth, without weight; around the tube, against
-its weight; or none of these within the turns that were followed."""
+"""A fixed point of the return map; one up to the azimuth, without weight; motion around the tube, against its weight;
+or none of these within the turns that were followed.
+"""
+
+END_STATES = {
+    "reaches-end": "nose or tail reached an end of the channel",
+    "left-table": "the robot tilted farther than its table of resistances is followed",
+    "standing": "the robot stands still: dry friction holds it, or its drive is off",
+    "orbit": "the robot went around the tube against its weight",
+    "ceiling": "the robot swims along the upper half of the tube",
+    "steady": "speed and tail rate are steady over turns of the tail",
+    "changing": "the motion still changes",
+}
+"""Final states of a released robot, the first that applies, and what they mean."""
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """The place of a free robot in its tube over its last turn of the tail (around the tube: over the last circuit).
+    """Pose of a free robot in its tube over its last turn of the tail (around the tube: over the last circuit).
 
     SI; azimuths about +x from the lowest place, pitch away from the wall, yaw to +y at the lowest place.
     """
@@ -37,7 +49,7 @@ class SteadyState:
     contact_force: float
     """Load on asperities, mean, N."""
     time: float
-    """For how long the motion was followed from where it was laid down, s."""
+    """Time over which the motion was followed since release, s."""
     approach_time: float
     """Time constant with which a small distance from the steady motion decays, s; NaN where there is none."""
     ended: str = ""

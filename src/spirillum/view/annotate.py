@@ -242,7 +242,7 @@ def annotated_film(
     period: float = 2.0 * math.pi,
     waiting: int = 8,
 ) -> Iterator[Callable[[int, np.ndarray, AnnotatedFrame], None]]:
-    """Video of annotated frames at their true times, rendered and encoded by a thread of its own.
+    """Video of annotated frames at their true times, rendered and encoded in a separate thread.
 
     Args:
         path: the file, `.mp4`.

@@ -34,7 +34,7 @@ class Degradation(Options):
     noise: Annotated[float, BeforeValidator(in_range(0.0, 64.0))] = 0.0
     """Standard deviation of the noise, in steps of 255; independent in every pixel and colour."""
     lamp_drift: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
-    """Share by which the lamp's brightness changes; its colour by a quarter of that."""
+    """Relative change of the lamp's brightness."""
     crf: Annotated[int, BeforeValidator(whole(0, 51))] = 18
     """Constant rate factor of the compression (H.264), 0 (lossless) to 51."""
     dropped: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
@@ -114,7 +114,7 @@ class Troubles(Options):
     mirrored_lamps: Annotated[int, BeforeValidator(whole(0, 8))] = 0
     """Number of lamps that the oil's surface mirrors into the picture."""
     grid_paper: Annotated[bool, Field(strict=True)] = False
-    """Whether grid paper lies under the tube, instead of a ruler beside it."""
+    """Whether grid paper is under the tube, instead of a ruler beside it."""
     glass_cover: Annotated[bool, Field(strict=True)] = False
     """Whether the body before its seal is a cover of glass with a battery and a board inside, as the paper's."""
 

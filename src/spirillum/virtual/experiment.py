@@ -151,7 +151,7 @@ def virtual_experiment(
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         seed: of all random numbers.
-        jobs: trials that are rendered at the same time, 1 to 64.
+        jobs: number of parallel renderings, 1 to 64.
         progress: told what is done, how many trials are done, and how many there are.
 
     Returns:
@@ -222,7 +222,7 @@ class _Filmed(NamedTuple):
     model: str
     """The study's first."""
     placement: Placement | None
-    """Where the study says that robots lie."""
+    """Poses of the robots in the study."""
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
+from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.virtual.optics import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 _USUAL = 20.0
 """Length of a video of steady swimming, s."""
 _LARGEST_STEP = 0.5 * np.pi
-"""Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
+"""Largest turn of the tail between two samples of a run above which a video states that it interpolates, rad."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class TrialMotion:
     warnings: tuple[Note, ...] = ()
     reason: str = ""
     """Why the model was taken; empty where it was named."""
+    motion: str = HELD
+    """`held`, `trial`, `run`, or `prescribed`."""
 
 
 def steady_rates(
@@ -113,7 +117,45 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         body_angle=trial.body_angle,
         tail_phase=trial.tail_phase,
     )
-    return TrialMotion(trajectory, source, warnings, reason)
+    return TrialMotion(trajectory, source, warnings, reason, "prescribed" if source == "prescribed" else HELD)
+
+
+def motion_of_trial(
+    robot: Robot,
+    motion: MotionOptions,
+    trial: TrialOptions,
+    camera: CameraOptions,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> TrialMotion:
+    """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults.
+
+    Args:
+        robot: a checked robot.
+        motion: the friction model; the rates follow from the run.
+        trial: duration, and the gap at which the robot is released.
+        camera: where the camera stands.
+        progress: told what is being computed, how much is done, and of how much.
+    """
+    from spirillum.dynamics.simulation import simulate
+
+    choice = choose_model(motion.model or AUTO, robot)
+    if choice.model != WALLED:
+        raise InputError(
+            f"run = 'trial' with model '{choice.model}', which has no walls to rest on; allowed: a robot in a channel "
+            f"with model '{WALLED}'"
+        )
+    given = [name for name in ("forward_velocity", "body_rate", "tail_rate") if getattr(motion, name) is not None]
+    if given:
+        raise InputError(f"{given[0]} with run = 'trial', which follows from the drive; allowed: one of them")
+    run = simulate(
+        robot,
+        model=WALLED,
+        friction=motion.friction,
+        timing={} if trial.duration is None else {"duration": trial.duration},
+        placement=None if trial.gap is None else {"gap": trial.gap},
+        progress=progress,
+    )
+    return replace(motion_of_run(robot, run, trial, camera), motion=RELEASED, reason=choice.reason)
 
 
 def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
@@ -136,7 +178,8 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     model = str(run.attrs.get("model", ""))[:60]
     if trial.duration is not None:
         trajectory = trajectory.until(trial.duration)
-    return TrialMotion(trajectory, f"run, {model}" if model else "run", _between_samples(trajectory))
+    source = f"run, {model}" if model else "run"
+    return TrialMotion(trajectory, source, _between_samples(trajectory), motion="run")
 
 
 def _between_samples(trajectory: TrialTrajectory) -> tuple[Note, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.kernels.raster import shade
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, corner_normals
@@ -74,6 +75,7 @@ def part_of(piece: RobotMesh, chosen: np.ndarray) -> RobotMesh:
 
 def _box(along: tuple[float, float], half: Samples, colour: tuple[float, float, float], z: float = 0.0) -> RobotMesh:
     """A box about the axis, or shifted to z."""
+    import_optional("trimesh", "the contents of a glass cover")
     from trimesh.creation import box
 
     bounds = np.array([[along[0], -half[0], z - half[1]], [along[1], half[0], z + half[1]]])
@@ -168,6 +170,7 @@ def solids_of(
         edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
         covered: whether a glass cover, which is not one of them, stands before the seal.
     """
+    robot.check_body("the virtual camera")
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
     if edges is not None:
         pieces = tuple(

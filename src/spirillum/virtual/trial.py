@@ -33,6 +33,7 @@ from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
 from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.version import versions
 from spirillum.virtual.artifacts import (
     Degradation,
@@ -44,7 +45,7 @@ from spirillum.virtual.artifacts import (
 )
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.framing import check_size, framed, lens_of, out_of_picture
-from spirillum.virtual.motion import motion_of, motion_of_run
+from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, motion_of_trial
 from spirillum.virtual.optics import Tank, VirtualLens, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
@@ -163,6 +164,8 @@ class VirtualTrial(DisplayMixin):
     warnings: tuple[Note, ...] = ()
     model_reason: str = ""
     """Why the model was taken; empty where it was named."""
+    motion: str = HELD
+    """`held`, `trial`, `run`, or `prescribed`."""
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
@@ -170,6 +173,7 @@ class VirtualTrial(DisplayMixin):
             "robot": self.robot.name,
             "synthetic": True,
             "model": self.model,
+            "motion": self.motion,
             **({"model_reason": self.model_reason} if self.model_reason else {}),
             "video": str(self.path),
             "setup": str(self.setup),
@@ -193,6 +197,30 @@ def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
             if name not in ("duration", "start") and getattr(options, name) not in (getattr(usual, name), AUTO):
                 value = str(getattr(options, name))[:60]
                 raise InputError(f"{name} = {value} with a run, which has its own; allowed: duration and start alone")
+
+
+def _shown(
+    robot: str | Path | Mapping[str, Any] | Robot | None,
+    run: xr.Dataset | str | Path | None,
+    motion: MotionOptions,
+    trial: TrialOptions,
+    camera: CameraOptions,
+    progress: Callable[[str, int, int], None] | None,
+) -> tuple[Robot, TrialMotion]:
+    """The robot of a video and its motion."""
+    from spirillum.dynamics.run_file import open_run, robot_of
+
+    if run is None or (isinstance(run, str) and run == RELEASED):
+        if robot is None:
+            raise InputError("no robot; allowed: a preset's name or a robot file, or a run, which has its own")
+        own = load(robot)
+        if run is None:
+            return own, motion_of(own, motion, trial, camera)
+        return own, motion_of_trial(own, motion, trial, camera, progress)
+    dataset = open_run(run) if isinstance(run, str | Path) else run
+    _check_not_of_run(motion, trial)
+    own = robot_of(dataset) if robot is None else load(robot)
+    return own, motion_of_run(own, dataset, trial, camera)
 
 
 def render(
@@ -220,7 +248,8 @@ def render(
         robot: a preset's name, a robot file, its tables, or a loaded robot; None: that of the run.
         path: the video (`.mp4`), or a new folder of PNG files (without an ending).
         motion: `MotionOptions`: the model of steady swimming, and prescribed rates.
-        run: a run of `spirillum.simulate` instead, or its file.
+        run: instead of steady swimming at a held pose, a run of `spirillum.simulate` or its file; or `trial`: the run
+            of a trial of the robot in its tube, as `predict` and `simulate` have it by their defaults.
         trial: `TrialOptions`: duration, and the robot's pose at the first frame.
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
@@ -236,25 +265,14 @@ def render(
     Raises:
         InputError: for wrong input, or a target that cannot be written.
     """
-    inputs = [item for item in (robot, run) if isinstance(item, (str, Path))]
+    inputs = [item for item in (robot, run) if isinstance(item, (str, Path)) and item != RELEASED]
     with guard_inputs(*inputs):
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
     degradation = degradation if target.suffix == ".mp4" else degradation.uncompressed()
     seed, setup_errors = Seeded.of({"seed": seed}).seed, SetupErrors.of(setup_errors)
-    from spirillum.dynamics.run_file import open_run, robot_of
-
-    if run is None:
-        if robot is None:
-            raise InputError("no robot; allowed: a preset's name or a robot file, or a run, which has its own")
-        robot = load(robot)
-        shown = motion_of(robot, motion, trial, camera)
-    else:
-        dataset = open_run(run) if isinstance(run, str | Path) else run
-        _check_not_of_run(motion, trial)
-        robot = robot_of(dataset) if robot is None else load(robot)
-        shown = motion_of_run(robot, dataset, trial, camera)
+    robot, shown = _shown(robot, run, motion, trial, camera, progress)
     tank = tank_of(robot, camera.view, camera.shrunk, grid=troubles.grid_paper)
     lens = lens_of(camera, tilt_of(degradation, seed))
     check_size(robot, tank, lens)
@@ -282,6 +300,7 @@ def render(
         fps=camera.fps,
         seed=seed,
         model_reason=shown.reason,
+        motion=shown.motion,
         warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens), *_idle_seed(seed, degradation, troubles)),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
@@ -321,7 +340,7 @@ def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles,
 
 
 def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:
-    """A sentence on a seed of a film of which nothing is drawn at random; none without a seed."""
+    """A sentence on a seed of a video that uses no random numbers; none without a seed."""
     plain = Degradation(crf=degradation.crf)
     if not seed or degradation != plain or troubles.uses_seed:
         return []

@@ -46,7 +46,7 @@ def _check_field(width: float) -> float:
 
 
 def _read_frame_rate(value: Any) -> float:
-    """Frames a second, as the nearest fraction that a video can hold."""
+    """Frames per second."""
     return float(Fraction(in_range(1.0, 1000.0, " frames a second")(value)).limit_denominator(1001))
 
 
@@ -101,7 +101,7 @@ class CameraOptions(Options):
     direction: Annotated[Literal["right", "left"], BeforeValidator(one_of("right", "left"))] = "right"
     """Where the nose points in the picture, `right` or `left`."""
     fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0
-    """Frames a second, as the nearest fraction that a video can hold."""
+    """Frames per second."""
     size: Annotated[tuple[int, int], BeforeValidator(_read_size)] = (640, 480)
     """Width and height in pixels, even numbers, or ``"640x480"``."""
     exposure: Time = 1.0 / 120.0
@@ -136,9 +136,9 @@ class SetupErrors(Options):
     argument: ClassVar[str] = "setup_errors"
 
     depth_error: SignedLength = 0.0
-    """By which the setup's height of the robot's axis is wrong; the stated axis stays in the oil."""
+    """Planted error of the setup's height of the robot's axis."""
     depth_uncertainty: LengthOrZero = 0.0
-    """Standard uncertainty of that height that the setup states."""
+    """Standard uncertainty of that height in the setup."""
 
 
 class Seeded(Options):

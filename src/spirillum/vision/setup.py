@@ -169,7 +169,9 @@ def load_setup(path: str | Path) -> tuple[Setup, Robot]:
         raise refused_table(checked, str(path))
     name = checked.robot.file
     beside = path.parent / name
-    return checked, load(beside if beside.is_file() else name)
+    robot = load(beside if beside.is_file() else name)
+    robot.check_body("the tracker, which follows the body's outline,")
+    return checked, robot
 
 
 def stripes_of(setup: Setup, robot: Robot) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from spirillum.cli.tables.parts import Answer, Blocks
 _MODULES = {
     "motion": "prediction model_comparison simulation magnetic_sweep settling flow remote control",
     "fits": "calibration model_ranking suggestion observations",
-    "studies": "study study_store design",
+    "studies": "study study_store design validation",
     "robots": "robot check export resistance preparation preparations report",
     "videos": "measurement feasibility track setup_check setup_proposal",
     "films": "virtual_experiment virtual_trial film show recording",

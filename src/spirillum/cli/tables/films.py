@@ -30,7 +30,8 @@ def virtual_trial(answer: Answer) -> Blocks:
     yield f"{answer['video']}: synthetic, {said}"
     names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate")
     true = {name: answer[name] for name in names}
-    yield quantity_grid(f"{answer['robot']}: true motion, {answer['model']}", true)
+    motion = f", {answer['motion']}" if answer["motion"] in ("held", "trial") else ""
+    yield quantity_grid(f"{answer['robot']}: true motion, {answer['model']}{motion}", true)
     yield from reason_of(answer)
 
 

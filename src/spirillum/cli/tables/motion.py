@@ -32,6 +32,7 @@ from spirillum.dynamics.run_summary import told
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.steady_quantities import headline
+from spirillum.swimming.steady_state import END_STATES
 from spirillum.units import display_unit, in_unit
 
 
@@ -77,7 +78,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
 
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
-"""What follows from other rows, and stands in the JSON only."""
+"""Rows that follow from others and are in the JSON only."""
 _SHORT = {
     "forward_velocity": "speed",
     "tail_rotation_rate": "tail",
@@ -101,7 +102,7 @@ def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
             yield Detail(_own_error(item))
         else:
             yield f"no answer by {item['model']}: {item['reason']}"
-    yield from files_of(answer, file="picture")
+    yield from files_of(answer, file="picture", plot="why models differ")
 
 
 def _side_by_side(answer: Answer, models: Sequence[Answer]) -> Blocks:
@@ -205,11 +206,18 @@ def simulation(answer: Answer) -> Blocks:
         yield from placement_of(answer["placement"])
     if "in_tube" in answer:
         yield _in_tube(answer["in_tube"])
+    if "state" in answer:
+        yield _end_state(answer)
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
     yield Detail(f"last 2/3: over the last two thirds of {whole}, on or off")
     yield Detail(f"steady: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
+
+
+def _end_state(answer: Answer) -> Detail:
+    """The state in which a released robot ends, and what it means."""
+    return Detail(f"state at the end: {answer['state']} ({END_STATES[answer['state']]})")
 
 
 def _in_tube(pose: Answer) -> Detail:
@@ -359,6 +367,7 @@ def control(answer: Answer) -> Blocks:
         yield f"learnt: {_learnt(answer['learnt'], answer['drawn'])}"
     if answer["scores"] is not None:
         yield from _scores(answer["scores"], answer["error"]["unit"])
+    yield Detail(f"start: {answer['start']}")
     yield from reason_of(answer)
     yield from files_of(answer, plot="plot", movie="movie", file="run")
 

@@ -80,7 +80,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
 
 
 RELEASED_COLUMNS = ("trial", "steady")
-"""Entries of an answer that stand beside the held one."""
+"""Entries of an answer beside the held one."""
 
 
 def released_columns(answer: Answer) -> Iterator[Block]:
@@ -129,7 +129,7 @@ def files_of(answer: Answer, **words: str) -> Iterator[str]:
 
 
 def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]:
-    """Where the model places the robot, unless nothing is around it; `head` begins the line."""
+    """The pose that the model takes, unless nothing is around the robot; `head` begins the line."""
     if len(placement) == 1:
         return
     said = [str(placement["kind"])]
@@ -152,7 +152,7 @@ def unsteady(answer: Answer) -> Iterator[str]:
 
 
 def resting_pose(lying: Answer) -> Iterator[Detail]:
-    """How a free robot moves in the end; the line before it says where it was released."""
+    """Final motion of a free robot; the line before it states its release."""
     said = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
@@ -190,7 +190,7 @@ def _band_words(item: Mapping[str, Any]) -> str:
 
 
 def reason_of(answer: Answer) -> Iterator[Detail]:
-    """Why this model answers, where nobody named one."""
+    """Reason of the model, where it was chosen automatically."""
     if "model_reason" in answer:
         yield Detail(f"model {answer['model']}: {answer['model_reason']}")
 

@@ -35,7 +35,9 @@ def robot(answer: Answer) -> Blocks:
 def _word(value: Any) -> str:
     if value is None:
         return "-"
-    if isinstance(value, tuple):
+    if isinstance(value, (tuple, list)):
+        if value and isinstance(value[0], (tuple, list)):
+            return f"{len(value)} points"
         return escape(", ".join(str(item) for item in value)) or "-"
     return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
 

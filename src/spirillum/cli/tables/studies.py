@@ -114,7 +114,7 @@ _SHOWN = (
     "shaft_power",
     "hydrodynamic_efficiency",
 )
-"""Quantities of a design that stand in the table; all are in the JSON."""
+"""Quantities of a design in the table; all are in the JSON."""
 
 
 def design(answer: Answer) -> Blocks:
@@ -130,9 +130,31 @@ def design(answer: Answer) -> Blocks:
     if "probability" in answer.get("uncertainty", {}):
         yield f"probability that the target is met: {_share(answer['uncertainty']['probability'])}"
     yield from _basis_of_design(answer)
+    if any("reason" not in one["trial"] for one in answer.get("confirmed", ())):
+        yield _confirmed(answer["confirmed"])
+    for reason in dict.fromkeys(
+        one["trial"]["reason"] for one in answer.get("confirmed", ()) if "reason" in one["trial"]
+    ):
+        yield Detail(f"no trial of designs: {reason}")
     if "front" in answer:
         yield _front(answer["front"])
     yield from files_of(answer, file="robot file", picture="picture", stl="body for a printer")
+
+
+def _confirmed(designs: Sequence[Answer]) -> Table:
+    """Held and trial of the best designs."""
+    paths = list(designs[0]["design"])
+    units = {
+        path: display_unit(designs[0]["design"][path]["value"], designs[0]["design"][path]["unit"]) for path in paths
+    }
+    rows = grid("the best designs", *(f"{path}, {unit}".removesuffix(", 1") for path, unit in units.items()))
+    for column in ("held, mm/s", "trial, mm/s"):
+        rows.add_column(column, justify="right")
+    for one in designs:
+        cells = [in_unit(one["design"][path]["value"], one["design"][path]["unit"], units[path]) for path in paths]
+        speeds = [one[motion].get("forward_velocity", {"value": None})["value"] for motion in ("held", "trial")]
+        rows.add_row(*cells, *(in_unit(speed, "m/s", "mm/s") for speed in speeds))
+    return rows
 
 
 def _best_values(answer: Answer) -> Table:
@@ -161,10 +183,17 @@ def _basis_of_design(answer: Answer) -> Iterator[Detail]:
         yield Detail(f"bound by: {'; '.join(answer['bound_by'])}")
     if "learned" in answer:
         known = answer["learned"]
-        best, rest = (percent(known[name]["value"]) for name in ("error_of_the_best", "error_left_out"))
+        errors = {
+            "the objective of the best was": "error_of_the_best",
+            "those of the better half, each left out, were": "error_left_out",
+        }
+        missed = [
+            f"{whose} missed by {percent(known[name]['value'])}"
+            for whose, name in errors.items()
+            if known[name]["value"] is not None
+        ]
         yield Detail(
-            f"learned from {known['solves']} designs that were solved for: the objective of the best was missed by "
-            f"{best}, those of the better half, each left out, by {rest}"
+            f"learned from {known['solves']} designs that were solved for: {', '.join(missed) or 'exact there'}"
         )
     counts = answer["designs"]
     yield Detail(
@@ -196,3 +225,27 @@ def _front(front: Mapping[str, Answer]) -> Table:
         cells = zip(row, front, strict=True)
         rows.add_row(*(in_unit(value, front[name]["unit"], units[name]) for value, name in cells))
     return rows
+
+
+def validation(answer: Answer) -> Blocks:
+    """A line for each case, then a row for each quantity of `validate`: published, ours, difference, error, covered."""
+    left = [row for row in answer["rows"] if not row["as_recorded"]]
+    count = sum(row["covered"] is True for row in answer["rows"])
+    published = sum(row["published"] is not None for row in answer["rows"])
+    cases = counted(len(answer["cases"]), "case")
+    yield f"{cases}, nothing fitted: {count} of {published} published numbers covered by stated errors and assumptions"
+    for row in left:
+        ends = " to ".join(f"{row['recorded'][end]:.4g}" for end in ("low", "high"))
+        where = f"{row['case']}, {row['point']}, {row['quantity']}"
+        yield f"left its recorded range: {where}: {row['ours']:.4g}, not {ends}"
+    table = grid("", "case", "quantity", "ours/published", "sd", "rows", "covered")
+    for case in answer["cases"]:
+        for one in case["ratios"]:
+            cells = f"{one['mean']:.2f}", f"{one['deviation']:.2f}" if one["count"] > 1 else "", str(one["count"])
+            table.add_row(case["case"], escape(one["quantity"]), *cells, str(one["covered"]))
+        for verdict in dict.fromkeys(claim["verdict"] for claim in case["statements"]):
+            number = sum(claim["verdict"] == verdict for claim in case["statements"])
+            table.add_row(case["case"], f"statements: {verdict}", "", "", str(number), "")
+    yield table
+    yield from files_of(answer, folder="report")
+    yield from (Detail(f"{case['case']}: {' '.join(case['explanation'].split())}") for case in answer["cases"])

@@ -68,13 +68,20 @@ def semi_axes(batch: RobotBatch) -> tuple[PerRobot, PerRobot]:
 
 def body_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot]:
     """D_x (N s/m) and E_x (N m s) of the isolated body, dimensional as in eq. (16)."""
-    drag = spheroid_drag(batch.viscosity, *semi_axes(batch))
+    drag = _drag_of(batch)
     return drag.axial, drag.axial_rotation
+
+
+def _drag_of(batch: RobotBatch) -> SpheroidDrag:
+    """Drag of the body; none without one."""
+    if batch.shape == "none":
+        return SpheroidDrag(*(np.zeros_like(batch.viscosity) for _ in SpheroidDrag._fields))
+    return spheroid_drag(batch.viscosity, *semi_axes(batch))
 
 
 def body_matrix(batch: RobotBatch) -> Matrix6:
     """B_b of eq. (16) about the body's mid-length, where G = 0."""
-    drag = spheroid_drag(batch.viscosity, *semi_axes(batch))
+    drag = _drag_of(batch)
     entries = (drag.axial, drag.transverse, drag.transverse)
     rotations = (drag.axial_rotation, drag.transverse_rotation, drag.transverse_rotation)
     diagonal = np.stack(np.broadcast_arrays(*entries, *rotations), axis=-1)

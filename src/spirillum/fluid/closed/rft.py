@@ -158,11 +158,19 @@ def _domain_of_the_set(batch: RobotBatch) -> list[Limit]:
 
 _PANELS_PER_TURN = 7
 _NODES_PER_PANEL = 16  # 112 nodes per wavelength; the paper uses at least 100 intervals
+_FLOOR_PHASES = 32
+"""Phases over which entries near a floor are averaged for a wire without a closed form."""
 _ROOT_BREAKS = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 18.0, 26.0, 38.0])
 
 
 def tail_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
-    """B_t of eq. (12) about the origin, by Gauss-Legendre quadrature along the wire."""
+    """B_t of eq. (12) about the origin, of all wires: they do not feel each other."""
+    wires = [_wire_matrix(batch, phase + turn) for turn in batch.form.turns]
+    return wires[0] if len(wires) == 1 else np.sum(wires, axis=0)
+
+
+def _wire_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
+    """Of one wire, by Gauss-Legendre quadrature along it."""
     fraction, weight = _along_the_wire(batch)
     b = batch
     columns = {
@@ -175,12 +183,8 @@ def tail_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
         "phase": phase,
     }
     columns = {name: column[:, None] for name, column in columns.items()}
-    line = centreline(fraction * columns["length"], **columns)
-    ds = (
-        weight
-        * columns["length"]
-        * (line.stretch if b.options.rft.arc_element == "true" else 1.0 / b.arc_fraction[:, None])
-    )
+    line = centreline(fraction * columns["length"], form=b.form, **columns)
+    ds = weight * columns["length"] * (line.stretch if _has_true_arc(b) else 1.0 / b.arc_fraction[:, None])
     local = _local_matrix(batch, line.tangent)
     arm = skew(line.position)
     upper = np.concatenate([local, -local @ arm], axis=-1)
@@ -191,10 +195,17 @@ def tail_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
     return total
 
 
+def _has_true_arc(batch: RobotBatch) -> bool:
+    """Whether the arc element is the wire's own: (l/L_t) dx is that of one helix."""
+    return batch.options.rft.arc_element == "true" or not batch.form.is_helix
+
+
 def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
     """Nodes and weights on [0, 1] of the axial length: even panels, finer where the tapered root bends."""
     turns = float(np.max(batch.tail_length / batch.wavelength))
-    breaks = [np.linspace(0.0, 1.0, int(np.ceil(_PANELS_PER_TURN * turns)) + 1)]
+    form = batch.form
+    pieces = max(_PANELS_PER_TURN * turns, 0.5 * len(form.curve), 4 * len(form.amplitude + form.wavelength))
+    breaks = [np.linspace(0.0, 1.0, int(np.ceil(pieces)) + 1)]
     breaks += [_ROOT_BREAKS / c for c in np.unique(batch.taper[np.isfinite(batch.taper)])]
     edges = np.unique(np.concatenate(breaks))
     edges = edges[edges <= 1.0]
@@ -233,7 +244,22 @@ class _Integrand(NamedTuple):
 
 
 def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """(B11, B14, B44) of eq. (12), averaged over the tail's phase where a floor makes them depend on it.
+    """(B11, B14, B44) of eq. (12), averaged over the tail's phase where a floor makes them depend on it."""
+    one = _helix_axial(batch) if batch.form.is_helix else _wire_axial(batch)
+    drag, coupling, rotation = (batch.form.starts * entry for entry in one)
+    return drag, coupling, rotation
+
+
+def _wire_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """Of a wire of any form; with a floor averaged over phases."""
+    phases = _FLOOR_PHASES if batch.options.rft.coefficients == "brennen-winet" else 1
+    turns = 2.0 * np.pi * np.arange(phases) / phases
+    matrix = np.mean([_wire_matrix(batch, np.full(1, turn)) for turn in turns], axis=0)
+    return matrix[:, 0, 0], matrix[:, 0, 3], matrix[:, 3, 3]
+
+
+def _helix_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """Of one helix.
 
     Away from the root the tail is a plain helix, whose integrand is constant; what the taper changes is
     integrated in w = exp(-c xi/L_t) by Gauss-Legendre nodes in tau, sinh(tau) = (B_o c/L_t) w, where the

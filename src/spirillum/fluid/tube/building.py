@@ -185,7 +185,7 @@ def _nodes(places: Places) -> list[NodeSolution]:
     """Nodes without yaw, then those with yaw, of the robot and of its mirror image."""
 
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
-        return places.geometry, even_phases(place.phases)
+        return places.geometry, even_phases(place.phases, places.geometry.form.starts)
 
     level = [NodeSolution((tail(place),), place.seat, places.fineness(place.t, place.seat)) for place in _level(places)]
     yawed = [
@@ -262,7 +262,8 @@ def _film_of(film: Samples, seat: Seat) -> Samples:
 
 def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the 8x8 at its nodes, and at those with yaw of the robot and of its mirror image."""
-    rest = [rest_at(m, _film_of(film, n.seat), n.t, n.seat) for n, m in zip(_level(places), level, strict=True)]
+    starts = places.geometry.form.starts
+    rest = [rest_at(m, _film_of(film, n.seat), n.t, n.seat, starts) for n, m in zip(_level(places), level, strict=True)]
     most = places.most[-1]
     on_axis = OnAxis.of(places.up * most[0], np.stack(rest[-len(places.up) :]))
     rest += [on_axis.coefficients(float(-f * most[1])) for f in places.down[1:]]
@@ -272,7 +273,7 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     if not places.stage.yawed:
         return kernel.packed(places.radius, places.rings, *parts, none, none, _NO_YAW, none, film)
     straight = kernel.packed(places.radius, places.rings, *parts, none, none, places.yaw_limit, none, film)
-    sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
+    sides = [_both_sides(film, place, starts, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
         for share in kernel.YAW_SHARES:
@@ -298,11 +299,11 @@ def _powers(middle: Samples, sides: Samples) -> Samples:
     return found
 
 
-def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> tuple[Samples, Samples]:
+def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: Samples) -> tuple[Samples, Samples]:
     """Fourier coefficients of the rest's factor with the nose to the left and to the right."""
     back = replace(place.seat, yaw=-place.seat.yaw)
-    left = rest_at(own, _film_of(film, place.seat), place.t, place.seat)
-    return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back)
+    left = rest_at(own, _film_of(film, place.seat), place.t, place.seat, starts)
+    return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back, starts)
 
 
 def _yawed_seats(places: Places) -> list[Seat]:

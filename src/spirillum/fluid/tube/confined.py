@@ -171,9 +171,9 @@ class _Link:
         )
 
 
-def share_basis(solids: Solids, tails: Sequence[Wire]) -> None:
-    """Let tails have their basis in common: it is made when the first of them is solved for."""
-    solids.tails = tuple(_turned(wire) for wire in tails)
+def share_basis(solids: Solids, tails: Sequence[Sequence[Wire]]) -> None:
+    """Let tails of one or several wires have their basis in common, made when the first of them is solved for."""
+    solids.tails = tuple(tuple(map(_turned, wires)) for wires in tails)
 
 
 def _reduced(solids: Solids, sources: Sources) -> Reduced:
@@ -184,8 +184,8 @@ def _reduced(solids: Solids, sources: Sources) -> Reduced:
     if served:
         return served[0]
     together = [sources]
-    for wire in solids.tails:
-        other = Sources.of((wire,), wire_system([(wire, 1)], solids.fineness.wire))
+    for wires in solids.tails:
+        other = Sources.of(wires, wire_system([(wire, 1) for wire in wires], solids.fineness.wire))
         if not any(other.alike(one) for one in together):
             together.append(other)
     found = Reduced.of(solids, together)

@@ -28,8 +28,8 @@ _WIDEST = 1e3
 
 def seat_of(batch: RobotBatch, index: int = 0) -> Seat:
     """Pose of robot number `index`; by default level, at a gap of `GAP_SHARE`."""
-    radius, diameter = tube_radius(batch, index), number_of(batch.body_diameter, index)
-    return Seat.of(batch.placement, RobotGeometry.of(batch, index).body, diameter, radius)
+    g = RobotGeometry.of(batch, index)
+    return Seat.of(batch.pose, g.body, g.width, tube_radius(batch, index))
 
 
 def tube_radius(batch: RobotBatch, index: int = 0) -> float:
@@ -49,7 +49,7 @@ def _tail_clearance(g: RobotGeometry, seat: Seat) -> tuple[float, str]:
 def placement_answer(batch: RobotBatch) -> dict[str, Any]:
     """Pose of the first robot of a batch, for results."""
     seat = seat_of(batch)
-    room = seat.radius - 0.5 * number_of(batch.body_diameter, 0)
+    room = seat.radius - 0.5 * RobotGeometry.of(batch).width
     found: dict[str, Any] = {
         "kind": "in the channel",
         "gap": quantity(seat.clearance(RobotGeometry.of(batch).body), "m"),
@@ -192,8 +192,8 @@ def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: fl
         if not np.isfinite(radius):
             continue
         outlines = g.outlines
-        asked[index] = gap_of(batch.placement, g.body_diameter, radius)
-        largest[index] = largest_gap(outlines["body"], radius, batch.placement.pitch or 0.0, batch.placement.yaw)
+        asked[index] = gap_of(batch.pose, g.width, radius)
+        largest[index] = largest_gap(g.body, radius, batch.placement.pitch or 0.0, batch.placement.yaw)
         if not thinnest_gap * g.body_diameter <= asked[index] <= largest[index]:
             continue
         seat = seat_of(batch, index)

@@ -20,7 +20,6 @@ from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
-from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
@@ -29,6 +28,8 @@ _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: the outer resistance is smooth below it."""
 CHECKED_FROM = 0.4
 """Least gap of a table's check poses over that of the first nodes."""
+_SWEPT = 121
+"""Points along the tail at which its clearance from the wall is computed."""
 _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
 _GROWTH = 2.0
@@ -38,8 +39,6 @@ _SPACED = 1.3
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most nodes the wall limits the tail to a smaller one."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
-_SWEPT = 121
-"""Points along the tail at which its clearance from the wall is computed."""
 _LEAST_PITCH = np.radians(0.2)
 _SEARCH_YAW = (float(np.radians(44.0)), 45, 1e-6)
 """Largest yaw that is tried, steps, and accuracy of the search for the tail's contact, rad."""
@@ -71,16 +70,20 @@ class Places:
 
     @cached_property
     def rings(self) -> Samples:
-        """See `rings_of`."""
+        """See `rings_of`.
+
+        Raises:
+            InputError: for a robot without a table.
+        """
+        if (shape := self.geometry.shape) in ("none", "profile"):
+            said = "a bare tail (body = 'none')" if shape == "none" else "a body of any profile"
+            raise InputError(f"{said} has no table in its tube; allowed: single poses, model.tube.form = 'direct'")
         return rings_of(self.geometry.body)
 
     @cached_property
     def swept(self) -> Samples:
         """Points of the wire's centreline, at angle 0 about the axis: what it sweeps does not know its wavelength."""
-        g = self.geometry
-        xi = np.linspace(0.0, g.tail_length, _SWEPT)
-        reach, _ = amplitude_envelope(xi, np.array(g.amplitude), np.array(g.tail_length), np.array(g.taper))
-        return np.stack([-0.5 * g.body_length - g.coupling_length - xi, reach, np.zeros_like(xi)], axis=1)
+        return self.geometry.swept(_SWEPT)
 
     def tail_clearance(self, seat: Seat) -> float:
         """Smallest distance between the wire's surface and the glass over a turn of the tail, m."""

@@ -26,6 +26,8 @@ HARMONICS = 4
 """Harmonics of the tail's phase that a table stores."""
 PHASES = 2 * HARMONICS + 1
 """Phases of the tail that give them all."""
+_PHASES_OF_STARTS = 5
+"""Phases of a tail with several starts: two harmonics of its period."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -128,20 +130,23 @@ def factor_of(matrix: Samples, where: str) -> Samples:
     return found
 
 
-def fourier(values: Samples, size: int = 0) -> Samples:
+def fourier(values: Samples, size: int = 0, starts: int = 1) -> Samples:
     """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0.
 
     Args:
-        values: (phases, ...).
+        values: (phases, ...), at `even_phases` of a tail with so many starts.
         size: least number of coefficients: those that so few phases do not give are zero.
+        starts: wires of the tail, by which harmonics of a turn go; those above `size` are left out.
     """
     count = len(values)
     phase = 2.0 * np.pi * np.arange(count) / count
-    rows = [np.full(count, 1.0 / count)]
+    size = max(size, count)
+    rows = np.zeros((size, count))
+    rows[0] = 1.0 / count
     for harmonic in range(1, (count - 1) // 2 + 1):
-        rows += [np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count]
-    rows += [np.zeros(count)] * (size - count)
-    found: Samples = np.tensordot(np.stack(rows), values, axes=1)
+        if (at := 2 * starts * harmonic) < size:
+            rows[at - 1], rows[at] = np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count
+    found: Samples = np.tensordot(rows, values, axes=1)
     return found
 
 
@@ -159,9 +164,11 @@ def matrices_at(coefficients: Samples, phases: Samples) -> Samples:
     return found
 
 
-def even_phases(count: int = PHASES) -> tuple[float, ...]:
-    """Evenly spread phases from 0, rad."""
-    return tuple(float(phase) for phase in 2.0 * np.pi * np.arange(count) / count)
+def even_phases(count: int = PHASES, starts: int = 1) -> tuple[float, ...]:
+    """Evenly spread phases from 0, rad; with several starts over the part of a turn after which the tail is alike."""
+    if starts > 1:
+        count = min(count, _PHASES_OF_STARTS)
+    return tuple(float(phase) for phase in 2.0 * np.pi / starts * np.arange(count) / count)
 
 
 def mirrored(g: RobotGeometry, phases: tuple[float, ...]) -> tuple[RobotGeometry, tuple[float, ...]]:
@@ -175,7 +182,7 @@ def seen_in_mirror(matrices: Samples) -> Samples:
     return found
 
 
-def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
+def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat, starts: int = 1) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36).
 
     Args:
@@ -183,8 +190,9 @@ def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
         film: of the body at that seat, (6, 6).
         t: of the place.
         seat: named where the rest is not positive definite.
+        starts: wires of the tail.
     """
     rest = matrices.copy()
     rest[:, :6, :6] -= cut_of_film(t) * film
     where = f"at an offset of {show(seat.offset, 'mm')} and a pitch of {show(seat.pitch, 'deg')}"
-    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES)
+    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES, starts)

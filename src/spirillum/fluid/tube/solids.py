@@ -87,7 +87,7 @@ class Solids:
         self.seat, self.fineness = seat, fineness
         self.parts = np.array([part for _, part in solids])
         self.kept: dict[str, object] = {}  # what others derive from the factors and want to use again
-        self.tails: tuple[Wire, ...] = ()  # those that share a basis, see `confined`
+        self.tails: tuple[tuple[Wire, ...], ...] = ()  # those that share a basis, see `confined`
         near = np.zeros((0, 3)) if lines is None else lines
         if not solids:
             return

@@ -34,6 +34,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.kernels import film_table
 from spirillum.kernels import tube_table as kernel
+from spirillum.robot.tail_form import PLAIN
 
 _REST = 3e-6
 _FILM = np.where(np.arange(film_table.ENTRIES) < len(film_table.ORDER), 2e-5, 1e-6)
@@ -298,7 +299,7 @@ def _read(path: Path) -> TubeTable | None:
         head, packed = packed_from(path)
         if head.pop("format") != _FORMAT:
             return None
-        geometry = RobotGeometry(**head.pop("geometry"))
+        geometry = RobotGeometry.read(head.pop("geometry"))
         return _checked(TubeTable(geometry=geometry, packed=packed, **head))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         return None
@@ -325,7 +326,9 @@ def _checked(table: TubeTable) -> TubeTable:
 
 def key_of(geometry: RobotGeometry, radius: float) -> str:
     """A digest of robot and tube, numbers to ten digits."""
-    words = [*(f"{value:.10g}" if isinstance(value, float) else str(value) for value in geometry), f"{radius:.10g}"]
+    *numbers, form, profile = geometry
+    words = [*(f"{value:.10g}" if isinstance(value, float) else str(value) for value in numbers), f"{radius:.10g}"]
+    words += [str(part) for part, usual in ((form, PLAIN), (profile, ())) if part != usual]
     return hashlib.sha256(" ".join(words).encode()).hexdigest()[:24]
 
 

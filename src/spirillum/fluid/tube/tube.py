@@ -120,7 +120,7 @@ class _Question(NamedTuple):
 
 def _held(question: _Question) -> Held:
     g, part, seat, fineness, phase = question
-    wires = [(_turned(g.wire(), phase), 1)] if "tail" in PIECES[part] else []
+    wires = [(_turned(wire, phase), 1) for wire in g.wires()] if "tail" in PIECES[part] else []
     return held_in_tube(_solids(_solid_key(g, part, seat, fineness)), wires, seat.tail_drop)
 
 
@@ -174,7 +174,7 @@ def solved_together(
     if len(keys) != 1:
         raise ValueError("robots that differ in more than their tails")
     solids = _solids(keys.pop())
-    share_basis(solids, [g.wire() for g, _ in tails])
+    share_basis(solids, [g.wires() for g, _ in tails])
     found = [np.stack([solved(g, seat, fineness, phase) for phase in phases]) for g, phases in tails]
     share_basis(solids, [])
     return found
@@ -308,7 +308,7 @@ class Tube(SwimmerModel):
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         """R and load along the tube and about the motor axis, (n, 5, 5), and the mean flow, (n, 5)."""
         count = batch.options.tube.phases
-        phases = 2.0 * np.pi * (np.arange(count) + self._first) / count
+        phases = 2.0 * np.pi / batch.form.starts * (np.arange(count) + self._first) / count
         along = np.zeros((5, MOTIONS))
         along[[1, 3, 4], [3, 9, 12]] = 1.0
         tilt = Seat(0.0, 0.0, batch.placement.pitch or 0.0, yaw=batch.placement.yaw)

@@ -23,6 +23,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.model_options import ModelOptions
+from spirillum.robot.tail_form import ROOT_SHARE, closest_strands
 
 FINEST_WIRE_ERROR = 0.004
 """Relative error of speeds with `high` wires: the largest of drag, thrust, torque and speed against resolved wires."""
@@ -46,7 +47,7 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
 def stations_of(batch: RobotBatch) -> PerRobot:
     """Return an upper bound of the number of stations along each tail: on the plain helix and the arm to it."""
     wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
-    return station_count(wire_length, 0.5 * batch.wire_diameter)
+    return batch.form.starts * station_count(wire_length, 0.5 * batch.wire_diameter)
 
 
 def robot_solution(batch: RobotBatch, index: int = 0) -> UnitTwistSolution:
@@ -55,7 +56,7 @@ def robot_solution(batch: RobotBatch, index: int = 0) -> UnitTwistSolution:
 
 
 def _solved(g: RobotGeometry, part: str, resolution: Discretisation) -> UnitTwistSolution:
-    wires = [(g.wire(resolution.spacing), 1)] if "tail" in PIECES[part] else []
+    wires = [(wire, 1) for wire in g.wires(resolution.spacing)] if "tail" in PIECES[part] else []
     return solve(g.solids(part), wires, resolution)
 
 
@@ -84,7 +85,14 @@ def _apart(batch: RobotBatch, limits: list[Limit]) -> Limit:
 
 @lru_cache(maxsize=4096)
 def _closest(g: RobotGeometry) -> float:
-    return closest_approach(g.wire())
+    wires = g.wires()
+    if len(wires) == 1:
+        return closest_approach(wires[0])
+    behind = wires[0].points[0, 0] - wires[0].points[:, 0]
+    joined = ROOT_SHARE * g.tail_length if g.form.curve else min(3.0 / g.taper, 4.0 * ROOT_SHARE) * g.tail_length
+    clear = behind > joined
+    along = np.cumsum(wires[0].lengths) - 0.5 * wires[0].lengths
+    return closest_strands([wire.points[clear] for wire in wires], along[clear], wires[0].radius)
 
 
 @lru_cache(maxsize=4096)
@@ -150,10 +158,11 @@ class Slender(SwimmerModel):
         """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
         coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        behind = batch.coupling_length if batch.shape != "none" else np.full(1, np.inf)
         limits = [
             Limit.of(
                 "coupling.length",
-                batch.coupling_length,
+                behind,
                 "more than",
                 0.5 * batch.wire_diameter,
                 "mm",
@@ -162,7 +171,7 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "coupling.length",
-                batch.coupling_length,
+                behind,
                 "at least",
                 _SMALLEST_GAP * batch.amplitude,
                 "mm",
@@ -171,7 +180,7 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "coupling.clearance",
-                np.where(coupled, batch.coupling_clearance, np.inf),
+                np.where(coupled & (batch.shape != "none"), batch.coupling_clearance, np.inf),
                 "at least",
                 _SMALLEST_CLEARANCE * batch.coupling_diameter,
                 "mm",

@@ -18,7 +18,7 @@ import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem
-from spirillum.robot.outline import Arc, Outline, Segment
+from spirillum.robot.outline import Arc, Outline, Piece, Smooth
 
 _FINE = 16  # nodes of the Gauss rule that integrates a panel near its target
 _GRADING = 4  # panels at a sharp edge: distance from it as the fourth power of the parameter
@@ -150,7 +150,7 @@ def panels_of(outlines: Sequence[Outline], longest: Callable[[int, Samples, Samp
 
 
 def _panel_parameters(
-    piece: Segment | Arc,
+    piece: Piece,
     sharp: tuple[bool, bool],
     beside: tuple[float, ...],
     longest: Callable[[Samples, Samples], Samples],
@@ -164,6 +164,10 @@ def _panel_parameters(
     if isinstance(piece, Arc):  # at most 60 degrees
         parts = int(np.ceil(abs(piece.angles[1] - piece.angles[0]) / (np.pi / 3 + 1e-9)))
         edges = list(np.linspace(0.0, 1.0, parts + 1))
+    elif isinstance(piece, Smooth):
+        t, turned = piece.fine[0], piece.turned
+        steps = np.linspace(0.0, turned[-1], 1 + int(np.ceil(turned[-1] / (np.pi / 3))))
+        edges = [0.0, *np.interp(steps[1:-1], turned, t).tolist(), 1.0]
     elif all(sharp):
         edges = [0.0, 0.5, 1.0]
     length = piece.length

@@ -47,7 +47,7 @@ export class Numbers {
     this.holder.replaceChildren(
       element("h2", {}, "Numbers", this.tag),
       ...(lane.trouble ? [element("p", { class: "trouble", role: "alert", text: sentence(lane.trouble) })] : []),
-      ...(numbers ? [table, words(numbers, lane)] : lane.trouble ? [] : [element("p", { class: "soft", text: "Computing. The first time on a machine some loops are compiled, which takes about twenty seconds." })]),
+      ...(numbers ? [table, words(numbers, lane)] : lane.trouble ? [] : [element("p", { class: "soft", text: "Computing \u2026" })]),
     );
   }
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.axial_robot import AxialRobot, rates, winding
+from spirillum.dynamics.axial_robot import AxialRobot, rates
 from spirillum.dynamics.axial_run import AxialIntegrator, axial_run
 from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
@@ -56,9 +56,7 @@ def _derivative(robot: AxialRobot, duty: float) -> Callable[[float, Samples], Sa
     numbers = robot.numbers
 
     def derivative(_time: float, y: Samples) -> Samples:
-        current = float(y[0])
-        square = current * current
-        return np.append(rates(numbers, current, duty, 0.0), [square, winding(numbers, abs(current))[0] * square])
+        return rates(numbers, float(y[0]), duty, 0.0)
 
     return derivative
 

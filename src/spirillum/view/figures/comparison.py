@@ -85,7 +85,7 @@ def _column(
     winner = np.array([robot.name in best.get(name, ()) for robot in robots])
     for chosen, face in ((winner, colour), (~winner, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
-    panel.set_xlabel(RANKED[name].heading(scale.unit))
+    panel.set_xlabel(RANKED[name].title + ("" if scale.unit == "1" else f" ({scale.unit})"))
     panel.xaxis.set_major_locator(MaxNLocator(ticks))
     panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))))
     panel.tick_params(axis="y", length=0)

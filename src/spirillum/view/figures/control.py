@@ -146,7 +146,7 @@ def _commands(axes: Axes, control: Control) -> None:
             axes.step(
                 data["decision_time"].values, tilt, where="post", color=COLOURS[colour], linewidth=1.0, label=name
             )
-        axes.set_ylabel("field's axis (°)")
+        axes.set_ylabel("field's axis (deg)")
         axes.legend(loc="upper right", ncols=2)
         return
     axes.step(data["time"].values, data["duty"].values, where="pre", color=COLOURS["blue"], linewidth=1.0)

@@ -70,7 +70,7 @@ def trial_figure(trial: Trial) -> Figure:
         if spoiled:
             left.text(0.02, 0.96, "not given: see the flags", transform=left.transAxes, va="top", color="#9c3d00")
     for axes in panels[-1]:
-        axes.set_xlabel("time, s")
+        axes.set_xlabel("time (s)")
     left_out = {name: _left_out(values[name], trial.fits[name]) for name, _, _ in _SERIES}
     panels[0][0].set_title(f"measured, with the fit{_why_left_out(list(left_out.values()))}", loc="left")
     panels[0][1].set_title("residuals", loc="left")
@@ -99,7 +99,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     for shown, colour in ((~out, COLOURS["sky"]), (out, _LEFT_OUT)):
         dots = np.where(shown, scale(values), np.nan)
         left.plot(time[few], dots[few], ".", color=colour, markersize=2.5, rasterized=True)
-    left.set_ylabel(f"{words}, {scale.unit}")
+    left.set_ylabel(f"{words} ({scale.unit})")
     if not rate.measured or rate.residual.size != time.size:
         return
     line = values - rate.residual
@@ -110,7 +110,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     small = UnitPrefix.of(rate.residual, "m" if unit == "m" else "rad")
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
-    right.set_ylabel(f"residual, {small.unit}")
+    right.set_ylabel(f"residual ({small.unit})")
 
 
 def _left_out(values: Samples, rate: Rate) -> np.ndarray:
@@ -146,7 +146,7 @@ def trials_figure(measurement: Measurement) -> Figure:
         reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
         axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
         first, _, rest = name.partition("_")
-        axes.set_title(f"{first}\n{rest.replace('_', ' ')}, {scale.unit}", fontsize=8.0)
+        axes.set_title(f"{first}\n{rest.replace('_', ' ')} ({scale.unit})", fontsize=8.0)
         axes.set_xlim(0.4, len(items) + 0.6)
         axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])
         axes.yaxis.set_major_locator(MaxNLocator(5))

@@ -142,7 +142,7 @@ def _ticks(axes: Axes, *, left: bool, bottom: bool) -> None:
 
 
 def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> Figure:
-    """Least misfit against each number, all others fitted anew; the dotted line cuts out the 95 % interval."""
+    """Least misfit against each parameter, all others fitted again; the dotted line marks the 95 % interval."""
     columns = min(len(profiles), 4)
     rows = -(-len(profiles) // columns)
     assert found.least_squares is not None  # noqa: S101 - profiles are those of a fit by least squares

@@ -6,6 +6,8 @@ matplotlib looks for the extent of every segment: half a second for a tube.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch, Polygon
@@ -16,7 +18,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import Seat
-from spirillum.view.figures.solids import wire_line
+from spirillum.view.figures.solids import wire_lines
 
 _GLASS, _RIM = "#dfe9f1", "#5d7486"
 _FILL, _EDGE, _BEYOND = "#a3a8ac", "#22292e", "#4a5258"
@@ -48,15 +50,21 @@ def draw_section(
         points: typographic points in one drawing unit.
         drop: distance by which the tail's axis is lowered, m.
     """
-    line = wire_line(robot, phase, 1.0) - np.array([0.0, 0.0, drop])
+    lines = [line - np.array([0.0, 0.0, drop]) for line in wire_lines(robot, phase, 1.0)]
     across = next(number for number, axis in enumerate("xyz") if axis not in plane)
     along = [number for number in range(3) if number != across]
     if plane != "yz":
         # The tail's silhouette, in true thickness; it does not hide the flow.
         width = robot.tail.wire_diameter / unit * points
-        axes.plot(
-            *line[:, along].T / unit, color="white", linewidth=width, alpha=0.35, solid_capstyle="round", zorder=4
-        )
+        look: dict[str, Any] = {
+            "color": "white",
+            "linewidth": width,
+            "alpha": 0.35,
+            "solid_capstyle": "round",
+            "zorder": 4,
+        }
+        for line in lines:
+            axes.plot(*line[:, along].T / unit, **look)
     for outline in outlines_of(robot).values():
         if (cut := _cut(outline, plane, 0.0)) is not None and offset != 0.0 and plane != "yz":
             axes.add_artist(
@@ -64,7 +72,8 @@ def draw_section(
             )
         if (cut := _cut(outline, plane, offset)) is not None:
             axes.add_artist(Polygon(cut / unit, closed=True, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=7))
-    _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
+    for line in lines:
+        _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
 
 
 def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:

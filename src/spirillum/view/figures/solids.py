@@ -52,21 +52,24 @@ def centreline_of(robot: Robot, xi: Values, phase: float) -> tuple[Values, Value
         root=np.array(0.5 * robot.body.length + robot.coupling.length),
         hand=np.array(robot.hand),
         phase=np.array(phase),
+        form=tail.form,
     )
     return found.position, found.tangent
 
 
-def wire_line(robot: Robot, phase: float, unit: float) -> Values:
-    """Points (x, y, z) of the wire's centreline from its root on, in `unit`."""
+def wire_lines(robot: Robot, phase: float, unit: float) -> list[Values]:
+    """Points (x, y, z) of each wire's centreline from its root on, in `unit`."""
     tail = robot.tail
-    count = int(np.clip(90 * tail.length / tail.wavelength, 200, _LARGEST_WIRE))
-    points: Values = centreline_of(robot, np.linspace(0.0, tail.length, count), phase)[0] / unit
-    return points
+    count = int(np.clip(max(90 * tail.length / tail.wavelength, 8 * len(tail.curve or ())), 200, _LARGEST_WIRE))
+    xi = np.linspace(0.0, tail.length, count)
+    return [centreline_of(robot, xi, float(phase + turn))[0] / unit for turn in tail.form.turns]
 
 
 def crests(robot: Robot, phase: float, unit: float) -> Values:
     """Positions x of the wire's highest points, from the root to the tip, in `unit`; without the rising root."""
     tail, hand = robot.tail, robot.hand
+    if not tail.form.is_helix:
+        return np.zeros(0)
     root = 0.5 * robot.body.length + robot.coupling.length
     most = np.ceil((root + tail.length) / tail.wavelength) + 1
     number = np.arange(-most, most + 1)
@@ -78,7 +81,7 @@ def crests(robot: Robot, phase: float, unit: float) -> Values:
 
 
 def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: float, points: float) -> None:
-    """Plot the tail's wire in true thickness, seen along +y: hidden parts are darker.
+    """Plot the tail's wires in true thickness, seen along +y: hidden parts are darker.
 
     Args:
         axes: where to draw, in `unit`.
@@ -88,10 +91,10 @@ def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: f
         unit: length of one drawing unit, m.
         points: typographic points in one drawing unit.
     """
-    path = wire_line(robot, phase, unit)
+    paths = wire_lines(robot, phase, unit)
     thickness, amplitude = robot.tail.wire_diameter / unit, robot.tail.amplitude / unit
-    pieces = np.stack([path[:-1, [0, 2]], path[1:, [0, 2]]], axis=1)
-    depth = 0.5 * (path[:-1, 1] + path[1:, 1])
+    pieces = np.concatenate([np.stack([path[:-1, [0, 2]], path[1:, [0, 2]]], axis=1) for path in paths])
+    depth = np.concatenate([0.5 * (path[:-1, 1] + path[1:, 1]) for path in paths])
     behind = np.clip(0.5 + 0.5 * depth / max(amplitude, 1e-12), 0.0, 1.0)
     bias = min(thickness, 0.8 * amplitude)
     layers = (  # share of the thickness, shade before and behind, depth before the centreline, height of the light

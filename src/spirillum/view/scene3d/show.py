@@ -91,7 +91,7 @@ def show(
     channel: bool = True,
     window: bool = False,
 ) -> Picture3D:
-    """Draw a robot lying level on its channel's floor: computed geometry in three dimensions.
+    """Render a robot lying level on its channel's floor: computed geometry in three dimensions.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.

@@ -240,12 +240,10 @@ def _lines_of(part: Samples) -> Lines | None:
 
 def _frequency(flat: Samples) -> float | None:
     """Spatial frequency of the clearest wave along the rows, lines per pixel; None without a clear peak."""
-    from scipy.fft import rfft  # several rows at a time
-
     width = flat.shape[1]
     length = 4 * 1 << int(np.ceil(np.log2(width)))
     rows = flat[:: max(2, len(flat) // _MOST_ROWS)]
-    spectrum = rfft(rows * np.hanning(width).astype(flat.dtype), length, axis=1)
+    spectrum = np.fft.rfft(rows * np.hanning(width).astype(flat.dtype), length, axis=1)
     power = spectrum.real**2
     power += spectrum.imag**2
     frequency = np.fft.rfftfreq(length)

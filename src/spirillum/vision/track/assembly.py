@@ -215,7 +215,8 @@ def track_of(
     optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
     seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
     cut = cut_off(record.placed)
-    elongation = np.where(seen & ~cut, [one.elongation for one in record.placed], np.nan)
+    told = seen & ~cut & (body.seal is None)  # a nose of glass shows what lies under it; against the seal, cues tell
+    elongation = np.where(told, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     other = something_else(time, pose[:, :2], np.isfinite(roll[:, 0]) | np.isfinite(tail[:, 0]), body.robot.body.length)
     pose[other] = errors[other] = elongation[other] = np.nan
@@ -231,8 +232,7 @@ def track_of(
     stripes = known.stripes
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], stripes.period, readable=stripes.readable)
     even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
-    body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
-    roll_flags = (*roll_flags, *_under_glare(known, body_angle))
+    body_angle, roll_flags = even.angle, (*roll_flags, *even.flags, *_under_glare(known, even.angle))
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     tail_size = _tail_size(known, sight.optics, roll[:, 0], tail[:, 0], np.isfinite(pose[:, 0]))
     scale, size_flags, roll_error = checked_scale(sight.scale, body, known.size, setup.markers.spacing, tail_size)
@@ -247,6 +247,7 @@ def track_of(
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     agreement = _agreement(time, record, cut | other, pixel, outline.suspect)
+    lag = math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel)
     glare, hops = learnt.glare.drift * pixel, hops_in(motion, pixel, picture)
     clock = clock_of(motion, pixel, known.stripes.period, np.array(record.time))
     if any(flag.spoils for flag in clock.flags):
@@ -282,9 +283,9 @@ def track_of(
         body_angle_drift=math.hypot(
             even.drift, roll_error, hops.angle, STRIPES.under_glare if known.stripes.under_glare else 0.0
         ),
-        tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * outline.drift * pixel / body.robot.tail.wavelength),
+        tail_phase_drift=math.hypot(hops.phase, 2.0 * np.pi * lag / body.robot.tail.wavelength),
         cues=agreement.cues,
-        cue_drift=math.hypot(agreement.drift, _colour_lag(position[:, 0], body), outline.drift * pixel),
+        cue_drift=lag,
         flags=(*swayed.flags, *early, *agreement.flags, *outline.flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

@@ -261,20 +261,17 @@ class BodyFinder:
         tilt = np.sum(stack * k, axis=2, keepdims=True) / np.sum(k**2)
         bare = stack - stack.mean(axis=2, keepdims=True) - tilt * k
         bare = np.nan_to_num(bare, nan=0.0)
-        count = bare.shape[1]
-        template = np.zeros((count, k.size))
         products = np.einsum("fik,fil->ikl", bare, bare)
+        together = np.empty_like(products)
         for index, name in enumerate(GROUPS):
             inside = np.flatnonzero(self.contour.group == index)
+            if name in ("rear", "seal"):  # stripes pass: one template for the edge, of either sign
+                together[inside] = products[inside].sum(axis=0)
+                continue
             for place, point in enumerate(inside):
-                if name in ("rear", "seal"):  # stripes pass: one template for the edge, of either sign
-                    together = inside
-                    if place:
-                        template[point] = template[inside[0]]
-                        continue
-                else:
-                    together = inside[max(0, place - OUTLINE.neighbours) : place + OUTLINE.neighbours + 1]
-                template[point] = np.linalg.eigh(products[together].sum(axis=0))[1][:, -1]
+                near = inside[max(0, place - OUTLINE.neighbours) : place + OUTLINE.neighbours + 1]
+                together[point] = products[near].sum(axis=0)
+        template = np.ascontiguousarray(np.linalg.eigh(together)[1][:, :, -1])
         self._template = template
         self._derivative = np.gradient(template, axis=1)
         self._steepness = np.sqrt(np.sum(self._derivative**2, axis=1))

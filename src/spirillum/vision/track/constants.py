@@ -202,6 +202,8 @@ class SetupFreeConstants:
     """Distance of the provisional lens over the width of what it shows."""
     spacing: float = 2e-3
     """Spacing of a ruler's lines to begin with, m: the paper's."""
+    seal_sizes: tuple[float, ...] = (1.0, 1.05, 0.95)
+    """Sizes over the guessed one at which a seal is fitted: by more than some hundredths its edges are out of reach."""
     nearer: float = 0.93
     """Length per pixel at the robot over that at a ruler behind it, to begin with."""
     shares: tuple[float, ...] = (0.5, 0.125)

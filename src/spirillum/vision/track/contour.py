@@ -131,6 +131,7 @@ class Contour:
 
 def contour_of(robot: Robot, optics: Optics) -> Contour:
     """Compute the apparent contour of a robot's body."""
+    robot.check_body("the tracker, which follows the body's outline,")
     outlines = {name: outline for name, outline in outlines_of(robot).items() if name in ("body", "coupling")}
     outline, radius = outlines["body"], 0.5 * robot.body.diameter
     spacing = 1.2 * optics.length_per_pixel
@@ -207,10 +208,8 @@ def _reach(robot: Robot, optics: Optics) -> tuple[float, float]:
 
 def _surface(outline: Outline) -> Samples:
     """Points on the surface of a solid of revolution, m, (k, 3)."""
-    pieces = []
-    for piece in outline.pieces:
-        turn = 0.0 if isinstance(piece, Segment) else abs(piece.angles[1] - piece.angles[0])
-        pieces.append(piece.points(np.linspace(0.0, 1.0, 2 + int(_PER_TURN * turn / (2.0 * np.pi)))))
+    counts = (2 + int(_PER_TURN * piece.turn / (2.0 * np.pi)) for piece in outline.pieces)
+    pieces = [piece.points(np.linspace(0.0, 1.0, count)) for piece, count in zip(outline.pieces, counts, strict=True)]
     x, rho = (np.concatenate(part) for part in zip(*pieces, strict=True))
     around = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)[:, None]
     rings = np.broadcast_arrays(x[None, :], rho * np.cos(around), rho * np.sin(around))

@@ -37,6 +37,8 @@ class CutConstants:
     """Least jump of the place, pixels."""
     angle: float = 0.12
     """Least jump of an angle, rad."""
+    persists: float = 0.5
+    """Share of a jump below which a series goes on after it as before."""
     gap: float = 3.0
     """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
     long_window: int = 30
@@ -100,8 +102,10 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
     if picture is None or cuts_in(motion, length_per_pixel, picture):
         return Hops(0.0, 0.0, 0.0, ())
     hops = [
-        None if jump is None or _in_the_picture(jump, motion.time, picture) else jump
-        for jump in _jumps(motion, length_per_pixel)
+        None
+        if jump is None or _in_the_picture(jump, motion.time, picture) or _returns(jump, motion.time, one)
+        else jump
+        for jump, one in zip(_jumps(motion, length_per_pixel), motion[1:], strict=True)
     ]
     first = min((hop for hop in hops if hop is not None), default=None)
     if first is None:
@@ -299,6 +303,21 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> _Jump |
     if not abs(steps[largest]) > max(least, CUTS.clear * spread):
         return None
     return _Jump(float(splits[largest]), float(reached[1][largest] - reached[0][largest]))
+
+
+def _returns(jump: _Jump, time: Samples, values: Samples) -> bool:
+    """Whether a series goes on after a jump as before: only frames beside it were misread, such as under a highlight.
+
+    By a line with a step through what lies farther away than the lines that tell the jump.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    split = int(np.searchsorted(time[known], jump.moment))
+    far = np.concatenate([known[: max(0, split - CUTS.window)], known[split + CUTS.window :]])
+    after = time[far] > jump.moment
+    if min(np.count_nonzero(after), np.count_nonzero(~after)) < CUTS.window:
+        return False
+    design = np.column_stack([np.ones(far.size), time[far], after])
+    return bool(abs(np.linalg.lstsq(design, values[far], rcond=None)[0][2]) < CUTS.persists * abs(jump.size))
 
 
 def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:

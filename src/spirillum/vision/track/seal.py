@@ -13,6 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.edges import profiles_across
+from spirillum.kernels.seals import seal_shares
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
@@ -65,7 +66,8 @@ class SealEdges:
         groups = contour.group[self.chosen]
         self._sides = [np.flatnonzero(groups == side) for side in _SIDES]
         self._offsets = np.arange(-OUTLINE.half_profile, OUTLINE.half_profile + 1, dtype=float)
-        self._outside = self._offsets >= SEAL.beside
+        ends = [[side[0], side[-1] + 1, flank] for side, flank in zip(self._sides, _FLANKS, strict=True) if side.size]
+        self._ends = np.array(ends, dtype=np.int64).reshape(-1, 3)
         self._classes = classes + 1  # colours of thin stripes at the silhouette are mixed
         from scipy.special import erf
 
@@ -164,38 +166,25 @@ class SealEdges:
 
     def _profiles(self, part: ColourPart, pixels: Samples, normals: Samples) -> _Profiles:
         """Share of the stripe's colour across each edge."""
-        colours = self._colours(part, pixels, normals)
-        share, distance = np.full(colours.shape[1:], np.nan), np.zeros(len(pixels))
-        kind = np.zeros(len(pixels), dtype=np.int64)
-        for flank, side in zip(_FLANKS, self._sides, strict=True):
-            here = colours[:, side]
-            outer = here[:, :, self._outside]
-            seen = np.isfinite(outer).all(axis=(0, 2))
-            if np.count_nonzero(seen) < SEAL.fewest_of_kind:
-                continue
-            means = outer.mean(axis=2)
-            means[:, ~seen] = means[:, seen].mean(axis=1, keepdims=True)
-            middle = _pooled(means)  # (3, n)
-            away = here - middle[:, :, None]
-            rest = away[:, :, self._outside].reshape(3, -1)
-            rest = rest[:, np.isfinite(rest).all(axis=0)]
-            spread = rest @ rest.T / rest.shape[1] + SEAL.noise**2 * np.eye(3)
-            low, high = (-SEAL.beside, -1.0) if flank else (-2.0 * SEAL.beside, -SEAL.beside)
-            inner = here[:, :, (self._offsets >= low) & (self._offsets <= high)].mean(axis=2)
-            step = inner - middle
-            towards = np.linalg.solve(spread, step)
-            apart = np.sum(towards * step, axis=0)
-            glare = np.maximum(inner.min(axis=0), middle.min(axis=0)) > STRIPES.white  # it hides what it covers
-            clear = (apart > SEAL.distinct**2) & ~glare
-            distance[side] = np.where(clear, apart, 0.0)
-            if self._palette is not None:
-                kind[side] = np.argmin(np.sum((np.nan_to_num(inner).T[:, None] - self._palette) ** 2, axis=2), axis=1)
-            if flank and self._palette is not None:  # a thin stripe at the silhouette, another one beside it
-                share[side] = _most_of(self._palette.T[:, :, None] - middle[:, None], spread, away)
-            else:
-                share[side] = np.matmul(towards.T[:, None], away.transpose(1, 0, 2))[:, 0]
-                share[side] /= np.maximum(apart, 1e-9)[:, None]
-        return _Profiles(share, np.nan_to_num(distance), kind)
+        colours, count = self._colours(part, pixels, normals), len(pixels)
+        share, distance, kind = np.empty(colours.shape[1:]), np.empty(count), np.empty(count, dtype=np.int64)
+        seal_shares(
+            colours,
+            self._offsets,
+            self._ends,
+            np.empty((0, 3)) if self._palette is None else self._palette,
+            SEAL.beside,
+            SEAL.noise,
+            SEAL.distinct,
+            STRIPES.white,
+            SEAL.fewest_of_kind,
+            SEAL.pooled,
+            np.empty((2, 3, count)),
+            share,
+            distance,
+            kind,
+        )
+        return _Profiles(share, distance, kind)
 
     def _rows(self, flank: bool) -> slice:  # noqa: FBT001 - of `_FLANKS`
         """Samples of a profile that are used: before the colours are known, the outermost stripe at a silhouette."""
@@ -238,24 +227,3 @@ def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: floa
     left, top, right, bottom = bounds
     part = cv2.GaussianBlur(image[top:bottom, left:right].astype(np.float32), (0, 0), blur)
     return ColourPart(np.asarray(part), np.array([left, top], dtype=float))
-
-
-def _most_of(steps: Samples, spread: Samples, away: Samples) -> Samples:
-    """Share of that colour of several of which there is most in each sample, (n, m).
-
-    Args:
-        steps: from the surroundings of each edge to each colour, (3, j, n).
-        spread: covariance of the surroundings, (3, 3).
-        away: from the surroundings to each sample, (3, n, m).
-    """
-    towards = np.linalg.solve(spread, steps.reshape(3, -1)).reshape(steps.shape)
-    towards /= np.sum(towards * steps, axis=0)
-    shares = np.matmul(towards.transpose(2, 1, 0), away.transpose(1, 0, 2))  # (n, j, m)
-    return np.asarray(np.clip(shares.max(axis=1), -0.2, 1.2))
-
-
-def _pooled(values: Samples) -> Samples:
-    """Means over neighbouring edges, (3, n)."""
-    from scipy.ndimage import uniform_filter1d
-
-    return np.asarray(uniform_filter1d(values, 2 * SEAL.pooled + 1, axis=-1, mode="nearest"))

@@ -8,6 +8,7 @@ that the search for the robot corrects. Finding and learning are those of every 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from itertools import permutations
 from typing import NamedTuple
@@ -239,7 +240,13 @@ def _found_at(
 
 
 def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
-    """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there."""
+    """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there.
+
+    First by the colours of its seal, which a cover of glass and a grid under it do not hide.
+    """
+    by_seal = _by_seal(video, setup, body, stills, factor)
+    if by_seal is not None:
+        return by_seal
     for _ in range(SETUP_FREE.rounds):
         try:
             known = identified_at(video.name, setup, body, stills.frames, stills.at(factor), 1.0)  # no size is stated
@@ -251,6 +258,21 @@ def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, facto
         if known.start.flags or tail < IDENTITY.least_share:
             return None
         body = resized(known.start.body, 1.0)  # it looks otherwise large: once more from there
+    return None
+
+
+def _by_seal(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
+    """The robot by its seal, at about the size of a body; None where its tail is not behind it."""
+    colours = len(set(stripes_of(setup, body.robot)))
+    for size in SETUP_FREE.seal_sizes if colours else ():
+        with suppress(InputError):
+            like = resized(body, size)
+            known = identified_at(video.name, setup, like, stills.frames, stills.at(factor), 1.0, colours)
+            tail = known.wire.readable
+            if known.start.search is not None and known.robot and tail > IDENTITY.least_share:
+                return known
+            if known.start.search is None and not known.start.flags and tail > IDENTITY.sure_share:
+                return known  # by its outline: the seal is of another size
     return None
 
 

@@ -53,6 +53,15 @@ class _SeenShape(NamedTuple):
     """Over that of the robot file."""
 
 
+def _other_than_a_helix() -> Flag:
+    """Say that the phase of such a tail is not read."""
+    sentence = (
+        "the rotation of a tail other than one helix of one size is not read from pictures, and not given; "
+        "position and rotation of the body are"
+    )
+    return Flag("tail-unreadable", sentence, _TAIL)
+
+
 class TailWave:
     """Reads the phase phi of the tail in the lab, modulo 2 pi.
 
@@ -105,6 +114,9 @@ class TailWave:
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Learn the contrast of the wire to its surroundings, and check its shape against the robot file."""
+        if not self.robot.tail.form.is_plain:
+            self._flags = [_other_than_a_helix()]
+            return
         strips = [(image, self._strip(pose)) for image, pose in samples]
         best, chosen = 0.0, None
         for weights in _CONTRASTS:

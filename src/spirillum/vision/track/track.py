@@ -73,7 +73,7 @@ class Track:
     body_angle_drift: float = 0.0
     """Standard uncertainty of the body's angle from end to end, by glare on its stripes or their widths, rad."""
     tail_phase_drift: float = 0.0
-    """Standard uncertainty of the tail's phase from end to end, by an outline that hopped, rad."""
+    """Standard uncertainty of the tail's phase from end to end, by an outline that hopped and by `cue_drift`, rad."""
     time_uncertainty: float = 0.0
     """Relative standard uncertainty of the video's length in time, where lost frames were put back in doubt."""
     elongation: Samples = field(repr=False, default_factory=lambda: np.zeros(0))

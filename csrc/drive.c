@@ -1,0 +1,126 @@
+/* The law of a drive, see drive.h, and the steady states of a motor under a load. */
+#include "drive.h"
+
+static const double LARGEST_EXPONENT = 600.0; /* far currents are tried on the way to a root */
+static const double LARGEST_START = 1e6;      /* largest current at which the search for the steady one starts, A */
+
+double winding_resistance(const Motor *m, double current) {
+    const double size = fabs(current);
+    return winding(m->constant, m->decay, exp(-m->decay_rate * size), m->growth,
+                   exp(smaller(m->growth_rate * size, LARGEST_EXPONENT)), m->slope, size);
+}
+
+/* dR/d|I|, ohm/A. */
+static double winding_slope(const Motor *m, double current) {
+    const double size = fabs(current);
+    return -m->decay * m->decay_rate * exp(-m->decay_rate * size)
+         + m->growth * m->growth_rate * exp(smaller(m->growth_rate * size, LARGEST_EXPONENT)) + m->slope;
+}
+
+/* dI/dt of (17), A/s, at a rate of the joint, all in one sense. */
+double current_rate(const Motor *m, double duty, double current, double rate) {
+    const double supply = duty * (m->voltage - m->internal_resistance * fabs(current));
+    return excess_voltage(supply, 0.0, winding_resistance(m, current), current, m->back_emf * rate) / m->inductance;
+}
+
+/* A motor under a load: back-emf without a current, V, and what a current adds to it, V/A. */
+typedef struct {
+    Motor motor;
+    double duty, back_emf, back_emf_per_current;
+} Loaded;
+
+/* What decides the size i of a steady current: voltage that it takes less the one that drives it. */
+typedef struct {
+    const Motor *motor;
+    double linear, drive;
+} Search;
+
+static double excess(const Search *s, double i) { return (winding_resistance(s->motor, i) + s->linear) * i - s->drive; }
+
+/* The next current of Newton's method. */
+static double newton_step(const Search *s, double i, double found) {
+    return i - found / (winding_resistance(s->motor, i) + s->linear + winding_slope(s->motor, i) * i);
+}
+
+/* Newton steps kept inside a bracket: while the motor drives there is a single root (the robot file is checked for it). */
+static double root_of(const Search *s) {
+    const Motor *m = s->motor;
+    const double at_rest = m->constant + m->decay + m->growth + larger(s->linear, 0.0);
+    /* A winding almost without resistance at rest would start beyond what 200 halvings come back from. */
+    double i = smaller(s->drive / (at_rest > 0.0 ? at_rest : 1.0), LARGEST_START);
+    double low = 0.0, high = 2.0 * i + 1e-12;
+    for (int n = 0; n < 60 && excess(s, high) < 0.0; n++) high *= 2.0;
+    if (!(excess(s, high) >= 0.0)) return NAN; /* driven too fast: V(|I|) falls faster than R(I) I rises */
+    double last = high - low;
+    for (int n = 0; n < 200; n++) {
+        const double f = excess(s, i), newton = newton_step(s, i, f);
+        if (f < 0.0)
+            low = i;
+        else
+            high = i;
+        /* Newton creeps along an exponential: a step that is not half the one before gives way to bisection. */
+        const bool good = newton >= low && newton <= high && fabs(newton - i) <= 0.5 * last;
+        const double next = good ? newton : 0.5 * (low + high);
+        last = fabs(next - i);
+        i = next;
+        if (!(last > 1e-9 * fabs(i))) break;
+    }
+    /* Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it. */
+    const double newton = newton_step(s, i, excess(s, i));
+    return isfinite(newton) ? clamped(newton, low, high) : i;
+}
+
+/* Steady root of (17), A: R(I) I = d V(I) - (back-emf + back-emf per current I). Negative where the load drives the motor,
+ * NaN where it does so beyond any root or beyond what the battery's voltage allows. */
+EXPORT void steady_currents(const double *cases, double *out, int64_t count) {
+    for (int64_t n = 0; n < count; n++) {
+        const Loaded *at = (const Loaded *)cases + n;
+        const double left = at->duty * at->motor.voltage - at->back_emf, sense = left < 0.0 ? -1.0 : 1.0;
+        const Search search
+            = {&at->motor, at->back_emf_per_current + sense * at->duty * at->motor.internal_resistance, fabs(left)};
+        const double i = root_of(&search);
+        out[n] = at->motor.voltage - at->motor.internal_resistance * i < 0.0 ? NAN : sense * i;
+    }
+}
+
+/* R, ohm, and dR/d|I|, ohm/A, at currents. */
+EXPORT void windings(const double *motors, const double *currents, double *out, int64_t count) {
+    for (int64_t n = 0; n < count; n++) {
+        const Motor *motor = (const Motor *)motors + n;
+        out[2 * n] = winding_resistance(motor, currents[n]);
+        out[2 * n + 1] = winding_slope(motor, currents[n]);
+    }
+}
+
+/* Piece behind a point of the curve, at a duty; that before the first point is level. */
+Piece piece_of(const Curve *curve, int64_t number, double duty) {
+    if (number < 0) return (Piece){duty * curve->at[0].torque, 0.0};
+    const double rate = curve->at[number].rate, torque = curve->at[number].torque;
+    const double slope = (curve->at[number + 1].torque - torque) / (curve->at[number + 1].rate - rate);
+    return (Piece){duty * (torque - slope * rate), duty * slope};
+}
+
+/* The piece itself where it holds at the rate that was found with it, else its neighbour there: torques do not rise with
+ * the rate, so that the solution lies on that side. */
+int64_t next_piece(const Curve *curve, int64_t number, double rate) {
+    const int64_t last = (int64_t)curve->points - 2;
+    if (number < last && rate > curve->at[number + 1].rate) return number + 1;
+    if (number >= 0 && rate < curve->at[number].rate) return number - 1;
+    return number;
+}
+
+/* Torque of a motor whose rate is `coasting` without a torque, rad/s, and grows by `per_torque` with it, 1/(N m s). */
+double curve_torque(const Curve *curve, double duty, double coasting, double per_torque) {
+    double torque = NAN;
+    for (int64_t number = -1, before = -2, n = 0; number != before && n < MOST_TRIALS; n++) {
+        const Piece piece = piece_of(curve, before = number, duty);
+        torque = (piece.torque + piece.slope * coasting) / (1.0 - piece.slope * per_torque);
+        number = next_piece(curve, number, coasting + per_torque * torque);
+    }
+    return torque;
+}
+
+EXPORT void curve_torques(const double *curve, const double *coasting, const double *per_torque, double duty, double *out,
+                          int64_t count) {
+    for (int64_t n = 0; n < count; n++) out[n] = curve_torque((const Curve *)curve, duty, coasting[n], per_torque[n]);
+}

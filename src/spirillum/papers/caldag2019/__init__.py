@@ -1,0 +1,1 @@
+"""Caldag and Yesilyurt 2019: a one-piece magnetic swimmer in closed tubes."""

@@ -1,0 +1,216 @@
+"""Form of a tail beyond one plain helix: several starts, sizes that vary along it, a centre line through points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples, Tensors, Values
+
+Along = tuple[tuple[float, float], ...]
+"""Factor along the tail: (share of its length, factor) from 0 to 1; empty where it is uniform."""
+CurvePoints = tuple[tuple[float, float, float], ...]
+"""Points of a centre line in the tail's frame, mm: x from the root to the tip on the motor axis, right-handed."""
+
+_PER_GAP = 24
+"""Samples between two points of a centre line, from which its lengths and bends follow."""
+ROOT_SHARE = 0.05
+"""Share of the wires' length in which those of several starts may touch: there they are joined."""
+_SHARES: Samples = np.linspace(0.0, 1.0, 129)
+
+
+class TailForm(NamedTuple):
+    """What makes a tail of its sizes: hashable, shared by the robots of a batch."""
+
+    starts: int = 1
+    """Identical wires, evenly spaced around the axis."""
+    amplitude: Along = ()
+    """Local amplitude over the largest."""
+    wavelength: Along = ()
+    """Local wavelength over the mean one, that of as many turns."""
+    curve: CurvePoints = ()
+    """A centre line in place of the helix, mm."""
+    tolerance: float = 0.0
+    """Root mean square distance by which smoothing may move its points, m."""
+
+    @classmethod
+    def read(cls, values: Sequence[Any]) -> TailForm:
+        """From JSON, which has lists."""
+        starts, amplitude, wavelength, curve, tolerance = values
+        points: list[Any] = [tuple(map(tuple, part)) for part in (amplitude, wavelength, curve)]
+        return cls(starts, points[0], points[1], points[2], tolerance)
+
+    @property
+    def is_helix(self) -> bool:
+        """Whether each wire is a helix of one amplitude and wavelength."""
+        return not (self.amplitude or self.wavelength or self.curve)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the tail is one such helix."""
+        return self.starts == 1 and self.is_helix
+
+    @property
+    def turns(self) -> Samples:
+        """Angle of each wire about the axis against the first, rad, (starts,)."""
+        turns: Samples = 2.0 * np.pi * np.arange(self.starts) / self.starts
+        return turns
+
+    @property
+    def rotations(self) -> Tensors:
+        """Rotation of each wire about the axis against the first, (starts, 3, 3)."""
+        cos, sin, zero = np.cos(self.turns), np.sin(self.turns), np.zeros(self.starts)
+        rows = [[zero + 1.0, zero, zero], [zero, cos, -sin], [zero, sin, cos]]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    @property
+    def centre(self) -> CentreLine:
+        """The centre line through the points."""
+        return centre_line(self.curve, self.tolerance)
+
+    def amplitude_at(self, share: Values) -> tuple[Values, Values]:
+        """Local over largest amplitude at shares of the length, and its derivative by the share."""
+        line, slope, _ = _along(self.amplitude)
+        top = max(value for _, value in self.amplitude)
+        return line(share) / top, slope(share) / top
+
+    def wavenumber_at(self, share: Values) -> tuple[Values, Values]:
+        """Local over mean wavenumber at shares of the length, and its integral from the root."""
+        rate, _, whole = _along(self.wavelength, inverse=True)
+        return rate(share) / whole(1.0), whole(share) / whole(1.0)
+
+    def widths(self, amplitude: Values, wavelength: Values) -> tuple[Values, Values]:
+        """Local amplitude and wavelength at shares along the tail, (..., shares); sizes as they are for a helix."""
+        b, wave = np.asarray(amplitude)[..., None], np.asarray(wavelength)[..., None]
+        if self.amplitude:
+            b = b * self.amplitude_at(_SHARES)[0]
+        if self.wavelength:
+            wave = wave / self.wavenumber_at(_SHARES)[0]
+        both: tuple[Values, Values] = np.broadcast_arrays(b, wave)[0], np.broadcast_arrays(b, wave)[1]
+        return both
+
+    def arc_length(self, amplitude: Values, wavelength: Values, length: Values) -> Values:
+        """Length of a wire without the rise of its amplitude at the root, m."""
+        if self.curve:
+            return np.full(np.shape(length), self.centre.length)
+        b, wave = self.widths(amplitude, wavelength)
+        stretch = np.hypot(1.0, 2.0 * np.pi * b / wave)
+        mean: Values = np.trapezoid(stretch, _SHARES, axis=-1) if stretch.shape[-1] > 1 else stretch[..., 0]
+        return length * mean
+
+
+PLAIN = TailForm()
+"""One plain helix."""
+
+
+@lru_cache(maxsize=64)
+def _along(points: Along, *, inverse: bool = False) -> tuple[Any, Any, Any]:
+    """Monotone interpolation of factors, its derivative and integral; of their inverses by many points."""
+    from scipy.interpolate import PchipInterpolator
+
+    share, value = np.array(points).T
+    line = PchipInterpolator(share, value)
+    if inverse:
+        fine = np.union1d(share, np.linspace(0.0, 1.0, 257))
+        line = PchipInterpolator(fine, 1.0 / line(fine))
+    return line, line.derivative(), line.antiderivative()
+
+
+def mean_of_inverse(points: Along) -> float:
+    """Mean of the inverse of a factor along the tail."""
+    return float(_along(points, inverse=True)[2](1.0))
+
+
+class CentreLine:
+    """A smooth centre line through points in the tail's frame, m; its parameter runs from 0 to 1."""
+
+    def __init__(self, points: Samples, tolerance: float) -> None:
+        """Interpolate by cubic splines over the length of chords, or smooth by splines of least knots."""
+        from scipy.interpolate import CubicSpline, PPoly, splprep
+
+        chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        self._knots = chord / chord[-1]
+        if tolerance > 0:
+            (knots, coefficients, degree), _ = splprep(points.T, u=self._knots, s=len(points) * tolerance**2)
+            parts = [PPoly.from_spline((knots, each, degree)) for each in coefficients]
+            self._spline: Any = PPoly(np.stack([part.c for part in parts], axis=-1), parts[0].x)
+        else:
+            self._spline = CubicSpline(self._knots, points)
+        fine = np.unique(np.linspace(self._knots[:-1], self._knots[1:], _PER_GAP + 1))
+        self.samples: Samples = self._spline(fine)
+        """Points along it, dense against its bends, (k, 3), m."""
+        first, second = self._spline(fine, 1), self._spline(fine, 2)
+        speed = np.linalg.norm(first, axis=1)
+        self.arc: Samples = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (speed[1:] + speed[:-1]))])
+        """Length from the root to those, m, (k,)."""
+        self.length = float(self.arc[-1])
+        """Length of the wire, m."""
+        self.curvature = float(np.max(np.linalg.norm(np.cross(first, second), axis=1) / speed**3))
+        """Largest curvature, 1/m."""
+        self.amplitude = float(np.max(np.hypot(self.samples[:, 1], self.samples[:, 2])))
+        """Largest distance from the axis, m."""
+        self.reach = float(np.max(self.samples[:, 0]))
+        """Largest axial distance from the root, m."""
+        self.nearest = float(np.min(self.samples[:, 0]))
+        """Smallest axial distance from the root, m."""
+        self.winding, self.turns = _turns(first / speed[:, None])
+
+    def at(self, share: Values) -> tuple[Values, Values]:
+        """Points (..., 3), m, and derivatives by the parameter."""
+        return self._spline(share), self._spline(share, 1)
+
+
+def _turns(tangents: Samples) -> tuple[float, float]:
+    """Turns of the tangent about the axis with their sign, and number of turns: for a flat wave those of a helix."""
+    across = tangents[:, 1] + 1j * tangents[:, 2]
+    winding = float(np.sum(np.angle(across[1:] * np.conj(across[:-1]), deg=False)) / (2.0 * np.pi))
+    flat = float(np.sum(np.abs(np.diff(across))) / (2.0 * np.pi * max(np.max(np.abs(across)), 1e-12)))
+    return winding, max(abs(winding) if flat > 0.5 * abs(winding) else 0.0, flat, 0.25)
+
+
+@lru_cache(maxsize=64)
+def centre_line(points: CurvePoints, tolerance: float) -> CentreLine:
+    """The centre line through points, mm, smoothed by a tolerance, m."""
+    return CentreLine(1e-3 * np.array(points), tolerance)
+
+
+def closest_strands(strands: Sequence[Samples], along: Samples, radius: float) -> float:
+    """Least distance between points of wires, further apart along one wire than half a tightest turn, m.
+
+    Infinite where none is closer than the wire's diameter.
+
+    Args:
+        strands: points along each wire, (k, 3), m.
+        along: lengths to these points, m, (k,).
+        radius: of the wire, m.
+    """
+    from scipy.spatial import cKDTree
+
+    points = np.concatenate(strands)
+    wire, at = np.repeat(np.arange(len(strands)), len(along)), np.tile(along, len(strands))
+    pairs = cKDTree(points).query_pairs(2.0 * radius, output_type="ndarray")
+    one, other = pairs.T
+    apart = (wire[one] != wire[other]) | (np.abs(at[one] - at[other]) > np.pi * radius)
+    distances = np.linalg.norm(points[one[apart]] - points[other[apart]], axis=1)
+    return float(np.min(distances, initial=np.inf))
+
+
+def strand_spacing(wavelength: Values, amplitude: Values, starts: int) -> Values:
+    """Least distance between neighbouring wires of a tail with several starts, m.
+
+    Points a turn t apart on neighbouring wires have d^2 = 2 b^2 (1 - cos t) + p^2 (t - 2 pi/n)^2 with p = lambda/2 pi;
+    its first minimum is found by bisection.
+    """
+    whole, p2 = 2.0 * np.pi / starts, (np.asarray(wavelength) / (2.0 * np.pi)) ** 2
+    b2 = np.asarray(amplitude) ** 2
+    low, high = np.zeros(np.broadcast_shapes(p2.shape, b2.shape)), np.full(1, whole)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        rising = b2 * np.sin(middle) + p2 * (middle - whole) > 0
+        low, high = np.where(rising, low, middle), np.where(rising, middle, high)
+    t = 0.5 * (low + high)
+    found: Values = np.sqrt(2.0 * b2 * (1.0 - np.cos(t)) + p2 * (t - whole) ** 2)
+    return found

@@ -1,0 +1,53 @@
+"""The columns of a study beside its models: held by `tube`, and trials, as `predict` has them."""
+
+import pytest
+
+import spirillum as sp
+from spirillum.errors import InputError
+from spirillum.studies.ranking import HELD, TRIAL, ranking_of
+
+ONE = {"title": "one", "robots": ["biorob2012-wide"], "models": ["sbt"], "friction": ["rotor"]}
+
+
+def test_a_study_without_walls_shows_what_tube_answers() -> None:
+    """Without being asked, and equal to `predict`; its own models keep their answers."""
+    found = sp.study(ONE)
+    alone = sp.predict("biorob2012-wide", motion="held")
+    assert float(found["forward_velocity_held"][0]) == pytest.approx(alone.forward_velocity, rel=1e-9)
+    assert float(found["tail_rotation_rate_held"][0]) == pytest.approx(alone.tail_rotation_rate, rel=1e-9)
+    assert HELD in ranking_of(found).quantities
+    assert ranking_of(found).best[0].quantity == "forward_velocity"
+    assert "forward_velocity_held" not in sp.study({**ONE, "models": ["tube"]})
+    assert "trial" not in found
+
+
+def test_trials_of_a_study_are_those_of_predict() -> None:
+    """One run each, equal to 1e-9, with its state and its pose; speed of contact that is stated too."""
+    contact = {"roughness": "20 um", "friction_coefficient": 0.05}
+    found = sp.study({**ONE, "trial": True, "contact": contact})
+    alone = sp.predict("biorob2012-wide", roughness="20 um", in_tube={"friction_coefficient": 0.05}).trial
+    assert alone is not None
+    assert float(found[TRIAL][0]) == pytest.approx(alone.values["forward_velocity"], rel=1e-9)
+    assert float(found["gap_trial"][0]) == pytest.approx(alone.values["gap"], rel=1e-9)
+    assert found["trial"].attrs["flag_meanings"].split()[int(found["trial"][0])] == "swimming"
+    assert "contact assumed, not validated" in str(found.attrs["warnings"])
+    assert list(ranking_of(found).quantities)[:3] == ["forward_velocity", HELD, TRIAL]
+
+
+@pytest.mark.slow
+def test_intervals_of_a_study_are_those_of_predict(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Median, low and high of 64 runs; a rerun computes nothing anew."""
+    found = sp.study(ONE, output=tmp_path / "one", interval=True)
+    alone = sp.predict("biorob2012-wide", interval=True).trial
+    assert alone is not None
+    for end in ("median", "low", "high"):
+        expected = getattr(alone.intervals["forward_velocity"], end)
+        assert float(found[f"{TRIAL}_{end}"][0]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_an_interval_is_of_a_trial() -> None:
+    """And a trial needs nothing fitted."""
+    with pytest.raises(InputError, match="interval without trial"):
+        sp.study({**ONE, "interval": True})
+    with pytest.raises(InputError, match="trial with a store"):
+        sp.study({**ONE, "trial": True}, store="never.zarr")
