@@ -43,7 +43,7 @@ def main() -> None:
         if arguments.channel not in (None, channel) or arguments.amplitude not in (None, amplitude):
             continue
         for table in built_tables(robots, workers=arguments.workers, progress=_tell):
-            table.write(_FOLDER / f"{table.key}.table")
+            table.write(_FOLDER / f"{table.key}.table", f"{channel}.film")
             errors = ", ".join(f"{name.replace('_', ' ')} {100.0 * value:.2g} %" for name, value in table.error.items())
             print(f"{channel}, {1e3 * table.geometry.wavelength:g} x {amplitude:g} mm: {errors}")
 

@@ -36,6 +36,12 @@ def test_no_robot_is_one_sentence(run) -> None:  # type: ignore[no-untyped-def]
     assert "no robot; allowed: a preset's name" in outcome.err
 
 
+def test_fine_and_a_stage_exclude_each_other(run) -> None:  # type: ignore[no-untyped-def]
+    refused = run("prepare", "biorob2012-wide", "--fine", "--stage", "straight")
+    assert refused.code == 2
+    assert "--fine and --stage are mutually exclusive" in refused.err
+
+
 def test_of_several_robots_the_one_that_has_no_table_is_named() -> None:
     bath = sp.load("biorob2012-narrow", channel="none", name="bath")
     with pytest.raises(sp.InputError, match=r"^bath.*channel"):

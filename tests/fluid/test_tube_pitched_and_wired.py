@@ -8,10 +8,10 @@ import pytest
 
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.tube.confined import Held, held_in_tube
-from spirillum.fluid.tube.reduced import Reduced
+from spirillum.fluid.tube.reduced import Reduced, _unbounded
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
-from spirillum.fluid.wire.interaction import Discretisation, share, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
 from spirillum.kernels.blobs import force_matrix
@@ -348,9 +348,9 @@ def test_reduced_basis_against_all_fields(seat: Seat, accuracy: Literal["standar
     away = float(np.min(seat.distances(sources.x, sources.rho)))
     wall = solids.rings.sent(reduced.waves, solids.systems, placed, along, away)
     free: list[list[np.ndarray]] = [[], []]
-    for m, cross in enumerate(sources.velocities(solids.panels, solids.modes)):
+    for m, cross in enumerate(_unbounded(solids, sources)):
         for family, turn in zip(free, (np.real, np.imag), strict=True):
-            family.append(share(m) * sources.columns(cross * turn(sources.turn(m, cross.shape[1]))))
+            family.append(sources.columns(cross * turn(sources.turn(m, cross.shape[1]))))
     fields = [rows.gathered(family) for rows, family in zip(solids.rows, free, strict=True)]
     fields = [np.concatenate(fields)] if len(wall) == 1 else fields
     for values, reflected in zip(fields, wall, strict=True):

@@ -518,10 +518,22 @@ def test_on_the_axis_every_tilt_is_a_pitch() -> None:
 )
 def test_a_table_whose_head_is_wrong_is_none(change: dict[str, Any], tmp_path: Path) -> None:
     path = next((Path(library.__file__).parent / "tables").glob("*.table"))
-    head, packed = packed_from(path.read_bytes())
-    (tmp_path / "a.table").write_bytes(to_bytes(json.dumps(json.loads(head) | change).encode(), packed))
+    head, packed = packed_from(path)
+    (tmp_path / "a.table").write_bytes(to_bytes(json.dumps(head | change).encode(), packed))
     with pytest.raises(InputError, match="no table"):
         TubeTable.read(tmp_path / "a.table")
+
+
+def test_tables_that_share_a_film_are_read_as_they_were_written(tmp_path: Path) -> None:
+    table = shipped()
+    table.write(tmp_path / "whole.table")
+    table.write(tmp_path / "shared.table", "body.film")
+    whole, shared = (TubeTable.read(tmp_path / name) for name in ("whole.table", "shared.table"))
+    np.testing.assert_array_equal(shared.packed, whole.packed)
+    np.testing.assert_allclose(shared.packed, table.packed, rtol=1e-6, atol=1e-9)
+    (tmp_path / "body.film").unlink()
+    with pytest.raises(InputError, match="no table"):
+        TubeTable.read(tmp_path / "shared.table")
 
 
 @lru_cache

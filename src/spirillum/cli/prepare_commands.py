@@ -20,9 +20,11 @@ def prepare(
         typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
     ] = None,
     stage: Annotated[
-        str,
-        typer.Option(help="straight (constrained motion), yaw (motion after release too) or fine (for publication)."),
-    ] = "yaw",
+        str | None,
+        typer.Option(
+            help="straight (constrained motion), yaw (motion after release too; the default) or fine (for publication)."
+        ),
+    ] = None,
     fine: Annotated[bool, typer.Option("--fine", help="Short for --stage fine.")] = False,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
     settings: Settings = None,
@@ -42,10 +44,12 @@ def prepare(
 
     if not robots and study is None:
         raise InputError("no robot; allowed: a preset's name or a robot file, several of them, or --study FILE")
+    if fine and stage is not None:
+        raise InputError("--fine and --stage are mutually exclusive; allowed: one of them")
     asked = [loaded_robot(robot, settings) for robot in robots or []]
     if study is not None:
         loaded = load_study(study_of(study), overrides_from(settings))
         asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
-        found = prepare_all(asked, stage="fine" if fine else stage, workers=workers, progress=progress)
+        found = prepare_all(asked, stage="fine" if fine else stage or "yaw", workers=workers, progress=progress)
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)

@@ -84,7 +84,7 @@ TubeForm = Literal["auto", "table", "direct"]
 
 
 class TubeOptions(Section):
-    """Options of the robot in its tube; the form of the wire is that of `SlenderOptions`."""
+    """Options of the robot in its tube; its wires are `high` unless they are long, or `SlenderOptions` asks for it."""
 
     form: TubeForm = "auto"
     """`table` (see `spirillum prepare`), `direct` (the flow is solved for), or `auto`: the table where there is one."""

@@ -36,19 +36,16 @@ from spirillum.fluid.tube.outer_resistance import (
     solved_as_one,
 )
 from spirillum.fluid.tube.progress_messages import kept_after, progress_message
-from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors, response_of
-from spirillum.fluid.tube.tube import check_solvable
+from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
+from spirillum.fluid.tube.tube import check_solvable, finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.fluid.wire.slender import MOST_STATIONS
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.film_table import film_at
 from spirillum.kernels.tube_table import MOTIONS
 from spirillum.robot.outline import Outline
-from spirillum.robot.placement import Placement
-from spirillum.robot.tube_pose import Seat, gap_of
+from spirillum.robot.tube_pose import Seat
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
 
@@ -111,8 +108,6 @@ _NEAR_GLASS = 0.9
 _SEED = 20121
 _NO_YAW = kernel.yaw_limit_of(np.zeros(1), np.zeros(1), np.zeros(1), 0.0)
 """Limit of the yaw of a table without yawed nodes."""
-_WIRE_PHASES, _WIRE_TOLERANCE = 3, 0.05
-"""Resolution at which both forms of the wire are compared: their ratio is good to a hundredth of their difference."""
 
 
 def built_tables(
@@ -162,31 +157,21 @@ def _solved_tables(
     checked = [pose for some in (*straight, *yawed) for pose in some]
     true = iter(solutions(checked, "checking the table", progress, workers))
     without = [_largest_errors(table, some, true) for table, some in zip(packed, straight, strict=True)]
-    errors = [
+    with_yaw = [
         _largest_errors(table, some, true) if some else known
         for table, some, known in zip(packed, yawed, without, strict=True)
     ]
-    wires = [_wire_error(places, workers) if places.stage.compares_wires else None for places in every]
     seconds = (time.perf_counter() - start) / len(every)
     return [
-        TubeTable(places.geometry, places.radius, table, error, level, len(some), seconds, wire, places.stage.name)
-        for places, some, table, error, level, wire in zip(every, nodes, packed, errors, without, wires, strict=True)
+        TubeTable(places.geometry, places.radius, table, error, level, len(some), seconds, _wire(places), stage.name)
+        for places, some, table, error, level in zip(every, nodes, packed, with_yaw, without, strict=True)
+        for stage in [places.stage]
     ]
 
 
-def _wire_error(places: Places, workers: int = 1) -> float | None:
-    """Relative difference of the forward velocities with `standard` and `high` wires, level; None for long wires."""
-    g = places.geometry
-    if g.stations > MOST_STATIONS["high"]:
-        return None
-    seat = Seat.at_gap(g.body, places.radius, max(gap_of(Placement(), g.body_diameter, places.radius), places.thinnest))
-    tail = g, even_phases(_WIRE_PHASES, g.form.starts)
-    standard, high = Fineness("standard", _WIRE_TOLERANCE), Fineness("high", _WIRE_TOLERANCE)
-    asked = [NodeSolution((tail,), seat, fineness) for fineness in (standard, high)]
-    speeds = [
-        response_of(np.mean(found[0], axis=0))[0] for found in solutions(asked, "checking the wire", None, workers)
-    ]
-    return float(abs(speeds[1] / speeds[0] - 1.0))
+def _wire(places: Places) -> float | None:
+    """None for the form of the wire: its error is then the largest that was measured."""
+    return 0.0 if finest_wire(places.geometry) == "high" else None
 
 
 @lru_cache(maxsize=4)
@@ -344,8 +329,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
         seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            finest = FINE.fineness(np.inf, level=bool(seat.pitch == 0 and seat.yaw == 0))
-            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, finest))
+            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, places.resolution(np.inf, seat, FINE)))
     return chosen
 
 

@@ -17,6 +17,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
+from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.outline import Arc, Outline
@@ -140,7 +141,12 @@ class Places:
     def fineness(self, t: float, seat: Seat) -> Fineness:
         """Resolution of the flow at a place."""
         gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
-        return self.stage.fineness(float(gap), level=bool(seat.pitch == 0 and seat.yaw == 0))
+        return self.resolution(float(gap), seat)
+
+    def resolution(self, gap: float, seat: Seat, stage: Stage | None = None) -> Fineness:
+        """Resolution of a stage, or of this one, with the finest wire; the gap is over the body's radius."""
+        found = (stage or self.stage).fineness(gap, level=bool(seat.pitch == 0 and seat.yaw == 0))
+        return replace(found, wire=finest_wire(self.geometry))
 
     @cached_property
     def most_yaw(self) -> Samples:

@@ -97,7 +97,7 @@ class Reduced:
         for number, (wall, (rows, _)) in enumerate(zip(walls, picked, strict=True)):
             gather = np.linalg.pinv(wall[rows])
             fields = [np.tensordot(gather, values[number], axes=1) for values in received]
-            found.append(_answers(solids, number, crossing, wall, fields))
+            found.append(_answers(solids, number, crossing, _sizes(sources), wall, fields))
         edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
         return [
             cls(tail, waves, solids.gap, tuple(answers.only(low, high, sources.x.size) for answers in found))
@@ -159,13 +159,28 @@ def _swept(sources: Sources) -> Samples:
 def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
     """Velocities of each mode on all nodes from ring sources in unbounded fluid, (3 nodes, sources)."""
     found: list[Samples] = []
+    screen = np.repeat(_screen(solids, sources), 3, axis=0)[:, :, None]
     for last, bearing in solids.tiers:
         cross = sources.velocities(solids.panels.of_solids(bearing), last)
         rows = np.flatnonzero(np.repeat(bearing[solids.panels.solid_of_node], 3))
         for m in range(len(found), last):
-            whole = np.zeros((3 * solids.panels.size, cross[m].shape[1]))
-            whole[rows] = share(m) * cross[m]
-            found.append(whole)
+            whole = np.zeros((*screen.shape[:2], cross[m].shape[1] // sources.x.size))
+            whole[rows] = share(m) * cross[m].reshape(len(rows), sources.x.size, -1)
+            whole[:, :, 3:] *= screen
+            found.append(whole.reshape(len(whole), -1))
+    return found
+
+
+def _screen(solids: Solids, sources: Sources) -> Samples:
+    """What the wall leaves of the velocity on solids from torques at the wires, (nodes, stations).
+
+    The velocity falls off as the square of the distance, and nearly vanishes in a film at the wall: an image behind a
+    plane wall takes it away. Without it torques of a fraction of a percent would press the film under the body.
+    """
+    x, rho = (values.ravel()[:, None] for values in (solids.panels.x, solids.panels.rho))
+    apart = (x - sources.x) ** 2 + (rho - sources.rho) ** 2
+    clear = solids.seat.distances(x.ravel(), rho.ravel())[:, None] * solids.seat.distances(sources.x, sources.rho)
+    found: Samples = 1.0 - apart / (apart + 4.0 * np.maximum(clear, 0.0))
     return found
 
 
@@ -198,12 +213,18 @@ def _mixing(size: int, columns: int, seed: int = 0) -> Samples:
     return mixed
 
 
+def _sizes(sources: Sources) -> Samples:
+    """Forces and torques of ring sources that move the fluid alike at a blob radius, (stations, 6)."""
+    blob = np.concatenate([np.full((len(wire.points), 3), wire.blob) for wire in sources.wires])
+    return np.concatenate([np.ones_like(blob), blob], axis=1)
+
+
 def _duals(system: System) -> Samples:
     return np.concatenate([family.dual for family in system])
 
 
 def _answers(
-    solids: Solids, number: int, crossing: list[Samples], wall: Samples, coefficients: list[Samples]
+    solids: Solids, number: int, crossing: list[Samples], sizes: Samples, wall: Samples, coefficients: list[Samples]
 ) -> Answers:
     """Solids' response of one system.
 
@@ -211,6 +232,7 @@ def _answers(
         solids: solids and wall.
         number: of the system.
         crossing: see `_unbounded`.
+        sizes: see `_sizes`.
         wall: basis of the fields that the wall reflects, (unknowns, fields).
         coefficients: of those, see `Answers`.
     """
@@ -222,7 +244,8 @@ def _answers(
     for family in system:
         for m, rows in enumerate(family.of_mode):
             here = slice(first + family.starts[m], first + family.starts[m + 1])
-            weighted.append(root[here] * crossing[m][rows])
+            values = root[here] * crossing[m][rows]
+            weighted.append(values * sizes[:, : values.shape[1] // len(sizes)].ravel() if values.size else values)
             places.append((family.parity, m, here))
         first += family.dual.size
     largest = max(float(np.max(np.linalg.norm(values, axis=0), initial=0.0)) for values in weighted)
@@ -233,7 +256,7 @@ def _answers(
         block[here] = fields
         blocks.append(block)
         if fields.size:
-            free.append((parity, m, fields.T @ values))
+            free.append((parity, m, fields.T @ values / sizes[:, : values.shape[1] // len(sizes)].ravel()))
     basis = np.concatenate([np.concatenate(blocks, axis=1) / root, wall], axis=1)
     tractions = solids.solve_system(number, basis)
     acting = (dual[:, None] * basis).T

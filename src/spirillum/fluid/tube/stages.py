@@ -47,8 +47,6 @@ class Stage:
     """Whether it has yawed nodes."""
     film_yaws: int = 5
     """Polynomials in yaw of the film."""
-    compares_wires: bool = False
-    """Whether both forms of the wire are compared for the stated error."""
 
     def fineness(self, gap: float, *, level: bool) -> Fineness:
         """Return the resolution of a node.
@@ -97,7 +95,6 @@ FINE = Stage(
     seconds=(10.0, 17.0),
     held_out=6,
     accuracy=1.0,
-    compares_wires=True,
 )
 STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW, FINE)}
 """From the coarsest to the finest: each answers what those before it answer."""

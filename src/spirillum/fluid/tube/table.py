@@ -19,6 +19,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.nodes import CHECKED_FROM
 from spirillum.fluid.tube.stages import STAGES, StageName
-from spirillum.fluid.tube.table_errors import RESPONSES, SOLIDS_ERROR, at_any_place, wire_error
+from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR, RESPONSES, SOLIDS_ERROR
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
 from spirillum.kernels import film_table
@@ -47,32 +48,57 @@ _LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
 
 def to_bytes(head: bytes, table: Samples) -> bytes:
     """A table as the content of its file."""
+    return _compressed(head + b"\n" + _coded_outer(table) + film_code(table))
+
+
+def film_code(table: Samples) -> bytes:
+    """The film of a table, coded; the same for all tails of a body in its tube."""
+    head, film = _film_of(kernel.parts_of(table).film)
+    return head.astype("<f8").tobytes() + _coded(film / _FILM)
+
+
+def _coded_outer(table: Samples) -> bytes:
+    """All of a table but its film, coded."""
     parts = kernel.parts_of(table)
-    film_head, film = _film_of(parts.film)
     rows = _rows_of(parts.rest)
     counts = np.array([parts.nodes.size, rows.size], dtype="<f8")
-    exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows, film_head))
+    exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows))
     steps = _steps(rows)
     yawed = _times(kernel.yaw_parts_at_nodes(), parts.yawed)
-    coded = _coded(parts.rest / steps) + _coded(yawed / steps) + _coded(film / _FILM)
-    return sealed(lzma.compress(head + b"\n" + exact + coded, filters=[_FILTER]))
+    return exact + _coded(parts.rest / steps) + _coded(yawed / steps)
 
 
-def packed_from(stored: bytes) -> tuple[bytes, Samples]:
-    """Head and packed table from the content of a file.
+def _compressed(content: bytes) -> bytes:
+    return sealed(lzma.compress(content, filters=[_FILTER]))
+
+
+def _opened(path: Path) -> bytes:
+    """The content of a file of `_compressed`.
 
     Raises:
         ValueError: if it is none.
     """
-    content = unsealed(stored)
+    content = unsealed(read_bytes(path, "a table", _LARGEST_FILE))
     if content is None:
         raise ValueError("damaged")
     try:
-        opened = lzma.LZMADecompressor(memlimit=_MOST_MEMORY).decompress(content, _LARGEST)
+        return lzma.LZMADecompressor(memlimit=_MOST_MEMORY).decompress(content, _LARGEST)
     except lzma.LZMAError as error:
         raise ValueError("no table") from error
-    head, _, rest = opened.partition(b"\n")
-    return head, _Reader(rest).table()
+
+
+def packed_from(path: Path) -> tuple[dict[str, Any], Samples]:
+    """Head and packed table from a file, and from the one beside it that has its film.
+
+    Raises:
+        ValueError: if it is none.
+    """
+    words, _, coded = _opened(path).partition(b"\n")
+    head = json.loads(words)
+    film = head.pop("film", None)
+    if film is not None:
+        coded += _opened(path.with_name(Path(str(film)).name))
+    return head, _Reader(coded).table()
 
 
 class _Reader:
@@ -85,9 +111,9 @@ class _Reader:
         """The packed table."""
         counts = self._exact(2).astype(int)
         nodes, rows = self._exact(int(counts[0])), self._exact(int(counts[1]))
-        head = self._exact(film_table.HEAD)
         shapes = kernel.shapes_of(nodes)
         rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
+        head = self._exact(film_table.HEAD)
         yawed = _times(np.asarray(np.linalg.inv(kernel.yaw_parts_at_nodes()), dtype=np.float64), yawed)
         film = (self._whole(film_table.shape_of(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
@@ -100,7 +126,8 @@ class _Reader:
     def _whole(self, shape: tuple[int, ...]) -> Samples:
         """Decode the result of `_coded`."""
         planes = np.frombuffer(self._taken(4 * int(np.prod(shape))), np.uint8).reshape(4, -1)
-        changes = np.ascontiguousarray(planes.T).view("<i4").reshape(shape[-1], *shape[:-1])
+        folded = np.ascontiguousarray(planes.T).view("<u4").reshape(shape[-1], *shape[:-1])
+        changes = (folded >> 1).astype(np.int32) ^ -(folded & 1).astype(np.int32)
         whole = np.moveaxis(changes, 0, -1).astype(np.int32)
         for axis in (0, 1):
             whole = np.cumsum(whole, axis=axis, dtype=np.int32)
@@ -115,10 +142,11 @@ class _Reader:
 
 
 def _coded(values: Samples) -> bytes:
-    """Values, rounded, as changes along their first two axes: small ones, whose upper bytes are alike."""
+    """Values, rounded, as changes along their first two axes, sign last: small ones, whose upper bytes are zero."""
     whole = np.rint(np.clip(values, -_MOST_STEPS, _MOST_STEPS)).astype(np.int32)
     for axis in (0, 1):
         whole = np.diff(whole, axis=axis, prepend=np.int32(0))
+    whole = (whole << 1) ^ (whole >> 31)
     ordered = np.ascontiguousarray(np.moveaxis(whole, -1, 0)).astype("<i4")
     return ordered.ravel().view(np.uint8).reshape(-1, 4).T.tobytes()
 
@@ -150,7 +178,7 @@ def _film_of(film: Samples) -> tuple[Samples, Samples]:
     return head, values.reshape(shape).astype(np.float64)
 
 
-_FORMAT = "spirillum.tube-table/6"
+_FORMAT = "spirillum.tube-table/7"
 _LARGEST_FILE = 2**21  # bytes
 
 
@@ -173,7 +201,7 @@ class TubeTable:
     seconds: float
     """Time that it took."""
     wire: float | None = None
-    """Relative error of the forward velocity by the form of the wire, compared when it was made; None: not compared."""
+    """Relative error of the forward velocity against the finest form of the wire; None: the largest measured one."""
     stage: StageName = "fine"
     """Nodes and resolution."""
 
@@ -217,7 +245,7 @@ class TubeTable:
         Args:
             yaw: nose to the side, rad.
         """
-        known = wire_error(self.geometry, self.radius) if self.wire is None else at_any_place(self.wire)
+        known = LARGEST_WIRE_ERROR if self.wire is None else self.wire
         return float(self.error_at(yaw)["forward_velocity"]) + known + FINEST_WIRE_ERROR + SOLIDS_ERROR
 
     def mirrored(self) -> TubeTable:
@@ -225,8 +253,13 @@ class TubeTable:
         geometry = self.geometry._replace(hand=-self.geometry.hand)
         return replace(self, geometry=geometry, packed=kernel.mirror_image(self.packed))
 
-    def write(self, path: Path) -> None:
-        """Write it, whole or not at all, its numbers rounded to some 1e-5; see `table_file`."""
+    def write(self, path: Path, film: str | None = None) -> None:
+        """Write it, whole or not at all, its numbers rounded to some 1e-5.
+
+        Args:
+            path: file.
+            film: name of a file beside it that has its film, which tails share; None: in the same file.
+        """
         head = {
             "format": _FORMAT,
             "geometry": self.geometry._asdict(),
@@ -238,8 +271,14 @@ class TubeTable:
             "wire": self.wire,
             "stage": self.stage,
         }
+        content = to_bytes(json.dumps(head).encode(), self.packed)
+        if film is not None:
+            words = json.dumps(head | {"film": film}).encode()
+            content = _compressed(words + b"\n" + _coded_outer(self.packed))
+            with atomic_write(path.with_name(film), replace="any") as temporary:
+                temporary.write_bytes(_compressed(film_code(self.packed)))
         with atomic_write(path, replace="any") as temporary:
-            temporary.write_bytes(to_bytes(json.dumps(head).encode(), self.packed))
+            temporary.write_bytes(content)
 
     @classmethod
     def read(cls, path: Path) -> TubeTable:
@@ -257,8 +296,7 @@ class TubeTable:
 def _read(path: Path) -> TubeTable | None:
     """The table in a file; None for any other file."""
     try:
-        words, packed = packed_from(read_bytes(path, "a table", _LARGEST_FILE))
-        head = json.loads(words)
+        head, packed = packed_from(path)
         if head.pop("format") != _FORMAT:
             return None
         geometry = RobotGeometry.read(head.pop("geometry"))

@@ -1,17 +1,10 @@
-"""Errors of a table's resistance matrices and of the wire resolution `standard`, on which tables are based.
-
-`response_errors` compares matrices by the robot's response to its turning tail. `wire_error` compares `standard` with
-`high` wires: a new table at one node, the shipped ones in `benchmarks/tube_wires.py`, level at a gap of 0.4 mm.
-"""
+"""Errors of a table's resistance matrices, by the robot's response to its turning tail."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
 RESPONSES = {
     "forward_velocity": 0.01,
@@ -57,76 +50,8 @@ def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None)
     return found
 
 
-_PLACES = 1.1
-"""Largest error at other poses, pitched by up to 3 degrees and at gaps from 0.3 mm up to the axis, over that one."""
 SOLIDS_ERROR = 2e-4
 """Relative error of the drag of a body in a tube at the coarsest tolerance of a table; see `docs/accuracy.md`."""
-_LEAST = 0.005
-"""Least relative error there: where errors of thrust and drag nearly cancel, their sum depends more on the pose."""
-_LENGTH, _WIRE = 60.0, 1.0  # of all that were measured, mm
-_MEASURED: dict[float, dict[tuple[float, float], float]] = {
-    40.0: {
-        (25.0, 1.5): 2.02,
-        (25.0, 2.0): 1.67,
-        (25.0, 2.5): 1.34,
-        (25.0, 3.5): 0.77,
-        (20.0, 1.5): 2.22,
-        (20.0, 2.0): 1.61,
-        (20.0, 2.5): 1.09,
-        (20.0, 3.5): 0.42,
-        (15.0, 1.5): 2.09,
-        (15.0, 2.0): 1.05,
-        (15.0, 2.5): 0.35,
-        (15.0, 3.5): -0.30,
-        (10.0, 1.5): 0.47,
-        (10.0, 2.0): -0.87,
-        (10.0, 2.5): -1.40,
-        (10.0, 3.5): -1.37,
-    },
-    30.0: {
-        (25.0, 1.5): 2.31,
-        (25.0, 2.0): 2.01,
-        (25.0, 2.5): 1.67,
-        (25.0, 3.5): 1.13,
-        (20.0, 1.5): 2.57,
-        (20.0, 2.0): 2.02,
-        (20.0, 2.5): 1.50,
-        (20.0, 3.5): 0.88,
-        (15.0, 1.5): 2.56,
-        (15.0, 2.0): 1.57,
-        (15.0, 2.5): 0.91,
-        (15.0, 3.5): 0.25,
-        (10.0, 1.5): 1.19,
-        (10.0, 2.0): -0.13,
-        (10.0, 2.5): -0.67,
-        (10.0, 3.5): -0.60,
-    },
-}
-"""By how much `high` wires are faster, percent: by the tube's diameter, wavelength and amplitude of the tail, mm."""
-
-
-def at_any_place(compared: float) -> float:
-    """Relative error for all poses, from that at the one pose at which both wires were compared."""
-    return _PLACES * max(abs(compared), _LEAST)
-
-
-LARGEST_WIRE_ERROR = at_any_place(max(abs(0.01 * error) for tube in _MEASURED.values() for error in tube.values()))
-"""The largest of all that were measured."""
-
-
-def wire_error(geometry: RobotGeometry, radius: float) -> float:
-    """Relative error of the forward velocity that a `standard` wire makes: measured, else the largest that was.
-
-    Args:
-        geometry: of the robot.
-        radius: R of its tube, m.
-    """
-
-    def of(length: float) -> float:
-        return round(1e3 * length, 9)
-
-    like = geometry.form.is_plain and math.isclose(of(geometry.tail_length), _LENGTH)
-    like = like and math.isclose(of(geometry.wire_diameter), _WIRE)
-    known = _MEASURED.get(of(2.0 * radius), {}) if like else {}
-    found = known.get((of(geometry.wavelength), of(geometry.amplitude)))
-    return LARGEST_WIRE_ERROR if found is None else at_any_place(0.01 * found)
+LARGEST_WIRE_ERROR = 0.0267
+"""Of the forward velocity with `standard` wires against `high` ones: the largest of `benchmarks/tube_wires.py`, 2.42 %,
+and a tenth more for other poses."""

@@ -33,11 +33,10 @@ from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
 from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
-from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, MOST_STATIONS, Slender, stations_of
+from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, Slender
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, within
-from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import Seat
 
@@ -49,6 +48,8 @@ _COARSER = 10.0
 """Tolerance of the resolution that gives the error estimate, over that of the result."""
 _COARSEST = 0.05
 """Coarsest tolerance of Fourier modes."""
+_MOST_FINE_STATIONS = 300
+"""Along a tail with `high` wires, whose equations then cost as much as the solids'."""
 _MOST_WAVES = 1_000_000
 """Orders and wave numbers together: minutes."""
 _MOST_UNKNOWNS = 11_000
@@ -192,13 +193,13 @@ def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
         index: which.
         phase: of the tail, rad.
     """
-    fineness = Tube().fineness(batch.options)
+    fineness = Tube().fineness(batch, index)
     return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
 
 
-def _has_finest_wire(batch: RobotBatch) -> bool:
-    """Whether all tails are short enough for `high` wires."""
-    return bool(np.all(stations_of(batch) <= MOST_STATIONS["high"]))
+def finest_wire(g: RobotGeometry) -> Accuracy:
+    """Form of the wire that the model takes: `high`, but for tails of more stations than are quickly solved for."""
+    return "high" if g.stations <= _MOST_FINE_STATIONS else "standard"
 
 
 class Tube(SwimmerModel):
@@ -222,7 +223,7 @@ class Tube(SwimmerModel):
         Args:
             coarser: factor of the tolerance.
             between: average over the phases halfway between those that start at 0.
-            wire: form of the wire; None: each robot's `model.slender.accuracy`.
+            wire: form of the wire; None: `high` by each robot's `model.slender.accuracy`, or where its tail allows it.
         """
         self._coarser, self._first, self._wire = coarser, 0.5 if between else 0.0, wire
 
@@ -236,26 +237,26 @@ class Tube(SwimmerModel):
             place = f"{' and '.join(unknown)}, not given here, {decide} much of the answer"
         else:
             place = "gap and pitch are taken as given: their own uncertainty comes on top"
-        standard = batch.options.slender.accuracy == "standard"
+        standard = any(self._wire_of(batch, index) == "standard" for index in range(batch.size))
         wire = f"; without walls, {validation_note(batch, CHECKED['slender'])}" if standard else ""
         return f"walls are computed, {what_is_fitted(fitted_by)}; {place}{wire}"
 
-    def fineness(self, options: ModelOptions) -> Fineness:
-        """Resolution of the flow with these options."""
-        return Fineness(
-            self._wire or options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST)
-        )
+    def fineness(self, batch: RobotBatch, index: int = 0) -> Fineness:
+        """Resolution of the flow around robot number `index`."""
+        tolerance = min(_CUT * self._coarser * batch.options.tube.tolerance, _COARSEST)
+        return Fineness(self._wire_of(batch, index), tolerance)
+
+    def _wire_of(self, batch: RobotBatch, index: int) -> Accuracy:
+        stated = batch.options.slender.accuracy
+        return self._wire or (stated if stated == "high" else finest_wire(RobotGeometry.of(batch, index)))
 
     def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
         """See `SwimmerModel.checked_by`: other phases give the error of the mean over a turn, too."""
-        coarser = Tube(_COARSER, between=True)
-        if batch.options.slender.accuracy == "high" or not _has_finest_wire(batch):
-            return (coarser,)
-        return coarser, Tube(_COARSER, between=True, wire="high")
+        return (Tube(_COARSER, between=True),)
 
     def unchecked_error(self, batch: RobotBatch) -> float:
-        """See `SwimmerModel.unchecked_error`; of wires too long for the finest form what that changes at most."""
-        return FINEST_WIRE_ERROR + (0.0 if _has_finest_wire(batch) else LARGEST_WIRE_ERROR)
+        """See `SwimmerModel.unchecked_error`; of `standard` wires what the finest form changes at most."""
+        return FINEST_WIRE_ERROR + (LARGEST_WIRE_ERROR if self._wire_of(batch, 0) == "standard" else 0.0)
 
     def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
         """See `ResistanceModel.placement_of`."""
@@ -273,7 +274,7 @@ class Tube(SwimmerModel):
         unknowns, waves, memory = np.zeros((3, batch.size))
         for index in within(batch, limits):
             g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
-            key = _solid_key(g, part, seat, self.fineness(batch.options))
+            key = _solid_key(g, part, seat, self.fineness(batch, index))
             unknowns[index] = _size(key)
             if unknowns[index] <= _MOST_UNKNOWNS:
                 waves[index] = _waves(key)
@@ -353,11 +354,10 @@ class Tube(SwimmerModel):
     def _full(self, batch: RobotBatch, part: str, phase: PerRobot) -> Samples:
         """R, load and drag of a part, (n, 13, 13), no net flux; NaN outside the domain."""
         found = np.full((batch.size, MOTIONS, MOTIONS), np.nan)
-        fineness = self.fineness(batch.options)
         turns = np.broadcast_to(phase, (batch.size,))
         for index in within(batch, self.part_domain(batch, part)):
             g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
-            question = _Question(g, part, seat, fineness, turn)
+            question = _Question(g, part, seat, self.fineness(batch, index), turn)
             found[index] = number_of(batch.viscosity, index) * _answer(question)
         return found
