@@ -72,7 +72,8 @@ def values_at(
 
 
 def _own_values(case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None) -> dict[str, CaseValue]:
-    robot, known = robot_of(case, point, trial), {}
+    robot = robot_of(case, point, trial)
+    known: dict[str, CaseValue] = {}
     if trial is not None:
         point = point.model_copy(update={"placement": {**point.placement, **trial.placement}})
     quantities = {name: case.quantities[name] for name in names}

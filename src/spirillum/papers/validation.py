@@ -247,10 +247,11 @@ def compute_case(name: str, progress: Progress | None = None, *, runs: bool = Fa
         _row(name, case, point, quantity, values, recorded[point.label][quantity]) for point, quantity in case.rows()
     )
     claims = [judge_trend(case, statement, rows) for statement in case.statements]
-    read = [statement.read for statement in case.statements]
+    read: list[Provenance] = [statement.read for statement in case.statements]
     if case.claims:
         more = study_claims(case.claims)
-        claims, read = [*claims, *more], [*read, *("text" for _ in more)]
+        stated: list[Provenance] = ["text"] * len(more)
+        claims, read = [*claims, *more], [*read, *stated]
     return CaseResult(name, case, rows, tuple(claims), tuple(read))
 
 

@@ -127,7 +127,7 @@ def _curves(axes: Axes, result: CaseResult) -> None:
     for number, series in enumerate(dict.fromkeys(row.series for row in rows)):
         part = sorted((row for row in rows if row.series == series), key=lambda row: row.x or 0.0)
         look: dict[str, Any] = {"color": COLOURS[_COLOURS[number]], "marker": _MARKERS[number]}
-        x = [row.x for row in part]
+        x = np.array([row.x for row in part], dtype=float)
         axes.plot(x, [row.ours for row in part], **look, label=f"{series}, ours" if series else "ours")
         if any(row.published for row in part):
             seen = [row.published or np.nan for row in part]
@@ -136,7 +136,7 @@ def _curves(axes: Axes, result: CaseResult) -> None:
                 x, seen, bars, **look, linestyle="none", markerfacecolor="white", label=f"{series}, published"
             )
     axes.set_xlabel(plain(result.case.x))
-    unit = "" if quantity.unit == "1" else f", {quantity.unit}"
+    unit = "" if quantity.unit == "1" else f" ({quantity.unit})"
     axes.set_ylabel(plain(f"{quantity.label}{unit}", 40))
     axes.legend()
 

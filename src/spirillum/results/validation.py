@@ -71,7 +71,7 @@ HEADER = ("Row", "Quantity", "Published", "Ours", "Difference", "Stated error", 
 
 def table_of(case: CaseResult) -> list[tuple[str, ...]]:
     """Return the rows of a case as texts, in the unit of the publication; see `HEADER`."""
-    found = []
+    found: list[tuple[str, ...]] = []
     for row in case.rows:
         unit = "" if row.quantity.unit == "1" else f" {row.quantity.unit}"
         spread = "" if row.uncertainty is None else f" ± {row.uncertainty:.3g}"

@@ -20,7 +20,7 @@ from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
-from spirillum.robot.outline import Arc, Outline
+from spirillum.robot.outline import Arc, Outline, Smooth
 from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
 
@@ -52,6 +52,8 @@ def rings_of(outline: Outline) -> Samples:
     for piece in outline.pieces:
         if isinstance(piece, Arc):
             rows.append((*piece.centre, abs(piece.semi_axes[0]), abs(piece.semi_axes[1])))
+        elif isinstance(piece, Smooth):
+            rows += [(x, rho, 0.0, 0.0) for x, rho in zip(*piece.fine[1:], strict=True)]
         else:
             rows += [(*piece.start, 0.0, 0.0), (*piece.end, 0.0, 0.0)]
     kept = [row for row in dict.fromkeys(rows) if row[1] > 0 or row[2] > 0]
