@@ -134,7 +134,7 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
     if tilted and model in MODELS and MODELS[model].placed:
         Console(stderr=True, soft_wrap=True).print(TILTED, highlight=False)
     quick = model not in MODELS or MODELS[model].closed_form
-    return at_work("solving for the flow (the first time, compiling takes some seconds)", quiet=quiet or quick)
+    return at_work("solving for the flow", quiet=quiet or quick)
 
 
 def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:

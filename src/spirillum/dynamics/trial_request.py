@@ -48,9 +48,11 @@ class TrialRequest:
             held: the answer.
             wanted: whether they are wanted.
         """
+        if self.duration is not None and self.duration <= 0.0:
+            raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         reason = why_not_released(held, fitted=self.fit.posterior is not None)
         if not wanted or reason:
-            self._check_unused()
+            self._check_unused(reason)
         if not wanted:
             return held
         if reason:
@@ -113,13 +115,14 @@ class TrialRequest:
 
         return with_interval(nominal, samples_of(robot, weight, unknowns), unknowns, run, self.progress)
 
-    def _check_unused(self) -> None:
-        """Refuse settings of a released motion for an answer without one."""
+    def _check_unused(self, reason: str) -> None:
+        """Refuse settings of a released motion for an answer without one, with the reason."""
         given = {"roughness": self.roughness, "duration": self.duration, "interval": self.interval or None}
         given |= {f"in_tube.{name}": self.in_tube.model_dump()[name] for name in self.in_tube.model_fields_set}
         for name, value in given.items():
             if value is not None:
+                why = f" ({reason})" if reason else ""
                 raise InputError(
-                    f"{name} = {str(value)[:40]} is of released motion in the tube; allowed: with model 'tube' and its "
-                    "table, and without motion 'held'"
+                    f"{name} = {str(value)[:40]} is of released motion in the tube, which this request does not "
+                    f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
                 )

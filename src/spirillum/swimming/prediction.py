@@ -291,7 +291,7 @@ def predict(
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
-        tell(TILTED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+        tell(TILTED if slow else chosen.name, 0, 1)
     checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = scenario.swim(batch)
     if not result.valid[0]:
