@@ -193,7 +193,10 @@ def test_a_wide_tube_returns_the_unbounded_flow(placed: Callable[..., Any], batc
     """The difference falls off as the radius grows, for a robot that is pulled."""
     points = np.array([[-0.06, 0.006, 0.001], [-0.02, 0.01, -0.02], [0.03, 0.0, 0.01], [-0.05, -0.01, 0.0]])
     alone = {"tail.length": "25 mm", "tail.wire_diameter": "1.5 mm", "coupling.diameter": "0 mm"}
-    unbounded = flow_field(batch_of(**alone), BODY, ROTOR, PHASE)
+    # As in the tube: wires of accuracy `high`, whose first moments the flow in a tube leaves out.
+    unbounded = flow_field(batch_of(**alone, **{"model.slender.accuracy": "high"}), BODY, ROTOR, PHASE)
+    solution = unbounded.solution
+    unbounded = replace(unbounded, solution=replace(solution, moments=np.zeros_like(solution.moments)))
     errors = []
     for diameter in (0.4, 0.8):
         fields = {**alone, "channel.diameter": f"{diameter} m", "model.tube.tolerance": 0.05}

@@ -105,15 +105,14 @@ def test_interpolated_errors_are_those_of_tails_in_between(
     np.testing.assert_allclose(stated, 100.0 * (found / true - 1.0), atol=margin)
 
 
-def test_speed_errors_are_those_of_the_page_and_of_the_readme() -> None:
-    """Of the reference robot, in the table of `docs/accuracy.md`, and in the table of models of README."""
+def test_speed_errors_are_those_of_the_page() -> None:
+    """Of the reference robot, in the tables of robots and of models of `docs/accuracy.md`."""
     robots = PAGE[PAGE.index("<!-- table: robot -->") :]
     rows = {line.split("|")[1].strip(): line.split("|")[2].strip() for line in robots.splitlines() if line[:2] == "| "}
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     for model, error in SPEED_ERRORS.items():
         assert rows[NAMES[model]] == f"+{error} %"
         assert find_swimmer_model(model).known_speed_error == pytest.approx(0.01 * error)
-        (row,) = re.findall(rf"^\| `{model}` \|.*$", readme, re.M)
+        (row,) = re.findall(rf"^\| `{model}` \|.*$", PAGE, re.M)
         assert row.count(f"speed +{error} %") == 1
         for name, column in (("drag", 0), ("thrust", 1), ("torque", 2)):
             ends = [errors[column] for errors in CHECKED[model].values()]
@@ -123,7 +122,7 @@ def test_speed_errors_are_those_of_the_page_and_of_the_readme() -> None:
 
 
 def _range(low: float, high: float) -> str:
-    """Ends of a range as README writes them, to whole per cent."""
+    """Ends of a range as the page writes them, to whole per cent."""
     return " to ".join(f"{round(end):+d}".replace("-", "−") for end in sorted((low, high), key=abs))
 
 

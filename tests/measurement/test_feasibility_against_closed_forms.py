@@ -168,7 +168,7 @@ def test_a_new_setup_file_is_valid_and_is_not_overwritten(tmp_path: Path) -> Non
         ({"duration": "0 s"}, "duration = 0 s"),
         ({"duration": "25 h"}, "duration = 90000 s; allowed: more than 0 s, at most 86400 s"),
         ({"frames_per_second": -1.0}, "fps = -1"),
-        ({"frames_per_second": 0.0}, "fps = 0; allowed"),
+        ({"frames_per_second": 0.0}, "fps = 0.0; allowed"),
         ({"tail_rate": "6 1/s"}, "expect-tail-rate"),
         ({"view_width": "3 s"}, "view-width"),
         ({"picture_width": 3}, "width = 3"),

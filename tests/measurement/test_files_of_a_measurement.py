@@ -217,7 +217,7 @@ def test_the_report_stands_alone_and_says_flags_and_failures(
         ({"tracking": False}, "--no-tracking without --marks"),
         ({"start": 5.0, "end": 4.0}, "end = 4 s; allowed: later than the start, 5 s"),
         ({"end": 0.0}, "end = 0 s; allowed: later than the start, 0 s"),
-        ({"start": -1.0}, "start = -1 s; allowed: 0 s or later"),
+        ({"start": -1.0}, 'start = "-1.0 s" is out of range; allowed: 0 s to 1e9 s'),
         ({"track": "t.csv"}, "track = t.csv with 2 videos; allowed: one video"),
         ({"overrides": {"tail.wavelength": "0 mm"}}, "tail.wavelength"),
     ],

@@ -59,6 +59,11 @@ def tree(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
+def without_tube(dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset without the columns that `tube` adds beside its models, which a store has not."""
+    return dataset.drop_vars([name for name in dataset.data_vars if str(name).endswith("_held")])
+
+
 def same(one: xr.Dataset, other: xr.Dataset) -> None:
     """Same values, names, units and warnings; coordinates are the same, too."""
     assert set(one.variables) == set(other.variables)
@@ -73,7 +78,7 @@ def same(one: xr.Dataset, other: xr.Dataset) -> None:
 @pytest.mark.usefixtures("small_regions")
 def test_store_holds_what_the_study_answers(whole: Path) -> None:
     stored = sp.study(GRID, store=whole)  # which is there: it is opened
-    same(sp.study(GRID), stored)
+    same(without_tube(sp.study(GRID)), stored)
     assert stored.attrs["finished"] == "yes"
     assert stored.attrs["unanswered"] == int(np.count_nonzero(stored["outside"])) > 0
     assert not (whole / "notes").exists()
@@ -92,7 +97,7 @@ def test_store_of_a_list_with_observed_rates_holds_what_the_study_answers(
     one = {**GRID, "grid": {**GRID["grid"], "wavelengths": ["25 mm"], "amplitudes": ["2.5 mm"]}}  # type: ignore[dict-item]
     seen = planted(one, "rft", "rotor", 1e-5)
     whole = sp.study(listed, observations=seen)
-    same(whole, sp.study(listed, observations=seen, store=tmp_path / "study.zarr"))
+    same(without_tube(whole), sp.study(listed, observations=seen, store=tmp_path / "study.zarr"))
     assert np.isfinite(whole["forward_velocity_at_observed_rate"]).any()
 
 
