@@ -71,7 +71,7 @@ def test_requests_about_a_body_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="this robot has none"):
         resistance(BARE, part="body")
     with pytest.raises(InputError, match="has no table"):
-        prepare(BARE)
+        prepare(load(BARE))
     with pytest.raises(InputError, match="takes a body"):
         simulate(BARE, model="rft", timing={"duration": "1 s"})
     (tmp_path / "bare.toml").write_text(robot_text(load(BARE)))
