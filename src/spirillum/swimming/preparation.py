@@ -102,11 +102,8 @@ def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
     return envelope("preparations", {"robots": [one.content for one in found]}, notes)
 
 
-Source = str | Path | Mapping[str, Any] | Robot
-
-
 def prepare(
-    robot: Source,
+    robot: str | Path | Mapping[str, Any] | Robot,
     *,
     stage: str = "yaw",
     workers: int = 1,
@@ -132,7 +129,7 @@ def prepare(
 
 
 def prepare_all(
-    robots: Sequence[Source],
+    robots: Sequence[str | Path | Mapping[str, Any] | Robot],
     *,
     stage: str = "yaw",
     workers: int = 1,
