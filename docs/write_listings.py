@@ -96,10 +96,16 @@ def _allowed(info: FieldInfo, kind: Kind | None) -> str:
     return _allowed_number_or_text(info)
 
 
+_FORMS = {"array": "points", "string": "a file", "null": "`none`"}
+"""Words for a type in a JSON schema."""
+
+
 def _choice(schema: dict[str, Any]) -> str:
     """One of several forms of a field, from its JSON schema."""
     if "minimum" in schema:
         return f"{schema['minimum']:g} to {schema['maximum']:g}"
+    if schema.get("type") in _FORMS:
+        return _FORMS[schema["type"]]
     words = schema.get("enum", [schema["const"]] if "const" in schema else ["true", "false"])
     return ", ".join(f"`{word}`" for word in words)
 
