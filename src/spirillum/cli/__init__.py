@@ -73,7 +73,7 @@ def _leave_threads(code: int) -> None:
 
 
 def _prepare() -> None:
-    """What only a separate process may set."""
+    """Settings that only a separate process may change."""
     gc.set_threshold(_OBJECTS)
     for ending in (signal.SIGINT, signal.SIGTERM):  # both end as cleanly, with the work that was started
         if signal.getsignal(ending) != signal.SIG_IGN:

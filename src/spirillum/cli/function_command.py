@@ -288,7 +288,7 @@ def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any
 
 
 def _value_kind(item: Declaration, metavar: str | None) -> tuple[Any, str | None]:
-    """Type of an option's value, and what stands for it in the help."""
+    """Type of an option's value, and its placeholder in the help."""
     words = item.words
     if "Path" in words:
         return Path, "FILE"

@@ -102,7 +102,7 @@ def _complete_friction(incomplete: str) -> list[str]:
 
 
 def complete_answers(incomplete: str) -> list[str]:
-    """What a robot in its tube may be fitted as."""
+    """Motions of a robot in its tube that can be fitted."""
     return starting(("held", "trial"), incomplete)
 
 
@@ -155,7 +155,7 @@ PANELS = {
 }
 """Panels of the help by argument, or by table (with a point)."""
 LISTED = "NAME,..."
-"""What stands for names with commas between them."""
+"""Placeholder of names separated by commas."""
 METAVARS = {
     "camera.size": "WIDTHxHEIGHT",
     "free": LISTED,

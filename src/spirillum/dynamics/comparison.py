@@ -87,9 +87,9 @@ class ModelComparison(DisplayMixin):
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """What each effect does to the speed, from Lighthill's theory to the trial.
+        """Speed after each effect, from Lighthill's theory to the trial.
 
-        Empty without `sbt` and `slender`, or with calibration factors, which stand for several effects at once.
+        Empty without `sbt` and `slender`, or with calibration factors, which represent several effects at once.
         """
         if any(answer.calibrated for answer in self.predictions.values()):
             return ()

@@ -26,7 +26,7 @@ class Effect(NamedTuple):
     """One step from Lighthill's theory to the trial."""
 
     name: str
-    """What is computed from here on."""
+    """Effect that is included from here on."""
     speed: float
     """Forward velocity with this effect and all before it, m/s."""
 

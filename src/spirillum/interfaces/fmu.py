@@ -91,7 +91,7 @@ def sources() -> dict[str, bytes]:
 
 
 def token_of(axial: AxialRobot, written: Mapping[str, bytes]) -> str:
-    """What an importer has to know to instantiate the FMU: a checksum of its numbers and its sources."""
+    """Token with which an importer instantiates the FMU: a checksum of its numbers and its sources."""
     said = repr((axial.robot.name, axial.values, axial.flow, axial.duty)).encode()
     return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
 

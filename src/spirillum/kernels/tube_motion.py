@@ -29,7 +29,7 @@ CAVITATION = 8  # the film's pressure is not below -p_c, Pa; infinite: without a
 SITES, STATIONS = 9, 10  # their numbers
 TUBE = 11
 RANGE_LEFT = "the range of the robot's table"
-"""How the event begins of a robot that tilts farther than its table is followed."""
+"""Prefix of the event of a robot that tilts farther than its table is followed."""
 CLOSED, OPEN, IMPOSED = 0.0, 1.0, 2.0  # kinds of ends
 
 

@@ -110,7 +110,7 @@ class Case(Section):
     references: list[str]
     """Keys of `citations.REFERENCES`."""
     source: str
-    """Where the numbers stand and how they were read."""
+    """Location of the numbers in the publication, and how they were read."""
     read: Provenance
     kind: Literal["experiment", "computation", "statements"]
     cost: Literal["seconds", "minutes"] = "seconds"
@@ -124,7 +124,7 @@ class Case(Section):
     curve: bool = False
     """Whether the figure shows the values over the abscissa too."""
     explanation: str
-    """What the comparison shows, and why it misses where it does."""
+    """Result of the comparison, and the reasons of its misses."""
     recorded_within: float = 0.01
     """Relative distance from the recorded value within which the program's has to be."""
     quantities: dict[str, CaseQuantity] = Field(default_factory=dict)

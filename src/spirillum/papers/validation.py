@@ -31,12 +31,12 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class AssumptionEffect:
-    """What one value of an assumption makes of a row."""
+    """Value of a row under one value of an assumption."""
 
     assumption: str
     value: str
     ours: float
-    """The row's value then, in its unit."""
+    """In the unit of the row."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class ValidationRow:
 
     @property
     def covered_by(self) -> str | None:
-        """What covers the published value; None without one.
+        """Reason why the published value is covered; None without one.
 
         `stated error`, together with the published uncertainty; these and the `assumptions`; or `nothing`.
         """

@@ -155,7 +155,7 @@ def _mean_effects(result: CaseResult) -> list[_Effect]:
 
 
 def _effects(axes: Axes, result: CaseResult, effects: Sequence[_Effect]) -> None:
-    """How each assumption changes ours."""
+    """Change of ours under each assumption."""
     axes.axvline(0.0, color="#444444", linewidth=0.8)
     for y, (_, changes) in enumerate(effects):
         for name, change in changes.items():

@@ -23,7 +23,7 @@ _SHARES: Samples = np.linspace(0.0, 1.0, 129)
 
 
 class TailForm(NamedTuple):
-    """What makes a tail of its sizes: hashable, shared by the robots of a batch."""
+    """Form of a tail beyond its sizes: hashable, shared by the robots of a batch."""
 
     starts: int = 1
     """Identical wires, evenly spaced around the axis."""

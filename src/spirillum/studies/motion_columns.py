@@ -27,11 +27,11 @@ from spirillum.swimming.model_choice import WALLED, has_table
 MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
 """Quantities of both columns."""
 POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
-"""Where a robot is in a trial, means over it."""
+"""Pose and contact of a robot, means over a trial."""
 ENDS = ("median", "low", "high")
 """Of an interval over the unknowns."""
 STATES = ("no-trial", "swimming", "standing")
-"""What became of a robot in its trial; the index in this list is the value in the dataset."""
+"""State of a robot in its trial; the index in this list is the value in the dataset."""
 _MOST_HELD = 1000
 """Robots of a study that are computed by `tube` without a request."""
 
@@ -85,7 +85,7 @@ class TrialTask(OneRobot):
         """Compute every quantity, (1,); NaN for a robot without a trial."""
         part: Part = {name: np.full(1, np.nan) for name in self.needed}
         part["state"] = np.zeros(1)
-        stated = self.contact.model_fields_set  # what nobody states is open in the interval
+        stated = self.contact.model_fields_set  # the others are unknowns of the interval
         contact = {name: getattr(self.contact, name) for name in stated}
         roughness = contact.pop("roughness", None)
         try:
@@ -133,7 +133,7 @@ def _placement(loaded: LoadedStudy, index: int) -> Placement:
 
 
 def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:
-    """What trials rest on, and which robots have none."""
+    """Assumptions of the trials, and the robots without one."""
     if not answers:
         return []
     words = f"trial: {ASSUMPTION}; released, 60 s of waiting, 20 s with the motor on, as `spirillum predict` has it"
@@ -180,6 +180,6 @@ def column_variables(
 
 
 def _meaning(name: str) -> str:
-    """What a value of a trial is."""
+    """Meaning of a value of a trial."""
     end = name.rpartition("_")[2]
     return "mean over a trial" if end not in ENDS else f"over what nobody states of a trial: {end} (90 % interval)"

@@ -131,7 +131,7 @@ class Study(Section):
     interval: Annotated[bool, Field(strict=True)] = False
     """Also give the 90 % interval of each trial over its unknowns: half a minute a robot; a rerun resumes."""
     contact: Contact = Contact()
-    """What settled robots and those in trials rest on."""
+    """Contact of released robots, in steady states and trials."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -240,7 +240,7 @@ def _found_at(
 
 
 def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
-    """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there.
+    """The robot at about the size of a body, searched again at the size that was found; None where it is not there.
 
     First by the colours of its seal, which a cover of glass and a grid under it do not hide.
     """
