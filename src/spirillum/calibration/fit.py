@@ -50,7 +50,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, WALLED, ModelChoice
-from spirillum.swimming.released_motion import HELD, RELEASED, check_released
+from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 
 
@@ -125,9 +125,6 @@ def fit_model(
         free_names(free, find_swimmer_model(model, AUTO).name, released=answer == RELEASED)
     if prepare and not is_fitted_in_tube(model, free, method):
         raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
-    if method == "posterior":
-        for library in ("emcee", "arviz_base", "arviz_stats"):
-            import_optional(library, "method 'posterior'", "posterior")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
@@ -138,6 +135,9 @@ def fit_model(
     )
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name not in ("friction", "shared_friction"))
+    if method == "posterior":  # before tables and trials are computed
+        for library in ("emcee", "arviz_base", "arviz_stats"):
+            import_optional(library, "method 'posterior'", "posterior")
     problem = posed(experiment, choice.model, names, progress, assumed, prepare=prepare, answer=answer)
     inertia_warnings(experiment)
     found = _fitted_by(method, problem, friction, sampling, progress)
@@ -146,7 +146,7 @@ def fit_model(
 
 def _check_answer(answer: str, method: str) -> None:
     """Refuse a fit of trials by the method that inverts held motion."""
-    check_released(answer)
+    check_choice("answer", answer, (HELD, RELEASED))
     if answer == RELEASED and method == "paper":
         raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
 

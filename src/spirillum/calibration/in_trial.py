@@ -1,4 +1,4 @@
-"""The forward model of trials: runs over the free numbers, and smooth surfaces through what they measure.
+"""The forward model of trials: runs over the free parameters, and smooth surfaces through their observables.
 
 A trial takes a second, a fit asks for many thousands of them. Each robot makes some trials that fill the ranges of the
 priors evenly (Sobol' points in the logarithms); between them its advance, turning and motor rate are interpolated by
@@ -16,10 +16,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment
+from spirillum.calibration.in_tube import without_tables
 from spirillum.dynamics.simulation import simulate
 from spirillum.dynamics.trial import trial_means
 from spirillum.errors import InputError
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import with_numbers
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 FREE = ("shared_friction", "friction_coefficient", "roughness")
 """Parameters that a fit of trials may free: where a robot lies follows from the run."""
 DEFAULT_FREE = ("friction_coefficient", "shared_friction")
-"""What is free where nothing is said; without motor rates the first alone."""
+"""Free parameters by default; without motor rates the first alone."""
 _RUNS = {1: 16, 2: 32, 3: 64}
 """Trials of each robot, by the number of free parameters."""
 _FEWEST = 0.75
@@ -43,7 +43,7 @@ Ends = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class TrialSurfaces:
-    """What trials of the robots of an experiment measure, over the free parameters."""
+    """Observables of the trials of an experiment as functions of the free parameters."""
 
     names: tuple[str, ...]
     ends: Ends
@@ -114,14 +114,12 @@ def trial_surfaces(
 
 def _tables(experiment: Experiment, tell: Callable[[str, int, int], None], *, prepare: bool) -> None:
     """Make the tables that are not there, or refuse."""
-    lacking = [robot for robot in experiment.robots if not has_table(RobotBatch.of(robot), "yaw")]
+    known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
+    lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
     if lacking and not prepare:
-        raise InputError(
-            f"{experiment.source}: trials need a table with yawed poses of every robot, and {len(lacking)} have none "
-            f"({lacking[0].with_tail} first); allowed: --prepare, which makes them first, each in {TABLE_TAKES}"
-        )
+        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses")
     if lacking:
-        prepare_all(lacking, stage="yaw", progress=tell)
+        prepare_all(experiment.robots, stage="yaw", progress=tell)
 
 
 def _points(ends: Ends, count: int) -> Samples:

@@ -79,14 +79,20 @@ def _tables(
     found = tables_of(batch)
     lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
     if lacking and not prepare:
-        more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
-        raise InputError(
-            f"{experiment.source}: model 'tube' asks a table of every robot, and {len(lacking)} of {len(found)} have "
-            f"none ({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
-            f"{TABLE_TAKES}, or model 'sbt', which leaves out the walls"
-        )
+        otherwise = ", or model 'sbt', which leaves out the walls"
+        raise without_tables(experiment, lacking, "model 'tube' asks a table", otherwise)
     made = [one.table for one in prepare_all(experiment.robots, stage="straight", progress=tell)] if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})
+
+
+def without_tables(experiment: Experiment, lacking: Sequence[str], need: str, otherwise: str = "") -> InputError:
+    """The error of a fit some of whose robots lack the table that it needs."""
+    more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
+    return InputError(
+        f"{experiment.source}: {need} of every robot, and {len(lacking)} of {len(experiment.robots)} have none "
+        f"({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
+        f"{TABLE_TAKES}{otherwise}"
+    )
 
 
 def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:

@@ -27,13 +27,13 @@ from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress, UnexplainedError
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.swimming.model_choice import WALLED
-from spirillum.swimming.released_motion import HELD, RELEASED, check_released
+from spirillum.swimming.released_motion import HELD, RELEASED
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
@@ -209,7 +209,7 @@ def rank_models(
     Raises:
         InputError: for wrong input, a single model, or observations that none of the models explains.
     """
-    check_released(answer)
+    check_choice("answer", answer, (HELD, RELEASED))
     wanted = free_by_model(models, free, answer)
     if answer == RELEASED and WALLED not in wanted:
         raise InputError(

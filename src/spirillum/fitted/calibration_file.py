@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.files import read_toml
 from spirillum.fluid.registry import SWIMMER_MODELS
@@ -25,7 +24,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.model_options import Calibration, known_model
 from spirillum.robot.placement import Placement
-from spirillum.robot.problems import problems_in, refused_table
+from spirillum.robot.problems import problems_in, refuse, refused_table
 from spirillum.robot.robot import Robot
 
 _WHAT = "a calibration file (TOML with [calibration.<model>] tables)"
@@ -127,7 +126,7 @@ class Provenance(Section):
     free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
     """Parameters that were free."""
     answer: Literal["held", "trial"] = "held"
-    """What was fitted."""
+    """Motion that was fitted."""
     friction_reading: Literal["", "rotor", "paper"] = ""
     """Reading of the friction under which B_eff was inferred."""
     synthetic: Annotated[bool, Field(strict=True)] = False
@@ -159,7 +158,7 @@ class CalibrationFile(Section):
         values = self.fitted != FittedValues() or self.contact != FittedContact()
         if not (self.calibration or self.friction or self.placement or values):
             sentence = "nothing is calibrated; allowed: at least one [calibration.<model>] table"
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+            raise refuse(sentence)
         self._each_once()
         return self
 
@@ -174,7 +173,7 @@ class CalibrationFile(Section):
         twice = [name for name, keys in listed.items() if len(set(keys)) < len(keys)]
         if twice:
             sentence = f"{twice[0]} holds two entries for the same geometry; allowed: one for each"
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+            raise refuse(sentence)
 
 
 def read_calibration(path: str | Path) -> CalibrationFile:

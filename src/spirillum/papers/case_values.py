@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from operator import sub, truediv
 from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
@@ -62,13 +63,11 @@ def values_at(
 ) -> dict[str, CaseValue]:
     """Return quantities of a point by name; with a trial without stated errors."""
     found = _own_values(case, point, names, trial)
-    if point.over:
-        beside = _own_values(case, case.point(point.over), names, trial)
-        return {name: CaseValue(one.value / beside[name].value, None) for name, one in found.items()}
-    if point.minus:
-        beside = _own_values(case, case.point(point.minus), names, trial)
-        return {name: CaseValue(one.value - beside[name].value, None) for name, one in found.items()}
-    return found
+    other, combine = (point.over, truediv) if point.over else (point.minus, sub)
+    if not other:
+        return found
+    beside = _own_values(case, case.point(other), names, trial)
+    return {name: CaseValue(combine(one.value, beside[name].value), None) for name, one in found.items()}
 
 
 def _own_values(case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None) -> dict[str, CaseValue]:

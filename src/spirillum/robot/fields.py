@@ -116,6 +116,8 @@ class AlsoReads:
 
 NONE = AlsoReads(lambda _: {"const": "none"})
 """The word `none` for a table that is left out."""
+UNSET = BeforeValidator(lambda value: None if value == "none" else value)
+"""A value that the word `none` takes away, also one of a preset."""
 
 
 def quantity_schema(kind: Kind) -> JsonSchemaValue:

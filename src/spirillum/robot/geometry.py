@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_v
 from spirillum.arrays import Values, Vectors
 from spirillum.robot.fields import (
     NONE,
+    UNSET,
     AlsoReads,
     Angle,
     Density,
@@ -71,16 +72,12 @@ ProfilePoints = tuple[tuple[float, float], ...]
 """Points (x, r) along a body's outline, mm."""
 
 
-def _read_none(value: Any) -> Any:
-    return None if value == "none" else value
-
-
 Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
 EndOrNone = Annotated[
     End | None,
-    BeforeValidator(_read_none),
+    UNSET,
     WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]}),
 ]
 
@@ -98,7 +95,7 @@ class CenterOfMass(Section):
     """Its angle about +x from the lowest place (-z of the body), as an azimuth."""
 
 
-CenterOfMassOrNone = Annotated[CenterOfMass | None, BeforeValidator(_read_none), NONE]
+CenterOfMassOrNone = Annotated[CenterOfMass | None, UNSET, NONE]
 
 _NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
 ProfileOrNone = Annotated[
@@ -263,7 +260,7 @@ class Tail(Section):
 
     @property
     def form(self) -> TailForm:
-        """What makes the tail of its sizes."""
+        """Form of the tail beyond its sizes."""
         points = self.amplitude_along or (), self.wavelength_along or (), self.curve or ()
         return TailForm.read((self.starts, *points, self.curve_tolerance or 0.0))
 
@@ -280,7 +277,7 @@ class Channel(Section):
 ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
 
 
-PressureOrNone = Annotated[Pressure | None, BeforeValidator(_read_none), NONE]
+PressureOrNone = Annotated[Pressure | None, UNSET, NONE]
 
 
 class Fluid(Section):

@@ -6,11 +6,11 @@ from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.arrays import Samples
 from spirillum.robot.arguments import Options
 from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw
+from spirillum.robot.problems import refuse
 from spirillum.units import show
 
 Ends = Literal["open", "closed"]
@@ -83,7 +83,7 @@ class Placement(Options):
                 "allowed: one of them, for an imposed flow leaves the ends no say"
             )
         if problems:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+            raise refuse(*problems)
         return self
 
     @property

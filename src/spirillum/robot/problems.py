@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
@@ -41,6 +42,11 @@ def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _
         return list(dict.fromkeys(sentences))
     except RecursionError:
         return ["its tables are nested too deeply; see `spirillum schema robot`"]
+
+
+def refuse(*sentences: str) -> PydanticCustomError:
+    """The error of a table that is refused by whole sentences, for a validator to raise."""
+    return PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(sentences)})
 
 
 def refused_table(problems: Sequence[str], source: str = "") -> InputError:

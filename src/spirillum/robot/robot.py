@@ -6,7 +6,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.kernels.axial_motor import CONSTANT, SLOPE
 from spirillum.kernels.drive import MOTOR, windings
@@ -14,6 +13,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
+from spirillum.robot.problems import refuse
 from spirillum.robot.tables import Battery, Motor, RobotTables
 from spirillum.units import display_unit, in_unit, show
 
@@ -74,7 +74,7 @@ class Robot(RobotTables):
     def _can_be_built(self) -> Self:
         problems = [limit.sentence() for limit in broken(assembly_limits(RobotBatch.of(self)))]
         if problems:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+            raise refuse(*problems)
         return self
 
     @model_validator(mode="after")
@@ -84,7 +84,7 @@ class Robot(RobotTables):
             return self
         problem = motor_current_problem(self.motor, self.battery)
         if problem:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": problem})
+            raise refuse(problem)
         return self
 
     def __repr__(self) -> str:

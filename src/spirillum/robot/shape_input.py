@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.files.limits import MOST_POINTS
 from spirillum.files.reading import csv_rows, number_in
+from spirillum.robot.problems import refuse
 from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, centre_line, mean_of_inverse
 from spirillum.scalars import is_number
 from spirillum.units import KINDS, parse_quantity
@@ -72,11 +72,6 @@ def with_points_of_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
             points = read_points(folder / str(inner[name]), columns, f"{section}.{name}")
             table = {**table, section: {**inner, name: points}}
     return table
-
-
-def refuse(sentence: str) -> PydanticCustomError:
-    """The error of a table that is refused by a whole sentence."""
-    return PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
 
 
 def checked_points(points: Any, columns: Sequence[str], field: str, least: int) -> tuple[tuple[float, ...], ...]:

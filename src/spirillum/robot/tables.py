@@ -8,13 +8,13 @@ from math import pi
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
 from spirillum.kernels.drive import MOST_POINTS
 from spirillum.notes import Note
 from spirillum.robot.fields import (
     NONE,
+    UNSET,
     AlsoReads,
     BackEmfConstant,
     Charge,
@@ -37,6 +37,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
+from spirillum.robot.problems import refuse
 from spirillum.units import KINDS, show
 
 DriveKind = Literal["dc-motor", "rate", "torque", "torque-speed", "magnetic"]
@@ -55,10 +56,6 @@ class TorqueCurve(NamedTuple):
     """1 where the motor turns the tail as its hand swims forward, else -1."""
 
 
-_UNSET = BeforeValidator(lambda value: None if value == "none" else value)
-"""A value that the word `none` takes away, also one of a preset."""
-
-
 class Drive(Section):
     """What turns the tail, and the joint between tail and body."""
 
@@ -67,9 +64,9 @@ class Drive(Section):
     `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
-    rate: Annotated[Rate | None, _UNSET, NONE] = None
+    rate: Annotated[Rate | None, UNSET, NONE] = None
     """For `rate`: rotation rate of the tail about +x in the lab."""
-    torque: Annotated[Torque | None, _UNSET, NONE] = None
+    torque: Annotated[Torque | None, UNSET, NONE] = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
     rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"]] = None
     """For `torque-speed`: rates of the tail against the body, 2 to 12 that increase from 0; three give a knee."""
@@ -279,7 +276,7 @@ class RobotTables(Section):
     def _no_field_missing_or_idle(self) -> Self:
         problems = [*self._end_problems(), *self._drive_problems(), *self._problems_without_body()]
         if problems:
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+            raise refuse(*problems)
         return self
 
     @property

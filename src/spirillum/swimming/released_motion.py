@@ -7,24 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from spirillum.envelope import quantity
-from spirillum.errors import InputError, did_you_mean
 from spirillum.quantities import QUANTITIES
 
 HELD = "held"
 RELEASED = "trial"
-"""What a robot in its tube may be asked for, where one of both answers."""
-
-
-def check_released(answer: str) -> None:
-    """Refuse a word that is neither of both.
-
-    Raises:
-        InputError: if it is none.
-    """
-    if answer not in (HELD, RELEASED):
-        raise InputError(
-            f"answer = {answer[:40]!r}{did_you_mean(answer, (HELD, RELEASED))}; allowed: {HELD}, {RELEASED}"
-        )
+"""Motions of a robot in its tube, where a request takes one of both."""
 
 
 class TrialInterval(NamedTuple):

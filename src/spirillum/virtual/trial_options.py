@@ -7,10 +7,10 @@ from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
-from pydantic_core import PydanticCustomError
 
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
 from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity
+from spirillum.robot.problems import refuse
 
 _USUAL_FIELD = (150e-3 + 60e-3 / 1.40) * 640.0 / 740.0
 """Width of the usual picture at the reference plane, m: the lens 150 mm above 60 mm of oil, seen through its surface,
@@ -116,7 +116,7 @@ class CameraOptions(Options):
     def _exposure_fits(self) -> Self:
         if self.exposure > 1.0 / self.fps:
             sentence = f"exposure = {self.exposure:.4g} s; allowed: at most the {1.0 / self.fps:.4g} s of a frame"
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+            raise refuse(sentence)
         return self
 
     @property
