@@ -12,7 +12,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#if defined(_WIN32)
+#if defined(SPIRILLUM_INSIDE) /* a part of another library */
+#define EXPORT
+#elif defined(_WIN32)
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT __attribute__((visibility("default")))

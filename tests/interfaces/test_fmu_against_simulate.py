@@ -44,6 +44,27 @@ def simulated(path: Path, inputs: dict[str, list[Any]], *, stop: float, step: fl
     )
 
 
+def check_kept_state(path: Path, outputs: list[int]) -> None:
+    """A kept state, serialised and set again, goes on as the run did."""
+    from fmpy import extract, instantiate_fmu, read_model_description
+
+    description = read_model_description(str(path))
+    folder = extract(str(path))
+    robot = instantiate_fmu(folder, description, "CoSimulation")
+    robot.enterInitializationMode(startTime=0.0)
+    robot.exitInitializationMode()
+    robot.doStep(0.0, 0.05)
+    kept = robot.getFMUState()
+    robot.doStep(0.05, 0.05)
+    first = robot.getFloat64(outputs)
+    robot.setFMUState(robot.deserializeFMUState(robot.serializeFMUState(kept)))
+    robot.doStep(0.05, 0.05)
+    np.testing.assert_array_equal(first, robot.getFloat64(outputs))
+    robot.terminate()
+    robot.freeInstance()
+    shutil.rmtree(folder)
+
+
 @needs_compiler
 @pytest.mark.parametrize("name", ["plain", "flow"])
 def test_fmpy_finds_no_problem(units: dict[str, Path], name: str) -> None:
@@ -130,23 +151,7 @@ def test_plain_c_program_loads_it(units: dict[str, Path], tmp_path: Path) -> Non
 
 @needs_compiler
 def test_state_can_be_kept(units: dict[str, Path]) -> None:
-    from fmpy import extract, instantiate_fmu, read_model_description
-
-    description = read_model_description(str(units["plain"]))
-    folder = extract(str(units["plain"]))
-    robot = instantiate_fmu(folder, description, "CoSimulation")
-    robot.enterInitializationMode(startTime=0.0)
-    robot.exitInitializationMode()
-    robot.doStep(0.0, 0.05)
-    kept = robot.getFMUState()
-    robot.doStep(0.05, 0.05)
-    first = robot.getFloat64([10, 18])
-    robot.setFMUState(robot.deserializeFMUState(robot.serializeFMUState(kept)))
-    robot.doStep(0.05, 0.05)
-    np.testing.assert_array_equal(first, robot.getFloat64([10, 18]))
-    robot.terminate()
-    robot.freeInstance()
-    shutil.rmtree(folder)
+    check_kept_state(units["plain"], [10, 18])
 
 
 @needs_compiler
@@ -157,6 +162,73 @@ def test_same_robot_gives_the_same_bytes_of_text(units: dict[str, Path], tmp_pat
         for name in first.namelist():
             if not name.startswith("binaries/"):
                 assert first.read(name) == second.read(name), name
+
+
+RELEASED = sp.load(WIDE, **{"battery.capacity": "0.1 mA h"})
+"""Its battery is empty after 1.2 s."""
+
+
+@pytest.fixture(scope="module")
+def released(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of a robot released in its tube."""
+    path = tmp_path_factory.mktemp("released") / "released.fmu"
+    sp.export(RELEASED, path, motion="free")
+    return path
+
+
+def check_moment(found: Any, moment: Any, tolerance: float) -> None:
+    """The end of a run of an FMU against a moment of a plant, over the largest value of each."""
+    vectors = {"position": moment.pose.position, "attitude": moment.pose.attitude}
+    pairs = [(f"{name}[{n + 1}]", float(value)) for name, of in vectors.items() for n, value in enumerate(of)]
+    for name, value in (*pairs, *moment.values.items()):
+        if name in found.dtype.names:
+            scale = max(abs(value), float(np.abs(found[name]).max()))
+            assert found[name][-1] == pytest.approx(value, abs=tolerance * scale), name
+
+
+@needs_compiler
+def test_released_robot_by_fmpy_is_that_of_a_plant(released: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(released)) == []
+    plant = sp.Plant(RELEASED)
+    moment = plant.step(2.0)
+    assert plant.state.spent
+    for step in (0.05, 0.1):  # the run does not depend on the importer's steps
+        found = simulated(released, {"time": [0.0], "remote": [True]}, stop=2.0, step=step)
+        check_moment(found, moment, 1e-9)
+
+
+@needs_compiler
+def test_released_robot_takes_remote_and_duty(released: Path) -> None:
+    plant = sp.Plant(RELEASED)
+    plant.step(0.3)
+    plant.step(0.2, remote=False)
+    moment = plant.step(1.5, duty=0.9)
+    switched = {
+        "time": [0.0, 0.3, 0.3, 0.5, 0.5, 2.0],
+        "remote": [True, True, False, False, True, True],
+        "duty": [1.0] * 4 + [0.9] * 2,
+    }
+    found = simulated(released, switched, stop=2.0, step=0.05)
+    check_moment(found, moment, 1e-6)  # rounding, which contact amplifies: ten tolerances of the integrator
+
+
+@needs_compiler
+def test_released_robot_ends_at_the_end_of_its_channel(tmp_path: Path) -> None:
+    short = sp.load(WIDE, **{"channel.length": "105.8 mm"})
+    plant = sp.Plant(short)
+    moment = plant.step(2.0)
+    assert moment.ended == "end of the channel"
+    sp.export(short, tmp_path / "short.fmu", motion="free")
+    found = simulated(tmp_path / "short.fmu", {"time": [0.0], "remote": [True]}, stop=2.0, step=0.1)
+    assert len(found) < 12
+    assert found["position[1]"][-1] == pytest.approx(moment.pose.position[0], rel=1e-9)
+
+
+@needs_compiler
+def test_state_of_a_released_robot_can_be_kept(released: Path) -> None:
+    check_kept_state(released, [10, 19])
 
 
 def test_units_are_their_si_bases() -> None:
@@ -178,6 +250,8 @@ def test_without_a_compiler_nothing_is_written(tmp_path: Path, monkeypatch: pyte
         ({"phase": 0.3}, "only for the robot's shape"),
         ({"sidecar": True}, "only for the robot's shape"),
         ({"model": "nonsense"}, "nonsense"),
+        ({"motion": "nonsense"}, "held, free"),
+        ({"motion": "free", "model": "rft"}, "allowed: model 'tube'"),
         ({"model": "rft", "placement": {"flow": 1e-3}}, "does not compute the channel's walls"),
     ],
 )

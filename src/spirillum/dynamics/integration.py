@@ -143,7 +143,7 @@ def integrate(
     state = np.array(start.state if isinstance(start, Checkpoint) else start, dtype=float)
     memory = np.zeros(stiff_steps.MEMORY)
     memory[stiff_steps.TIME] = start.time if isinstance(start, Checkpoint) else time[0]
-    memory[stiff_steps.STEP] = start.step if isinstance(start, Checkpoint) else _FIRST * robot.turn
+    memory[stiff_steps.STEP] = start.step if isinstance(start, Checkpoint) else first_step(robot)
     memory[stiff_steps.LAST_TIME], memory[stiff_steps.LAST_STEP] = memory[stiff_steps.TIME], memory[stiff_steps.STEP]
     run = _Run(robot, reach, state, memory, np.ones(robot.gap_count + stiff_steps.WATCHED), state.copy())
     pieces: list[tuple[Samples, Samples, float]] = []
@@ -175,6 +175,18 @@ def integrate(
     return _joined(robot, pieces, events, switches, run)
 
 
+def first_step(robot: FreeRobot) -> float:
+    """Length of the first step, s."""
+    return _FIRST * robot.turn
+
+
+def run_sizes(robot: FreeRobot) -> Samples:
+    """`FreeRobot.step_sizes` of a run, whose works may be those of a robot that only sinks."""
+    sizes = robot.step_sizes()
+    sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
+    return sizes
+
+
 def observed_at(robot: FreeRobot, state: Samples, time: float = 0.0) -> Samples:
     """What is observed in one state, (13,), or (26,) in a tube."""
     return np.asarray(robot.observe(np.array([time]), state[None])[0])
@@ -202,8 +214,7 @@ def _stretch(
     outside = float(observed_at(robot, run.state)[rigid_links.OUTSIDE]) if robot.table.size else 0.0
     stiff_steps.watched(run.state, outside, data, robot.table, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, rigid_links.STATES))
-    sizes, done = robot.step_sizes(), 0
-    sizes[rigid_links.DRIVEN : rigid_links.STATES] *= _LITTLE_WORK
+    sizes, done = run_sizes(robot), 0
     events: list[Event] = []
     clip = stop <= end
     target, what = min(stop, end), ""

@@ -23,6 +23,7 @@ from spirillum.dynamics.integration import (
     INTERRUPTED,
     Checkpoint,
     Progress,
+    Reach,
     Trajectory,
     integrate,
     observed_at,
@@ -222,6 +223,16 @@ class Plant:
         return self._now
 
     @property
+    def links(self) -> FreeRobot:
+        """What the robot's rates follow from."""
+        return self._links
+
+    @property
+    def reach(self) -> Reach:
+        """What ends a run, or its drive."""
+        return self._reach
+
+    @property
     def roughness(self) -> float | None:
         """Height of the wall's asperities, m; None without a wall."""
         links = self._links
@@ -416,6 +427,8 @@ class Plant:
 
     def _moment(self, run: Trajectory) -> Snapshot:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
+        phase_at_start = self._first.state[rigid_links.PHASE]
+        series["tail_angle"] = run.states[:, rigid_links.ROLL] + run.states[:, rigid_links.PHASE] - phase_at_start
         if isinstance(self._links, TubeRobot):
             series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
         elif self.roughness is not None:

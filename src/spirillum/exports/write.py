@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.axial_robot import PARAMETERS, AxialRobot, axial_robot
+from spirillum.dynamics.axial_robot import axial_robot
+from spirillum.dynamics.plant import Plant
 from spirillum.envelope import as_json, envelope, quantity
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_choice
 from spirillum.exports.descriptions import FLUID_WARNING, check_inertia, mjcf_text, sidecar_of, urdf_text
 from spirillum.exports.meshes import (
     UnitedBody,
@@ -36,6 +37,9 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
+
+if TYPE_CHECKING:
+    from spirillum.interfaces.fmu import FmuModel
 
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """glTF's y points up, where ours is z."""
@@ -236,7 +240,7 @@ class Export(DisplayMixin):
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
     warnings: tuple[Note, ...]
     """What to be careful about, a sentence each."""
-    held: AxialRobot | None = None
+    unit: FmuModel | None = None
     """Of an FMU: the equations in it."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -267,8 +271,8 @@ class Export(DisplayMixin):
         }
         if self.solid is not None:
             content["solid"] = dict(self.solid)
-        if self.held is not None:
-            content |= _equations(self.held)
+        if self.unit is not None:
+            content |= _equations(self.unit)
         return envelope("export", content, self.warnings)
 
 
@@ -281,6 +285,7 @@ def export(
     unit: str | None = None,
     sidecar: bool | None = None,
     model: str | None = None,
+    motion: str | None = None,
     friction: str | None = None,
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
@@ -290,7 +295,8 @@ def export(
     `.stl` is one closed body for a printer, `.glb` a coloured scene, `.vtp` a surface for ParaView. `.urdf` and
     `.mjcf` (or `.xml`) are descriptions of two links with mesh files beside them in a folder `<name>-meshes`, and
     with the resistance in `<name>.resistance.json`. `.fmu` is a co-simulation unit of the robot held to its channel's
-    axis, compiled for this machine by its C compiler. All files are made before the first takes its place.
+    axis, or released in its channel, compiled for this machine by its C compiler. All files are made before the first
+    takes its place.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -300,9 +306,11 @@ def export(
         unit: of an STL file, `mm`, `um` or `m`; None: mm, or um where the file would not be watertight in mm.
         sidecar: whether to write the resistance beside the file; None: with `.urdf` and `.mjcf` only.
         model: whose resistance, `slender` or `rft`; of an `.fmu` any model; None: `slender`, of an `.fmu` `auto`.
+        motion: of an `.fmu`, `held` (axial motion; None) or `free` (released in the tube, without a wait).
         friction: of an `.fmu`, reading of the friction; None: the robot's own.
         calibration: of an `.fmu`, calibration file whose factors replace the robot's.
-        placement: of an `.fmu` with `tube`, where the robot is held; with a `flow`, also 0, the flow is an input.
+        placement: of an `.fmu` with `tube`, where the robot is held or starts; with a `flow`, also 0, the flow is an
+            input.
 
     Raises:
         InputError: for wrong input, a file that cannot be written, masses that a description needs and the robot
@@ -311,15 +319,17 @@ def export(
     inputs = [robot] if isinstance(robot, (str, Path)) else []
     with guard_inputs(*inputs, calibration):
         target = output_target(path, KINDS_OF_FILES, "robot.stl")
-    angle, of_held = parse_option("phase", phase, KINDS["angle"]), (friction, calibration, placement)
+    angle, of_held = parse_option("phase", phase, KINDS["angle"]), (motion, friction, calibration, placement)
     if target.suffix == ".fmu":
         if angle or fineness != 1.0 or unit is not None or sidecar is not None:
             raise InputError("phase, fineness, unit or sidecar with .fmu; allowed: only for the robot's shape")
-        axial = axial_robot(robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
-        return _unit_of(axial, target)
+        check_choice("motion", motion or "held", ("held", "free"))
+        make = _released_unit if motion == "free" else _axial_unit
+        return make(target, robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
     if any(given is not None for given in of_held):
         raise InputError(
-            f"friction, calibration or a placement (gap, pitch, flow) with {target.suffix}; allowed: only with .fmu"
+            f"motion, friction, calibration or a placement (gap, pitch, flow) with {target.suffix}; allowed: "
+            "only with .fmu"
         )
     wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
@@ -365,26 +375,40 @@ def _shape_of(
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
 
 
-def _unit_of(axial: AxialRobot, target: Path) -> Export:
-    """An FMU, written."""
+def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
+    """The FMU of a robot in axial motion, written."""
+    from spirillum.interfaces.fmu import axial_model
+
+    axial = axial_robot(robot, **options)
+    inertia = axial.check_steady(1.0, axial.flow or 0.0)  # the duty is an input of the unit
+    return _unit_of(axial_model(axial), target, inertia)
+
+
+def _released_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
+    """The FMU of a robot that is released in its tube, written."""
+    from spirillum.interfaces.fmu import free_model
+
+    plant = Plant(robot, **options)
+    return _unit_of(free_model(plant), target, plant.warnings)
+
+
+def _unit_of(model: FmuModel, target: Path, notes: Iterable[Note]) -> Export:
     from spirillum.interfaces.fmu import fmu_bytes
 
-    robot = axial.robot
-    inertia = axial.check_steady(1.0, axial.flow or 0.0)  # the duty is an input of the unit
-    _commit(target, {target.name: fmu_bytes(axial)})
-    warnings = tuple(dict.fromkeys((*axial.prediction.warnings, *inertia)))
+    _commit(target, {target.name: fmu_bytes(model)})
+    robot, warnings = model.prediction.robot, tuple(dict.fromkeys((*model.prediction.warnings, *notes)))
     files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
-    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, axial)
+    return Export(robot, 0.0, files, (), links_of(robot), None, warnings, model)
 
 
-def _equations(axial: AxialRobot) -> dict[str, Any]:
+def _equations(model: FmuModel) -> dict[str, Any]:
     """Where the numbers of an FMU are from, and which they are."""
-    numbers = zip(PARAMETERS, axial.values, strict=True)
     return {
-        **axial.prediction.answered_by,
-        "friction": axial.prediction.friction,
-        "inputs": ["remote", "duty", *(["mean_flow"] if axial.flow is not None else [])],
-        "parameters": {item.name: quantity(value, item.unit, meaning=item.meaning) for item, value in numbers},
+        **model.prediction.answered_by,
+        "motion": model.motion,
+        "friction": model.prediction.friction,
+        "inputs": ["remote", "duty", *(["mean_flow"] if model.flow is not None else [])],
+        "parameters": {item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in model.parameters},
     }
 
 

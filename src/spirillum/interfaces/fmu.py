@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import platform
 import re
 import shutil
@@ -11,17 +12,27 @@ import subprocess
 import sys
 import zipfile
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
+from spirillum.arrays import Samples
 from spirillum.display import fitted_words
 from spirillum.dynamics.axial_robot import OUTPUTS, PARAMETERS, AxialRobot
+from spirillum.dynamics.integration import first_step, run_sizes, watched_limits
+from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
+from spirillum.kernels import rigid_links, stiff_steps
+from spirillum.kernels.axial_motor import STATES as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
+from spirillum.swimming.prediction import Prediction
 from spirillum.version import own_version
 
 _DERIVED: Mapping[str, Mapping[str, int]] = {
@@ -56,79 +67,212 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: power for base, power in found.items() if power}
 
 
-SOURCE = "axial_robot.c"
-"""Name of the C source with the functions of FMI."""
-_EQUATIONS = ("axial.c", "drive.c", "core.h", "drive.h")
-"""Files of csrc/ with its equations."""
+_PLUMBING = ("fmi3.c", "model.h")
+"""C sources with the functions of FMI, around those of a model."""
+_HEADERS = ("core.h", "drive.h")
+_MOTION = (
+    "stiff_steps",
+    "tube_motion",
+    "two_links",
+    "links",
+    "contacts",
+    "dry_friction",
+    "table",
+    "film",
+    "cavitation",
+)
+_MOTION_HEADERS = ("motion.h", "contacts.h", "table.h", "links.h", "film.h", "cavitation.h")
 _REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
 """Value references, which the C source knows too."""
 
 
-class _Variable(NamedTuple):
-    """One variable of the model."""
+class FmuVariable(NamedTuple):
+    """One output or parameter of an FMU."""
 
-    kind: str
     name: str
-    reference: int
-    causality: str
-    variability: str
     meaning: str
-    unit: str = ""
-    start: str = ""
+    unit: str
+    value: float | None = None
+    """Start of a parameter; None: an output, whose place is its value reference."""
 
 
-def identifier_of(axial: AxialRobot) -> str:
-    """The robot's name as C takes it."""
-    return re.sub(r"\W", "_", f"robot_{axial.robot.name}", flags=re.ASCII)[:100]
+@dataclass(frozen=True)
+class FmuModel:
+    """What an FMU is made of: a robot, C sources with its equations, and its numbers."""
+
+    prediction: Prediction
+    """The robot with model and friction."""
+    motion: str
+    """How it moves, in half a sentence."""
+    duty: float
+    """Duty at first."""
+    flow: float | None
+    """Imposed mean flow at first, m/s; None: it is no input."""
+    source: str
+    """C source of the model, in this folder."""
+    equations: tuple[str, ...]
+    """Files of csrc/ with its equations, and headers."""
+    outputs: Mapping[int, FmuVariable]
+    """By their place in the C source."""
+    parameters: tuple[FmuVariable, ...]
+    """Numbers that an importer can set."""
+    defined: Mapping[str, str]
+    """Numbers of the C source by name."""
+    arrays: Mapping[str, Samples]
+    """Arrays of the C source by name."""
+
+    @property
+    def identifier(self) -> str:
+        """The robot's name as C takes it."""
+        return re.sub(r"\W", "_", f"robot_{self.prediction.robot.name}", flags=re.ASCII)[:100]
 
 
-def sources() -> dict[str, bytes]:
+def _output(name: str, label: str = "", unit: str = "") -> FmuVariable:
+    item = QUANTITIES[name]
+    return FmuVariable(label or name, item.meaning, unit or item.unit)
+
+
+def axial_model(axial: AxialRobot) -> FmuModel:
+    """The FMU of a robot in axial motion."""
+    numbers = ", ".join(map(_number, axial.values))
+    return FmuModel(
+        prediction=axial.prediction,
+        motion="held to the axis of its channel",
+        duty=axial.duty,
+        flow=axial.flow,
+        source="axial_robot.c",
+        equations=("axial.c", "drive.c", *_HEADERS),
+        outputs={place: _output(name) for place, name in enumerate(OUTPUTS)},
+        parameters=tuple(
+            FmuVariable(item.name, item.meaning, item.unit, value)
+            for item, value in zip(PARAMETERS, axial.values, strict=True)
+        ),
+        defined={"STATE": str(AXIAL_STATES), "OUTPUTS": str(len(OUTPUTS)), "VALUES": f"{{ {numbers} }}"},
+        arrays={},
+    )
+
+
+_VECTORS = {"position": ("m", 3), "attitude": ("1", 4)}
+_FREE = (
+    *("tail_angle", "body_angle", "forward_velocity", "tail_rotation_rate", "body_rotation_rate"),
+    *("motor_rotation_rate", "pitch", "yaw", "drive_energy", "offset", "azimuth", "wall_pitch", "wall_yaw", "wall_gap"),
+    *("contact_force", "mean_flow"),
+)
+_ELECTRICAL = ("motor_torque", "motor_current", "battery_voltage", "electrical_power", "battery_charge_used")
+"""Outputs of a free robot behind `_VECTORS`, as free_robot.c counts them; the last ones of a DC motor alone."""
+
+
+def free_model(plant: Plant) -> FmuModel:
+    """The FMU of a robot released in its tube.
+
+    Raises:
+        InputError: for a robot without a tube.
+    """
+    links, reach, first = plant.links, plant.reach, plant.state
+    if not isinstance(links, TubeRobot):
+        raise InputError(
+            f"motion = 'free' of {plant.robot.name} by model '{plant.model}'; allowed: model 'tube', in a channel"
+        )
+    names = [
+        _output(name, f"{name}[{place + 1}]", unit) for name, (unit, size) in _VECTORS.items() for place in range(size)
+    ]
+    electrical = _ELECTRICAL if plant.steady.batch.drive == "dc-motor" else ()
+    names += [_output(name) for name in (*_FREE, *electrical)]
+    data, gaps = links.data, links.gap_count + stiff_steps.WATCHED
+    state = stiff_steps.MEMORY + 10 * rigid_links.STATES + gaps + 4 + data.size
+    drive = rigid_links.SEEN + links.friction.size + links.weight.size
+    return FmuModel(
+        prediction=plant.steady,
+        motion="released in its channel",
+        duty=first.duty,
+        flow=first.flow,
+        source="free_robot.c",
+        equations=(*(f"{name}.c" for name in (*_MOTION, "drive")), *_HEADERS, *_MOTION_HEADERS),
+        outputs=dict(enumerate(names)),
+        parameters=(),
+        defined={
+            "STATE": str(state),
+            "OUTPUTS": str(len(_FREE) + len(_ELECTRICAL) + sum(size for _, size in _VECTORS.values())),
+            "GAPS": str(links.gap_count),
+            "DATA_SIZE": str(data.size),
+            "TABLE_SIZE": str(links.table.size),
+            "DUTY_PLACE": str(drive + rigid_links.DUTY),
+            "ROUGHNESS": _number(links.roughness),
+            "TOLERANCE": _number(links.tolerance),
+            "FIRST_STEP": _number(first_step(links)),
+        },
+        arrays={
+            "DATA": data,
+            "TABLE": links.table,
+            "FIRST": np.array(first.state),
+            "SIZES": run_sizes(links),
+            "LIMITS": watched_limits(links, reach),
+        },
+    )
+
+
+def _number(value: float) -> str:
+    """A number as C takes it."""
+    return repr(float(value)) if math.isfinite(value) else f"({'-' if value < 0 else ''}INFINITY)"
+
+
+def _sources(model: FmuModel) -> dict[str, bytes]:
     """The C sources by name, those of csrc/ among them."""
-    packaged = files(__package__).joinpath("csrc")
+    here = files(__package__)
+    packaged = here.joinpath("csrc")
     csrc = packaged if packaged.is_dir() else Path(__file__).parents[3] / "csrc"
-    own = {SOURCE: files(__package__).joinpath(SOURCE).read_bytes()}
-    return own | {name: csrc.joinpath(name).read_bytes() for name in _EQUATIONS}
+    found = {name: here.joinpath(name).read_bytes() for name in (model.source, *_PLUMBING)}
+    found |= {name: csrc.joinpath(name).read_bytes() for name in model.equations}
+    if model.arrays:
+        lines = (
+            f"const double {name}[] = {{{', '.join(map(_number, values.tolist()))}}};"
+            for name, values in model.arrays.items()
+        )
+        found["robot_numbers.c"] = "\n".join(["#include <math.h>", *lines, ""]).encode()
+    return found
 
 
-def token_of(axial: AxialRobot, written: Mapping[str, bytes]) -> str:
+def _token(model: FmuModel, written: Mapping[str, bytes]) -> str:
     """Token with which an importer instantiates the FMU: a checksum of its numbers and its sources."""
-    said = repr((axial.robot.name, axial.values, axial.flow, axial.duty)).encode()
+    said = repr((model.prediction.robot.name, dict(model.defined), model.flow, model.duty)).encode()
     return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
 
 
-def header_text(axial: AxialRobot, token: str) -> str:
+def _header(model: FmuModel, token: str) -> str:
     """The robot for the C source: `robot.h`."""
-    values = ",\n".join(
-        f"    {value!r} /* {item.name}, {item.unit} */" for item, value in zip(PARAMETERS, axial.values, strict=True)
-    )
-    lines = "{ \\\n" + values.replace("\n", " \\\n") + " \\\n}"
-    return (
-        f'#define TOKEN "{token}"\n#define FLOW_INPUT {int(axial.flow is not None)}\n'
-        f"#define START_DUTY {axial.duty!r}\n#define START_FLOW {axial.flow or 0.0!r}\n#define VALUES {lines}\n"
-    )
+    defined = {
+        "TOKEN": f'"{token}"',
+        "FLOW_INPUT": str(int(model.flow is not None)),
+        "START_DUTY": _number(model.duty),
+        "START_FLOW": _number(model.flow or 0.0),
+        "PARAMETERS": str(len(model.parameters)),
+        **model.defined,
+    }
+    return "".join(f"#define {name} {value}\n" for name, value in defined.items())
 
 
-def build_text(identifier: str) -> str:
+def _build_text(model: FmuModel, names: Iterable[str]) -> str:
     """How the source is compiled: `sources/buildDescription.xml`."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
     compiled = ET.SubElement(configuration, "SourceFileSet", language="C11")
-    for name in (SOURCE, *_EQUATIONS):
+    for name in names:
         if name.endswith(".c"):
             ET.SubElement(compiled, "SourceFile", name=name)
+    ET.SubElement(compiled, "PreprocessorDefinition", name=_INSIDE)
     return _text(root)
 
 
-def description_text(axial: AxialRobot, token: str) -> str:
+def description_text(model: FmuModel, token: str) -> str:
     """`modelDescription.xml` of FMI 3.0."""
-    prediction, variables = axial.prediction, _variables(axial)
+    prediction = model.prediction
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="3.0",
-        modelName=axial.robot.name,
+        modelName=prediction.robot.name,
         instantiationToken=token,
         description=(
-            f"{axial.robot.name}, held to the axis of its channel: model {prediction.model.name}, friction "
+            f"{prediction.robot.name}, {model.motion}: model {prediction.model.name}, friction "
             f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
         generationTool=f"spirillum {own_version()}",
@@ -137,66 +281,66 @@ def description_text(axial: AxialRobot, token: str) -> str:
     ET.SubElement(
         root,
         "CoSimulation",
-        modelIdentifier=identifier_of(axial),
+        modelIdentifier=model.identifier,
         canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
     )
+    variables = _variables(model)
     units = ET.SubElement(root, "UnitDefinitions")
-    for unit in dict.fromkeys(item.unit for item in variables if item.unit):
+    for unit in dict.fromkeys(item["unit"] for _, item in variables if "unit" in item):
         exponents = {base: str(power) for base, power in base_units(unit).items()}
         ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", exponents)
     ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="1.0", stepSize="0.01")
     found = ET.SubElement(root, "ModelVariables")
-    for item in variables:
-        attributes = {
-            "name": item.name,
-            "valueReference": str(item.reference),
-            "causality": item.causality,
-            "variability": item.variability,
-            "description": item.meaning,
-        }
-        attributes |= {"unit": item.unit} if item.unit else {}
-        ET.SubElement(found, item.kind, attributes | ({"start": item.start} if item.start else {}))
+    for kind, item in variables:
+        ET.SubElement(found, kind, item)
     structure = ET.SubElement(root, "ModelStructure")
     for kind in ("Output", "InitialUnknown"):
-        for item in variables:
-            if item.causality == "output":
-                ET.SubElement(structure, kind, valueReference=str(item.reference))
+        for _, item in variables:
+            if item["causality"] == "output":
+                ET.SubElement(structure, kind, valueReference=item["valueReference"])
     return _text(root)
 
 
-def _variables(axial: AxialRobot) -> list[_Variable]:
-    duty = QUANTITIES["duty"]
+def _variables(model: FmuModel) -> list[tuple[str, dict[str, str]]]:
+    """Kind and attributes of all variables."""
+
+    def variable(reference: int, causality: str, variability: str, item: FmuVariable) -> tuple[str, dict[str, str]]:
+        found = {
+            "name": item.name,
+            "valueReference": str(reference),
+            "causality": causality,
+            "variability": variability,
+            "description": item.meaning,
+            "unit": item.unit,
+        }
+        return "Float64", found | ({} if item.value is None else {"start": repr(item.value)})
+
+    duty, flow = QUANTITIES["duty"], QUANTITIES["mean_flow"]
     found = [
-        _Variable("Float64", "time", 0, "independent", "continuous", "time", "s"),
-        _Variable("Boolean", "remote", _REMOTE, "input", "discrete", "remote: the drive is on", start="true"),
-        _Variable(
-            "Float64", "duty", _DUTY, "input", "continuous", f"{duty.meaning}, 0 to 1", "1", start=repr(axial.duty)
+        variable(0, "independent", "continuous", FmuVariable("time", "time", "s")),
+        (
+            "Boolean",
+            {
+                "name": "remote",
+                "valueReference": str(_REMOTE),
+                "causality": "input",
+                "variability": "discrete",
+                "description": "remote: the drive is on",
+                "start": "true",
+            },
         ),
+        variable(_DUTY, "input", "continuous", FmuVariable("duty", f"{duty.meaning}, 0 to 1", "1", model.duty)),
     ]
-    if axial.flow is not None:
-        flow = QUANTITIES["mean_flow"]
-        found.append(
-            _Variable("Float64", flow.name, _FLOW, "input", "continuous", flow.meaning, flow.unit, repr(axial.flow))
-        )
-    for place, name in enumerate(OUTPUTS):
-        item = QUANTITIES[name]
-        found.append(_Variable("Float64", name, _FIRST_OUTPUT + place, "output", "continuous", item.meaning, item.unit))
-    for place, (parameter, value) in enumerate(zip(PARAMETERS, axial.values, strict=True)):
-        reference = _FIRST_PARAMETER + place
-        found.append(
-            _Variable(
-                "Float64",
-                parameter.name,
-                reference,
-                "parameter",
-                "fixed",
-                parameter.meaning,
-                parameter.unit,
-                repr(value),
-            )
-        )
+    if model.flow is not None:
+        imposed = FmuVariable(flow.name, flow.meaning, flow.unit, model.flow)
+        found.append(variable(_FLOW, "input", "continuous", imposed))
+    for place, item in model.outputs.items():
+        if not (item.name == flow.name and model.flow is not None):
+            found.append(variable(_FIRST_OUTPUT + place, "output", "continuous", item))
+    for place, item in enumerate(model.parameters):
+        found.append(variable(_FIRST_PARAMETER + place, "parameter", "fixed", item))
     return found
 
 
@@ -206,7 +350,8 @@ def _text(root: ET.Element) -> str:
 
 
 _COMPILERS = ("cc", "gcc", "clang")
-_OPTIONS = ("-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden")
+_INSIDE = "SPIRILLUM_INSIDE"
+_OPTIONS = ("-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", f"-D{_INSIDE}")
 _LONGEST = 120.0
 """Time after which a compiler is given up, s."""
 _LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
@@ -226,16 +371,16 @@ def compiler() -> str:
     )
 
 
-def fmu_bytes(axial: AxialRobot) -> bytes:
+def fmu_bytes(model: FmuModel) -> bytes:
     """The FMU of a robot: a zip archive with description, source and library."""
-    written, name = sources(), identifier_of(axial)
-    token = token_of(axial, written)
-    written["robot.h"] = header_text(axial, token).encode()
+    written, name = _sources(model), model.identifier
+    token = _token(model, written)
+    written["robot.h"] = _header(model, token).encode()
     system, ending = _LIBRARIES.get(sys.platform, ("linux", ".so"))
     machine = platform.machine().lower()
     contents = {
-        "modelDescription.xml": description_text(axial, token).encode(),
-        "sources/buildDescription.xml": build_text(name).encode(),
+        "modelDescription.xml": description_text(model, token).encode(),
+        "sources/buildDescription.xml": _build_text(model, written).encode(),
         **{f"sources/{file}": text for file, text in written.items()},
         f"binaries/{_PROCESSORS.get(machine, machine)}-{system}/{name}{ending}": _compiled(written),
     }

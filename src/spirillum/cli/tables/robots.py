@@ -77,7 +77,10 @@ def export(answer: Answer) -> Blocks:
         size = " x ".join(f"{1e3 * value:.4g}" for value in solid["size"]["value"])
         yield f"{size} mm, {1e6 * solid['volume']['value']:.4g} ml"
     elif "parameters" in answer:
-        title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}"
+        title = f"{answer['robot']}, {answer['motion']}: model {answer['model']}, friction {answer['friction']}"
+        if not answer["parameters"]:
+            yield title
+            return
         rows = grid(title, "parameter", "value", "unit")
         for name, item in answer["parameters"].items():
             rows.add_row(name, f"{item['value']:.6g}", item["unit"])
