@@ -49,6 +49,11 @@ def table(header: Sequence[str], rows: Rows) -> str:
     return "".join(f"| {' | '.join(_cell(cell) for cell in line)} |\n" for line in lines)
 
 
+def items(rows: Rows) -> str:
+    """A list in Markdown: name, what stands in brackets behind it, meaning."""
+    return "".join(f"- {name} ({_cell(about)}): {_cell(text)}\n" for name, about, text in rows)
+
+
 def _cell(text: str) -> str:
     return " ".join(str(text).split()).replace("|", "\\|").replace("<", "&lt;") or " "
 
@@ -85,7 +90,7 @@ def _bounds(info: FieldInfo) -> tuple[Any, Any]:
 
 def _allowed(info: FieldInfo, kind: Kind | None) -> str:
     if kind is not None:
-        return kind.allowed.replace("**", "^")
+        return kind.name
     for item in _metadata(info):
         schema = getattr(item, "json_schema", None) or {}
         if "anyOf" in schema:
@@ -154,7 +159,9 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
         yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "")
 
 
-_HEADER = ("Field", "Default", "Allowed", "Meaning")
+def _fields(rows: Rows) -> str:
+    """Fields as a list: what is allowed and the default stand in brackets."""
+    return items((name.replace("<", "&lt;"), f"{allowed}; {default}", text) for name, default, allowed, text in rows)
 
 
 def robot_fields(wanted: str) -> str:
@@ -166,11 +173,12 @@ def robot_fields(wanted: str) -> str:
         words = meanings(Robot)
         rows = [(f"`{name}`", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
         extends = "What the file starts from; its own fields are laid over it."
-        return table(_HEADER, [*rows, ("`extends`", "unset", "a preset, or a robot file beside this one", extends)])
+        rows.append(("`extends`", "unset", "a preset, or a robot file beside this one", extends))
+        return _fields(rows)
     model = _section(Robot.model_fields[wanted])
     if model is None:
         raise ValueError(f"{wanted} is no table of the robot file")
-    return table(_HEADER, field_rows(model, "calibration.<model>." if wanted == "calibration" else f"{wanted}."))
+    return _fields(field_rows(model, "calibration.<model>." if wanted == "calibration" else f"{wanted}."))
 
 
 def study_fields() -> str:
@@ -180,7 +188,7 @@ def study_fields() -> str:
     rows = list(field_rows(Study, ""))
     pose = [row[0] for row in rows if row[0].startswith("`placement.")]
     words = f"The pose ({', '.join(pose)}) has the meaning of the shared options of these names.\n"
-    return table(_HEADER, [row for row in rows if row[0] not in pose]) + f"\n{words}"
+    return _fields(row for row in rows if row[0] not in pose) + f"\n{words}"
 
 
 def derived_quantities() -> str:
@@ -188,15 +196,14 @@ def derived_quantities() -> str:
     from spirillum import load
 
     derived = load("biorob2012-wide").derived()
-    return table(("Quantity", "Unit", "Meaning"), [(f"`{n}`", item.unit, item.meaning) for n, item in derived.items()])
+    return items((f"`{name}`", item.unit, item.meaning) for name, item in derived.items())
 
 
 def quantities() -> str:
     """The quantities of a prediction."""
     from spirillum.swimming.steady_quantities import STEADY
 
-    rows = [(f"`{item.name}`", item.unit, item.meaning, item.source) for item in STEADY]
-    return table(("Quantity", "Unit", "Meaning", "Source"), rows)
+    return items((f"`{item.name}`", f"{item.unit}; {item.source}", item.meaning) for item in STEADY)
 
 
 @lru_cache(maxsize=1)
@@ -227,9 +234,18 @@ def _variables(dataset: Any, names: Iterable[str]) -> str:
         rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
     usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
     named: dict[tuple[str, str], list[str]] = {}
-    shown = []
+    shown: list[tuple[str, str, str]] = []
+    variants: dict[str, list[str]] = {}
+    means: list[str] = []
+    known = {row[0].strip("`") for row in rows}
     for row in rows:
-        if pattern := _pattern(row, usual[0]):
+        suffix = next((end for end in _VARIANTS if row[0].endswith(f"{end}`")), "")
+        base = row[0].strip("`").removesuffix(suffix)
+        if suffix and base in known:
+            variants.setdefault(suffix, []).append(base)
+        elif base.startswith("mean_") and base.removeprefix("mean_") in known:
+            means.append(base)
+        elif pattern := _pattern(row, usual[0]):
             named.setdefault((pattern, row[3]), []).append(row[0].replace(pattern.removeprefix("<quantity>"), ""))
         else:
             name, unit, text, *others = row
@@ -237,8 +253,33 @@ def _variables(dataset: Any, names: Iterable[str]) -> str:
     head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
     for (pattern, over), found in named.items():
         head += " As in `predict`" + (f", named `{pattern}`" if pattern != "<quantity>" else "")
-        head += (f", over {over}" if over != usual[0] else "") + f": {', '.join(found)}."
-    return f"{head}\n\n" + table(("Variable", "Unit", "Meaning"), shown)
+        head += (f", over {over}" if over != usual[0] else "") + f": {_all_or(found)}."
+    if means:
+        head += f" Averages over the last two thirds of the run: {', '.join(f'`{name}`' for name in means)}."
+    for suffix, bases in variants.items():
+        head += f" `{_common(bases)}{suffix}` is {_VARIANTS[suffix]}."
+    return f"{head}\n\n" + items(shown)
+
+
+_VARIANTS = {
+    "_ci95": "the half width of its 95 % interval",
+    "_on": "the average while the drive is on",
+    "_steady": "that while the motion is steady too",
+}
+"""What an ending of a variable's name says of the variable without it."""
+
+
+def _common(names: Sequence[str]) -> str:
+    """A pattern for names, of which all may have the same first word."""
+    first = names[0].partition("_")[0]
+    return f"{first}_<...>" if all(name.startswith(f"{first}_") for name in names) else "<...>"
+
+
+def _all_or(found: Sequence[str]) -> str:
+    """Names of quantities of `predict`, or that it is all of them."""
+    from spirillum.swimming.steady_quantities import STEADY
+
+    return "all quantities" if len(found) == len(STEADY) else ", ".join(found)
 
 
 def _pattern(row: Sequence[str], over: str) -> str:
@@ -272,7 +313,7 @@ def outside_flags() -> str:
     """The values of the variable `outside`."""
     from spirillum.studies.work import REASONS
 
-    return table(("Value", "Meaning"), [(str(value), f"`{flag}`") for value, flag in enumerate(REASONS)])
+    return ", ".join(f"{value} `{flag}`" for value, flag in enumerate(REASONS)) + ".\n"
 
 
 def simulation_variables(motion: str) -> str:
@@ -401,12 +442,24 @@ def reference_list() -> str:
 
 
 def command_options(words: str) -> str:
-    """Arguments and options of a command, those that it shares with others by name alone."""
+    """Arguments and options of a command, those that it shares with others by name alone, the usual ones not at all."""
     shared = _shared_options()
     found = _options_of(words)
     lines = [_item(option) for option in found if option not in shared]
-    names = ", ".join(f"`{option.names[-1]}`" for option in found if option in shared)
-    return "".join(lines) + (f"\nShared options: {names}.\n" if names else "")
+    names = [option.names[-1] for option in found if option in shared and option.names[-1] not in _USUAL]
+    pose = [name for name in names if name in _POSE]
+    if len(pose) == len(_POSE):
+        names = ["pose", *(name for name in names if name not in pose)]
+    words = ", ".join(name if name == "pose" else f"`{name}`" for name in names)
+    return "".join(lines) + ("\n" if lines and words else "") + (f"Shared: {words}.\n" if words else "")
+
+
+_USUAL = ("--set", "--json", "--notes")
+"""Options of nearly every command, which the page names once."""
+_POSE = ("--gap", "--eccentricity", "--pitch", "--yaw", "--ends", "--flow")
+"""Options that the page calls the pose."""
+_EXAMPLE = re.compile(r"(?:, |; )such as -?[\d.]+ ?[A-Za-z/]+(?=[.;,]|$)")
+"""An example of a value with its unit, of which the page has one for every kind."""
 
 
 def shared_options() -> str:
@@ -470,7 +523,7 @@ def _option(parameter: Any) -> Option:
     stated = getattr(parameter, "show_default", None)  # of options whose default stands in a table
     value = stated if isinstance(stated, str) else parameter.default
     default = "required" if parameter.required else "" if value in (None, False) else str(value)
-    return Option(names, metavar, default, parameter.help or "")
+    return Option(names, metavar, default, _EXAMPLE.sub("", parameter.help or ""))
 
 
 def notes(severity: str) -> str:
