@@ -199,8 +199,8 @@ def table(rows: Sequence[Row]) -> str:
     lines = [
         f"{len(rows)} films, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} films of each trouble.",
         "",
-        "| Trouble | What is done | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
-        "|---|---|---|---|---|---|---|---|",
+        "| Trouble | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
+        "|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
         own = [row for row in rows if row["trouble"] == trouble.name]
@@ -209,7 +209,6 @@ def table(rows: Sequence[Row]) -> str:
         count = counts(own)
         cells = [
             trouble.name,
-            trouble.what,
             becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
             f"{count['inside']} of {count['given']}",
