@@ -344,15 +344,13 @@ def sweep_variables() -> str:
 
 
 def claims() -> str:
-    """The verdicts of the paper's study without observations."""
+    """The verdicts of the paper's study without observations: a table of what is decided, a list of what is not."""
     from spirillum.papers.registry import claims_of
 
-    rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
-    repeated = [reason for _, _, _, _, text in rows for reason in text.split("; ")]
-    marks = {reason: f"({n})" for n, (reason, count) in enumerate(Counter(repeated).most_common(), 1) if count >= 3}
-    shown = [(*row, "; ".join(marks.get(reason, reason) for reason in text.split("; "))) for *row, text in rows]
-    reasons = "".join(f"{mark} {reason}. " for reason, mark in marks.items())
-    return f"{reasons.strip()}\n\n" + table(("Statement", "Paper", "Computed", "Verdict", "Reason"), shown)
+    found = claims_of(_studied())
+    rows = [(c.claim, c.paper, c.computed, c.verdict) for c in found if c.verdict != "undecidable"]
+    others = "".join(f"- {_cell(c.claim)} ({_cell(c.paper)})\n" for c in found if c.verdict == "undecidable")
+    return table(("Statement", "Paper", "Computed", "Verdict"), rows) + f"\nUndecidable:\n\n{others}"
 
 
 def study_figure(name: str) -> str:
@@ -411,7 +409,7 @@ def validation_case(name: str) -> str:
         parts.append(table(("Statement", "Read", "Computed", "Verdict"), claims))
     elif result.statements:
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
-        parts.append(f"Statements: {verdicts}; each with its reason on the page of [the paper's study](study.md).")
+        parts.append(f"Statements: {verdicts}; each is on the page of [the paper's study](study.md).")
     robots = [robot for robot in dict.fromkeys((case.robot, *(point.robot for point in case.points))) if robot]
     start = ", ".join(f"`spirillum robot new mine.toml --from {robot}`" for robot in robots)
     parts.append(f"Read ({case.read}): {' '.join(case.source.split())}. Robot files: {start}.")
