@@ -349,7 +349,7 @@ def claims() -> str:
 
     found = claims_of(_studied())
     rows = [(c.claim, c.paper, c.computed, c.verdict) for c in found if c.verdict != "undecidable"]
-    others = "".join(f"- {_cell(c.claim)} ({_cell(c.paper)})\n" for c in found if c.verdict == "undecidable")
+    others = "".join(f"- {_cell(c.claim)}: {_cell(c.paper)}\n" for c in found if c.verdict == "undecidable")
     return table(("Statement", "Paper", "Computed", "Verdict"), rows) + f"\nUndecidable:\n\n{others}"
 
 
