@@ -189,7 +189,7 @@ def percents(rows: Sequence[Row], name: str) -> str:
         return "-"
     errors = [100 * abs(number["value"] / number["true"] - 1) for number in given]
     widths = [50 * (number["high"] - number["low"]) / abs(number["true"]) for number in given]
-    return f"{np.median(errors):.2g}, {max(errors):.2g} ({np.median(widths):.2g})"
+    return f"{np.median(errors):.2g}/{max(errors):.2g}/{np.median(widths):.2g}"
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -211,7 +211,7 @@ def table(rows: Sequence[Row]) -> str:
             trouble.name,
             becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
-            f"{count['inside']} of {count['given']}",
+            f"{count['inside']}/{count['given']}",
             far(count),
         ]
         lines.append(f"| {' | '.join(cells)} |")

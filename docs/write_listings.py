@@ -161,7 +161,11 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
 
 def _fields(rows: Rows) -> str:
     """Fields as a list: what is allowed and the default stand in brackets."""
-    return items((name.replace("<", "&lt;"), f"{allowed}; {default}", text) for name, default, allowed, text in rows)
+    shown = (
+        (name, allowed if default in ("unset", "empty") else f"{allowed}; {default}", text)
+        for name, default, allowed, text in rows
+    )
+    return items((name.replace("<", "&lt;"), about, text) for name, about, text in shown)
 
 
 def robot_fields(wanted: str) -> str:
@@ -416,22 +420,6 @@ def validation_case(name: str) -> str:
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
-def models() -> str:
-    """The hydrodynamic models with what they cost."""
-    from spirillum.fluid.registry import MODELS
-
-    rows = [
-        (
-            f"`{model.name}`",
-            ", ".join(f"`{part}`" for part in model.parts),
-            "along and about the axis" if model.axial_only else "all",
-            model.known_error,
-        )
-        for model in MODELS.values()
-    ]
-    return table(("Model", "Parts", "Entries", "Known error"), rows)
-
-
 def reference_list() -> str:
     """Every reference under its key, to which pages link."""
     from spirillum.citations import REFERENCES
@@ -443,13 +431,21 @@ def command_options(words: str) -> str:
     """Arguments and options of a command, those that it shares with others by name alone, the usual ones not at all."""
     shared = _shared_options()
     found = _options_of(words)
-    lines = [_item(option) for option in found if option not in shared]
+    lines = [_item(option._replace(meaning=_brief(option.meaning))) for option in found if option not in shared]
     names = [option.names[-1] for option in found if option in shared and option.names[-1] not in _USUAL]
     pose = [name for name in names if name in _POSE]
     if len(pose) == len(_POSE):
         names = ["pose", *(name for name in names if name not in pose)]
     words = ", ".join(name if name == "pose" else f"`{name}`" for name in names)
     return "".join(lines) + ("\n" if lines and words else "") + (f"Shared: {words}.\n" if words else "")
+
+
+def _brief(meaning: str) -> str:
+    """A help text without long clauses that state neither choices nor a default; `--help` prints the whole."""
+    first, *more = re.split(r"(?<=[.;]) (?![^(]*\))", meaning)
+    stating = re.compile(r"(?i)else|or\b|auto|`")
+    kept = " ".join([first, *(part for part in more if stating.match(part) or len(part.split()) <= 5)])
+    return kept[:-1] + "." if kept.endswith(";") else kept
 
 
 _USUAL = ("--set", "--json", "--notes")
@@ -551,7 +547,6 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "claims": claims,
     "validation-sources": validation_sources,
     "validation-case": validation_case,
-    "models": models,
     "reference-list": reference_list,
     "command-options": command_options,
     "shared-options": shared_options,
