@@ -197,9 +197,9 @@ def table(rows: Sequence[Row]) -> str:
     seeds = len({row["seed"] for row in rows})
     styles = [style for style in STYLES if any(row["style"] == style for row in rows)]
     lines = [
-        f"{len(rows)} films, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} films of each trouble.",
+        f"{len(rows)} videos, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} videos of each artifact.",
         "",
-        "| Trouble | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
+        "| Artifact | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
         "|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
@@ -217,7 +217,7 @@ def table(rows: Sequence[Row]) -> str:
         lines.append(f"| {' | '.join(cells)} |")
     lines += [
         "",
-        "| Style | Films | Numbers inside | Far | No speed though it could be read |",
+        "| Style | Videos | Numbers inside | Far | No speed though it could be read |",
         "|---|---|---|---|---|",
     ]
     for style in (*styles, "all"):

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "spirillum"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-MAP = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split("## Map of the house")[1].split("## Habits")[0]
+MAP = (ROOT / "CONTRIBUTING.md").read_text("utf-8").split("## Map\n")[1].split("## Habits")[0]
 
 
 def _definitions(path: Path) -> list[str]:
