@@ -286,11 +286,15 @@ def _all_or(found: Sequence[str]) -> str:
     return "all quantities" if len(found) == len(STEADY) else ", ".join(found)
 
 
+_PREDICTED = ("_at_observed_rate", "_at_assumed_rate", "_held")
+"""Endings of variables that are quantities of `predict` under other circumstances."""
+
+
 def _pattern(row: Sequence[str], over: str) -> str:
     """How a variable is named after a quantity of `predict`, listed on the same page; empty if it is not."""
     from spirillum.swimming.steady_quantities import STEADY
 
-    suffix = next((end for end in ("_at_observed_rate", "_at_assumed_rate") if row[0].endswith(f"{end}`")), "")
+    suffix = next((end for end in _PREDICTED if row[0].endswith(f"{end}`")), "")
     name = row[0].strip("`").removesuffix(suffix)
     known = any(name == item.name and row[1] == item.unit for item in STEADY)
     return f"<quantity>{suffix}" if known and (suffix or row[3] == over) else ""
