@@ -228,8 +228,21 @@ def _observed() -> Any:
         return study(observations=path)
 
 
+class _Families(typing.NamedTuple):
+    """Variables of a dataset, sorted by how they are listed."""
+
+    plain: list[tuple[str, str, str]]
+    """Name, unit and meaning of those that stand by themselves."""
+    predicted: dict[tuple[str, str], list[str]]
+    """Quantities of `predict`, by the pattern of the name and the dimensions."""
+    means: list[str]
+    """Averages of other variables over the run."""
+    variants: dict[str, list[str]]
+    """Variables that differ from another one by an ending, by that ending."""
+
+
 def _variables(dataset: Any, names: Iterable[str]) -> str:
-    """Variables of a dataset; dimensions and source of most of them stand once above the table."""
+    """Variables of a dataset; what most of them share, and families of names, stand once above the list."""
     rows = []
     for name in names:
         about = dataset[name].attrs
@@ -237,32 +250,35 @@ def _variables(dataset: Any, names: Iterable[str]) -> str:
         unit, source = str(about.get("units", "–")), str(about.get("source", "–"))
         rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
     usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
-    named: dict[tuple[str, str], list[str]] = {}
-    shown: list[tuple[str, str, str]] = []
-    variants: dict[str, list[str]] = {}
-    means: list[str] = []
+    found = _families(rows, usual)
+    head = [f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."]
+    for (pattern, over), same in found.predicted.items():
+        named = f", named `{pattern}`" if pattern != "<quantity>" else ""
+        head.append(f"As in `predict`{named}{f', over {over}' if over != usual[0] else ''}: {_all_or(same)}.")
+    if found.means:
+        head.append(f"Averages over the last two thirds of the run: {', '.join(f'`{name}`' for name in found.means)}.")
+    head += [f"`{_common(bases)}{suffix}` is {_VARIANTS[suffix]}." for suffix, bases in found.variants.items()]
+    return f"{' '.join(head)}\n\n" + items(found.plain)
+
+
+def _families(rows: Sequence[tuple[str, str, str, str, str]], usual: Sequence[str]) -> _Families:
+    """Sort variables by how they are listed."""
+    found = _Families([], {}, [], {})
     known = {row[0].strip("`") for row in rows}
     for row in rows:
         suffix = next((end for end in _VARIANTS if row[0].endswith(f"{end}`")), "")
         base = row[0].strip("`").removesuffix(suffix)
         if suffix and base in known:
-            variants.setdefault(suffix, []).append(base)
+            found.variants.setdefault(suffix, []).append(base)
         elif base.startswith("mean_") and base.removeprefix("mean_") in known:
-            means.append(base)
+            found.means.append(base)
         elif pattern := _pattern(row, usual[0]):
-            named.setdefault((pattern, row[3]), []).append(row[0].replace(pattern.removeprefix("<quantity>"), ""))
+            name = row[0].replace(pattern.removeprefix("<quantity>"), "")
+            found.predicted.setdefault((pattern, row[3]), []).append(name)
         else:
             name, unit, text, *others = row
-            shown.append((name, unit, _unusual(text, others, usual)))
-    head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
-    for (pattern, over), found in named.items():
-        head += " As in `predict`" + (f", named `{pattern}`" if pattern != "<quantity>" else "")
-        head += (f", over {over}" if over != usual[0] else "") + f": {_all_or(found)}."
-    if means:
-        head += f" Averages over the last two thirds of the run: {', '.join(f'`{name}`' for name in means)}."
-    for suffix, bases in variants.items():
-        head += f" `{_common(bases)}{suffix}` is {_VARIANTS[suffix]}."
-    return f"{head}\n\n" + items(shown)
+            found.plain.append((name, unit, _unusual(text, others, usual)))
+    return found
 
 
 _VARIANTS = {
