@@ -189,7 +189,7 @@ def percents(rows: Sequence[Row], name: str) -> str:
         return "-"
     errors = [100 * abs(number["value"] / number["true"] - 1) for number in given]
     widths = [50 * (number["high"] - number["low"]) / abs(number["true"]) for number in given]
-    return f"{np.median(errors):.2g}, {max(errors):.2g} ({np.median(widths):.2g})"
+    return f"{np.median(errors):.2g}/{max(errors):.2g}/{np.median(widths):.2g}"
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -197,10 +197,10 @@ def table(rows: Sequence[Row]) -> str:
     seeds = len({row["seed"] for row in rows})
     styles = [style for style in STYLES if any(row["style"] == style for row in rows)]
     lines = [
-        f"{len(rows)} films, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} films of each trouble.",
+        f"{len(rows)} videos, {len(styles)} styles, {seeds} seeds, {len(styles) * seeds} videos of each artifact.",
         "",
-        "| Trouble | What is done | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
-        "|---|---|---|---|---|---|---|---|",
+        "| Artifact | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
+        "|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
         own = [row for row in rows if row["trouble"] == trouble.name]
@@ -209,16 +209,15 @@ def table(rows: Sequence[Row]) -> str:
         count = counts(own)
         cells = [
             trouble.name,
-            trouble.what,
             becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
-            f"{count['inside']} of {count['given']}",
+            f"{count['inside']}/{count['given']}",
             far(count),
         ]
         lines.append(f"| {' | '.join(cells)} |")
     lines += [
         "",
-        "| Style | Films | Numbers inside | Far | No speed though it could be read |",
+        "| Style | Videos | Numbers inside | Far | No speed though it could be read |",
         "|---|---|---|---|---|",
     ]
     for style in (*styles, "all"):

@@ -49,6 +49,11 @@ def table(header: Sequence[str], rows: Rows) -> str:
     return "".join(f"| {' | '.join(_cell(cell) for cell in line)} |\n" for line in lines)
 
 
+def items(rows: Rows) -> str:
+    """A list in Markdown: name, what stands in brackets behind it, meaning."""
+    return "".join(f"- {name} ({_cell(about)}): {_cell(text)}\n" for name, about, text in rows)
+
+
 def _cell(text: str) -> str:
     return " ".join(str(text).split()).replace("|", "\\|").replace("<", "&lt;") or " "
 
@@ -85,7 +90,7 @@ def _bounds(info: FieldInfo) -> tuple[Any, Any]:
 
 def _allowed(info: FieldInfo, kind: Kind | None) -> str:
     if kind is not None:
-        return kind.allowed.replace("**", "^")
+        return kind.name
     for item in _metadata(info):
         schema = getattr(item, "json_schema", None) or {}
         if "anyOf" in schema:
@@ -154,7 +159,13 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
         yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "")
 
 
-_HEADER = ("Field", "Default", "Allowed", "Meaning")
+def _fields(rows: Rows) -> str:
+    """Fields as a list: what is allowed and the default stand in brackets."""
+    shown = (
+        (name, allowed if default in ("unset", "empty") else f"{allowed}; {default}", text)
+        for name, default, allowed, text in rows
+    )
+    return items((name.replace("<", "&lt;"), about, text) for name, about, text in shown)
 
 
 def robot_fields(wanted: str) -> str:
@@ -166,11 +177,12 @@ def robot_fields(wanted: str) -> str:
         words = meanings(Robot)
         rows = [(f"`{name}`", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
         extends = "What the file starts from; its own fields are laid over it."
-        return table(_HEADER, [*rows, ("`extends`", "unset", "a preset, or a robot file beside this one", extends)])
+        rows.append(("`extends`", "unset", "a preset, or a robot file beside this one", extends))
+        return _fields(rows)
     model = _section(Robot.model_fields[wanted])
     if model is None:
         raise ValueError(f"{wanted} is no table of the robot file")
-    return table(_HEADER, field_rows(model, "calibration.<model>." if wanted == "calibration" else f"{wanted}."))
+    return _fields(field_rows(model, "calibration.<model>." if wanted == "calibration" else f"{wanted}."))
 
 
 def study_fields() -> str:
@@ -180,7 +192,7 @@ def study_fields() -> str:
     rows = list(field_rows(Study, ""))
     pose = [row[0] for row in rows if row[0].startswith("`placement.")]
     words = f"The pose ({', '.join(pose)}) has the meaning of the shared options of these names.\n"
-    return table(_HEADER, [row for row in rows if row[0] not in pose]) + f"\n{words}"
+    return _fields(row for row in rows if row[0] not in pose) + f"\n{words}"
 
 
 def derived_quantities() -> str:
@@ -188,15 +200,14 @@ def derived_quantities() -> str:
     from spirillum import load
 
     derived = load("biorob2012-wide").derived()
-    return table(("Quantity", "Unit", "Meaning"), [(f"`{n}`", item.unit, item.meaning) for n, item in derived.items()])
+    return items((f"`{name}`", item.unit, item.meaning) for name, item in derived.items())
 
 
 def quantities() -> str:
     """The quantities of a prediction."""
     from spirillum.swimming.steady_quantities import STEADY
 
-    rows = [(f"`{item.name}`", item.unit, item.meaning, item.source) for item in STEADY]
-    return table(("Quantity", "Unit", "Meaning", "Source"), rows)
+    return items((f"`{item.name}`", f"{item.unit}; {item.source}", item.meaning) for item in STEADY)
 
 
 @lru_cache(maxsize=1)
@@ -217,8 +228,21 @@ def _observed() -> Any:
         return study(observations=path)
 
 
+class _Families(typing.NamedTuple):
+    """Variables of a dataset, sorted by how they are listed."""
+
+    plain: list[tuple[str, str, str]]
+    """Name, unit and meaning of those that stand by themselves."""
+    predicted: dict[tuple[str, str], list[str]]
+    """Quantities of `predict`, by the pattern of the name and the dimensions."""
+    means: list[str]
+    """Averages of other variables over the run."""
+    variants: dict[str, list[str]]
+    """Variables that differ from another one by an ending, by that ending."""
+
+
 def _variables(dataset: Any, names: Iterable[str]) -> str:
-    """Variables of a dataset; dimensions and source of most of them stand once above the table."""
+    """Variables of a dataset; what most of them share, and families of names, stand once above the list."""
     rows = []
     for name in names:
         about = dataset[name].attrs
@@ -226,26 +250,67 @@ def _variables(dataset: Any, names: Iterable[str]) -> str:
         unit, source = str(about.get("units", "–")), str(about.get("source", "–"))
         rows.append((f"`{name}`", unit, str(about["long_name"]), over, source))
     usual = [Counter(row[column] for row in rows).most_common(1)[0][0] for column in (3, 4)]
-    named: dict[tuple[str, str], list[str]] = {}
-    shown = []
+    found = _families(rows, usual)
+    head = [f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."]
+    for (pattern, over), same in found.predicted.items():
+        named = f", named `{pattern}`" if pattern != "<quantity>" else ""
+        head.append(f"As in `predict`{named}{f', over {over}' if over != usual[0] else ''}: {_all_or(same)}.")
+    if found.means:
+        head.append(f"Averages over the last two thirds of the run: {', '.join(f'`{name}`' for name in found.means)}.")
+    head += [f"`{_common(bases)}{suffix}` is {_VARIANTS[suffix]}." for suffix, bases in found.variants.items()]
+    return f"{' '.join(head)}\n\n" + items(found.plain)
+
+
+def _families(rows: Sequence[tuple[str, str, str, str, str]], usual: Sequence[str]) -> _Families:
+    """Sort variables by how they are listed."""
+    found = _Families([], {}, [], {})
+    known = {row[0].strip("`") for row in rows}
     for row in rows:
-        if pattern := _pattern(row, usual[0]):
-            named.setdefault((pattern, row[3]), []).append(row[0].replace(pattern.removeprefix("<quantity>"), ""))
+        suffix = next((end for end in _VARIANTS if row[0].endswith(f"{end}`")), "")
+        base = row[0].strip("`").removesuffix(suffix)
+        if suffix and base in known:
+            found.variants.setdefault(suffix, []).append(base)
+        elif base.startswith("mean_") and base.removeprefix("mean_") in known:
+            found.means.append(base)
+        elif pattern := _pattern(row, usual[0]):
+            name = row[0].replace(pattern.removeprefix("<quantity>"), "")
+            found.predicted.setdefault((pattern, row[3]), []).append(name)
         else:
             name, unit, text, *others = row
-            shown.append((name, unit, _unusual(text, others, usual)))
-    head = f"Unless stated otherwise over {usual[0]}; source: {usual[1]}."
-    for (pattern, over), found in named.items():
-        head += " As in `predict`" + (f", named `{pattern}`" if pattern != "<quantity>" else "")
-        head += (f", over {over}" if over != usual[0] else "") + f": {', '.join(found)}."
-    return f"{head}\n\n" + table(("Variable", "Unit", "Meaning"), shown)
+            found.plain.append((name, unit, _unusual(text, others, usual)))
+    return found
+
+
+_VARIANTS = {
+    "_ci95": "the half width of its 95 % interval",
+    "_on": "the average while the drive is on",
+    "_steady": "that while the motion is steady too",
+}
+"""What an ending of a variable's name says of the variable without it."""
+
+
+def _common(names: Sequence[str]) -> str:
+    """A pattern for names, of which all may have the same first word."""
+    first = names[0].partition("_")[0]
+    return f"{first}_<...>" if all(name.startswith(f"{first}_") for name in names) else "<...>"
+
+
+def _all_or(found: Sequence[str]) -> str:
+    """Names of quantities of `predict`, or that it is all of them."""
+    from spirillum.swimming.steady_quantities import STEADY
+
+    return "all quantities" if len(found) == len(STEADY) else ", ".join(found)
+
+
+_PREDICTED = ("_at_observed_rate", "_at_assumed_rate", "_held")
+"""Endings of variables that are quantities of `predict` under other circumstances."""
 
 
 def _pattern(row: Sequence[str], over: str) -> str:
     """How a variable is named after a quantity of `predict`, listed on the same page; empty if it is not."""
     from spirillum.swimming.steady_quantities import STEADY
 
-    suffix = next((end for end in ("_at_observed_rate", "_at_assumed_rate") if row[0].endswith(f"{end}`")), "")
+    suffix = next((end for end in _PREDICTED if row[0].endswith(f"{end}`")), "")
     name = row[0].strip("`").removesuffix(suffix)
     known = any(name == item.name and row[1] == item.unit for item in STEADY)
     return f"<quantity>{suffix}" if known and (suffix or row[3] == over) else ""
@@ -272,7 +337,7 @@ def outside_flags() -> str:
     """The values of the variable `outside`."""
     from spirillum.studies.work import REASONS
 
-    return table(("Value", "Meaning"), [(str(value), f"`{flag}`") for value, flag in enumerate(REASONS)])
+    return ", ".join(f"{value} `{flag}`" for value, flag in enumerate(REASONS)) + ".\n"
 
 
 def simulation_variables(motion: str) -> str:
@@ -303,15 +368,13 @@ def sweep_variables() -> str:
 
 
 def claims() -> str:
-    """The verdicts of the paper's study without observations."""
+    """The verdicts of the paper's study without observations: a table of what is decided, a list of what is not."""
     from spirillum.papers.registry import claims_of
 
-    rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
-    repeated = [reason for _, _, _, _, text in rows for reason in text.split("; ")]
-    marks = {reason: f"({n})" for n, (reason, count) in enumerate(Counter(repeated).most_common(), 1) if count >= 3}
-    shown = [(*row, "; ".join(marks.get(reason, reason) for reason in text.split("; "))) for *row, text in rows]
-    reasons = "".join(f"{mark} {reason}. " for reason, mark in marks.items())
-    return f"{reasons.strip()}\n\n" + table(("Statement", "Paper", "Computed", "Verdict", "Reason"), shown)
+    found = claims_of(_studied())
+    rows = [(c.claim, c.paper, c.computed, c.verdict) for c in found if c.verdict != "undecidable"]
+    others = "".join(f"- {_cell(c.claim)}: {_cell(c.paper)}\n" for c in found if c.verdict == "undecidable")
+    return table(("Statement", "Paper", "Computed", "Verdict"), rows) + f"\nUndecidable:\n\n{others}"
 
 
 def study_figure(name: str) -> str:
@@ -370,27 +433,11 @@ def validation_case(name: str) -> str:
         parts.append(table(("Statement", "Read", "Computed", "Verdict"), claims))
     elif result.statements:
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
-        parts.append(f"Statements: {verdicts}; each with its reason on the page of [the paper's study](study.md).")
+        parts.append(f"Statements: {verdicts}; each is on the page of [the paper's study](study.md).")
     robots = [robot for robot in dict.fromkeys((case.robot, *(point.robot for point in case.points))) if robot]
     start = ", ".join(f"`spirillum robot new mine.toml --from {robot}`" for robot in robots)
     parts.append(f"Read ({case.read}): {' '.join(case.source.split())}. Robot files: {start}.")
     return "\n\n".join(part.strip() for part in parts) + "\n"
-
-
-def models() -> str:
-    """The hydrodynamic models with what they cost."""
-    from spirillum.fluid.registry import MODELS
-
-    rows = [
-        (
-            f"`{model.name}`",
-            ", ".join(f"`{part}`" for part in model.parts),
-            "along and about the axis" if model.axial_only else "all",
-            model.known_error,
-        )
-        for model in MODELS.values()
-    ]
-    return table(("Model", "Parts", "Entries", "Known error"), rows)
 
 
 def reference_list() -> str:
@@ -401,12 +448,32 @@ def reference_list() -> str:
 
 
 def command_options(words: str) -> str:
-    """Arguments and options of a command, those that it shares with others by name alone."""
+    """Arguments and options of a command, those that it shares with others by name alone, the usual ones not at all."""
     shared = _shared_options()
     found = _options_of(words)
-    lines = [_item(option) for option in found if option not in shared]
-    names = ", ".join(f"`{option.names[-1]}`" for option in found if option in shared)
-    return "".join(lines) + (f"\nShared options: {names}.\n" if names else "")
+    lines = [_item(option._replace(meaning=_brief(option.meaning))) for option in found if option not in shared]
+    names = [option.names[-1] for option in found if option in shared and option.names[-1] not in _USUAL]
+    pose = [name for name in names if name in _POSE]
+    if len(pose) == len(_POSE):
+        names = ["pose", *(name for name in names if name not in pose)]
+    words = ", ".join(name if name == "pose" else f"`{name}`" for name in names)
+    return "".join(lines) + ("\n" if lines and words else "") + (f"Shared: {words}.\n" if words else "")
+
+
+def _brief(meaning: str) -> str:
+    """A help text without long clauses that state neither choices nor a default; `--help` prints the whole."""
+    first, *more = re.split(r"(?<=[.;]) (?![^(]*\))", meaning)
+    stating = re.compile(r"(?i)else|or\b|auto|`")
+    kept = " ".join([first, *(part for part in more if stating.match(part) or len(part.split()) <= 5)])
+    return kept[:-1] + "." if kept.endswith(";") else kept
+
+
+_USUAL = ("--set", "--json", "--notes")
+"""Options of nearly every command, which the page names once."""
+_POSE = ("--gap", "--eccentricity", "--pitch", "--yaw", "--ends", "--flow")
+"""Options that the page calls the pose."""
+_EXAMPLE = re.compile(r"(?:, |; )such as -?[\d.]+ ?[A-Za-z/]+(?=[.;,]|$)")
+"""An example of a value with its unit, of which the page has one for every kind."""
 
 
 def shared_options() -> str:
@@ -470,7 +537,7 @@ def _option(parameter: Any) -> Option:
     stated = getattr(parameter, "show_default", None)  # of options whose default stands in a table
     value = stated if isinstance(stated, str) else parameter.default
     default = "required" if parameter.required else "" if value in (None, False) else str(value)
-    return Option(names, metavar, default, parameter.help or "")
+    return Option(names, metavar, default, _EXAMPLE.sub("", parameter.help or ""))
 
 
 def notes(severity: str) -> str:
@@ -500,7 +567,6 @@ LISTINGS: dict[str, Callable[..., str]] = {
     "claims": claims,
     "validation-sources": validation_sources,
     "validation-case": validation_case,
-    "models": models,
     "reference-list": reference_list,
     "command-options": command_options,
     "shared-options": shared_options,

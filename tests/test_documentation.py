@@ -165,7 +165,7 @@ def test_every_table_of_the_robot_file_is_listed() -> None:
 
     text = (DOCS / "robot-file.md").read_text("utf-8")
     tables = set(re.findall(r"<!-- written: robot-fields (\w+) -->", text))
-    plain = {name for name in Robot.model_fields if f"| `{name}` |" in text}
+    plain = {name for name in Robot.model_fields if f"- `{name}` (" in text}
     assert tables - {"root"} | plain == set(Robot.model_fields)
 
 

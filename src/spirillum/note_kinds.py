@@ -4,146 +4,128 @@ from __future__ import annotations
 
 CAUTIONS = {
     "posterior-unusable": (
-        "The chains of the sampler have not mixed, or hold too few effective draws, so that intervals from this "
-        "posterior are wrong. Sample for longer (`--doublings`), or free fewer numbers."
+        "The chains of the sampler have not mixed: intervals from this posterior are wrong. Sample for longer "
+        "(`--doublings`), or free fewer numbers."
     ),
     "synthetic": (
-        "The observations or the video say that they are synthetic: computed, not measured. What follows from them "
-        "tests the method and describes no real robot."
+        "The observations or the video are computed, not measured. What follows from them tests the method and "
+        "describes no real robot."
     ),
     "walls-left-out": (
-        "The robot is in a tube, and the model that answers has no walls. Walls slow a robot down: without them the "
-        "predicted speed is several times too high, and robots may change their order. A model without walls answers "
-        "only where it is named; without a name (`--model auto`) a robot in a tube is answered by `tube`."
+        "The robot is in a tube, and the named model has no walls: its speed is several times too high. `--model "
+        "auto` answers with `tube`."
     ),
     "pose-unknown": (
-        "The gap under the body or its pitch is not given, and they decide much of the speed. The answer holds for one"
-        " pose of several. `--band` computes the range over them, `--gap` and `--pitch` state them, and `--motion "
-        "free` finds the pose from weight and contact."
+        "The gap under the body or its pitch is not given, and they decide much of the speed. `--band` computes the "
+        "range, `--gap` and `--pitch` state them, `--motion free` finds the pose."
     ),
     "outside-validity": (
-        "A field lies outside the range in which the model is accurate. The note names field, value and bound. The "
-        "answer is given, with a larger error than the stated one; another model may hold there."
+        "A field lies outside the range in which the model is accurate: the error is larger than the stated one. "
+        "Another model may hold there."
     ),
     "inertia": (
-        "All models neglect inertia (Stokes flow). Above a Reynolds number of 0.1 the error grows, and no error "
-        "estimate covers it; above 10 the answer is refused. A more viscous fluid, a smaller or a slower robot stays "
-        "below."
+        "All models neglect inertia (Stokes flow). Above a Reynolds number of 0.1 the error grows, and no estimate "
+        "covers it; above 10 the answer is refused."
     ),
     "calibration-missing": (
-        "The model has no walls, and the robot has no drag factors for it, which could replace their effect. Speeds "
-        "and rates are those in unbounded fluid. Calibrate, or use model `tube`."
+        "The model has no walls, and no drag factors that could replace their effect. Calibrate, or use model `tube`."
     ),
     "calibration-outside": (
-        "Drag factors were fitted to a body and a channel of other sizes, and are used for this robot. How they change"
-        " with size is unknown. Calibrate again, or use model `tube`."
+        "Drag factors were fitted to a body and a channel of other sizes. Calibrate again, or use model `tube`."
     ),
     "friction-unset": (
-        "The effective friction B_eff of equation (18) is not given. The motor then turns against less friction than a"
-        " real one, and its rates, and the speeds that follow, are upper bounds. Set `friction.effective`, or "
-        "calibrate with observed rates."
+        "The effective friction B_eff of equation (18) is not given: rates, and the speeds that follow, are upper "
+        "bounds. Set `friction.effective`, or calibrate with observed rates."
     ),
     "friction-negative": (
-        "The inferred effective friction is negative, which no bearing has: the torque that the model predicts exceeds"
-        " what the motor gives. Check the rates' units, the motor's constants and the tail. Predictions take zero."
+        "The inferred effective friction is negative: the torque that the model predicts exceeds that of the motor. "
+        "Check the rates' units, the motor's constants and the tail. Predictions take zero."
     ),
     "friction-counted-twice": (
-        "A body drag factor below 1 already includes friction on the body; the friction model `paper` counts it again."
-        " Use `--friction rotor`."
+        "A body drag factor below 1 already includes friction on the body; the friction model `paper` counts it "
+        "again. Use `--friction rotor`."
     ),
     "friction-not-fitted": (
         "B_eff of this tail was not fitted. The median of the fitted tails is used; the intervals of a posterior "
         "include their spread."
     ),
     "friction-other-fit": (
-        "B_eff was inferred with another model or friction model than the one in use, where it stands for another "
-        "torque. Rates and speeds under the robot's own drive do not follow from the observations there. Fit again "
-        "with this model."
+        "B_eff was inferred with another model or friction model than the one in use. Fit again with this model."
     ),
     "friction-ignored": (
-        "With a prescribed tail rate the effective friction is inferred from (17) and (18); the field "
-        "`friction.effective` has no effect."
+        "With a prescribed tail rate the effective friction is inferred from (17) and (18); `friction.effective` has "
+        "no effect."
     ),
     "fit-not-used": (
-        "Nothing in the calibration or posterior applies to this robot and model, so that the answer is the one "
-        "without it. Name the model that was fitted, or fit in this channel."
+        "Nothing in the calibration or posterior applies to this robot and model. Name the model that was fitted, or "
+        "fit in this channel."
     ),
     "fit-other-motion": (
-        "Numbers were fitted to robots held at a pose, and are used for free motion, whose pose differs. Intervals are"
-        " of the free motion and need not contain the observations."
+        "Numbers were fitted to robots held at a pose, and are used for free motion: intervals need not contain the "
+        "observations."
     ),
     "field-slips": (
-        "A rotating field turns as fast as, or faster than, the step-out rate. Beyond it the robot slips behind the "
-        "field, and rates and speed are averages over slips. Lower the rate, or raise the flux density."
+        "The field turns as fast as, or faster than, the step-out rate: rates and speed are averages over slips. "
+        "Lower the rate, or raise the flux density."
     ),
     "tail-against-motor": (
-        "At the prescribed rate the tail turns against its motor, or drives it: inferred friction, current and "
-        "electrical power then have no meaning or a negative sign. Check the rate's sign, `motor.polarity` and "
-        "`tail.handedness`."
+        "At the prescribed rate the tail turns against its motor, or drives it: friction, current and power have no "
+        "meaning. Check the rate's sign, `motor.polarity` and `tail.handedness`."
     ),
     "torque-unexplained": (
-        "With this friction model nothing balances the rest of the motor's torque. The friction model `rotor` infers "
-        "the friction that does."
+        "With this friction model nothing balances the rest of the motor's torque; the friction model `rotor` infers "
+        "what does."
     ),
     "no-weight": (
-        "The masses of body and tail are not all given, or are left out. The robot is taken to rest on the floor of "
-        "its channel, or moves without weight. Give `body.mass` and `tail.density`, or the pose."
+        "Masses are missing or left out: the robot is taken to rest on the floor, or moves without weight. Give "
+        "`body.mass` and `tail.density`, or the pose."
     ),
     "imposed-flow": (
-        "Fluid flows through the tube. Efficiencies and cost of transport use the velocity in the lab, and do not "
-        "compare with those in fluid at rest."
+        "Efficiencies and cost of transport use the velocity in the lab, and do not compare with those in fluid at "
+        "rest."
     ),
     "table-not-checked": (
-        "The motion reaches poses beyond those at which the robot's table was compared with full solutions, or the "
-        "table misses them by more than it should. The error estimate does not cover these poses. Films of micrometres "
-        "agree with Reynolds' equation to 1 %; the outer part of the resistance is extrapolated to them."
+        "The motion reaches poses beyond those at which the robot's table was compared with full solutions: the "
+        "error estimate does not cover them."
     ),
     "held-by-friction": (
-        "Dry friction is larger than the thrust along the wall. The speed that is left is that of the smoothing of the"
-        " friction law, and means no motion."
+        "Dry friction is larger than the thrust: the speed that is left comes from the smoothing of the friction "
+        "law, and means no motion."
     ),
     "unsteady": (
-        "The motion is not steady, or approaches its steady state more slowly than a trial lasts. Means depend on the "
-        "start and on the duration."
+        "The motion is not steady, or approaches its steady state more slowly than a trial lasts. Means depend on "
+        "the start and on the duration."
     ),
-    "velocity-along-x": (
-        "The robot does not move along x: it sinks, rises, or follows a tilted field. Velocities are the components "
-        "along x."
-    ),
-    "run-cut-short": (
-        "The run ended, or was interrupted, before its requested end. Averages are over the part that was run."
-    ),
+    "velocity-along-x": "The robot sinks, rises, or follows a tilted field. Velocities are the components along x.",
+    "run-cut-short": "The run ended before its requested end. Averages are over the part that was run.",
     "schedule-outside-run": (
         "Switching times or rows of a flow file lie outside the run and have no effect. Check the duration."
     ),
     "misfit": (
-        "The model misses the observations by more than the scatter of the trials. Fitted numbers then compensate for "
-        "what the model lacks (model discrepancy) and hold for these tails alone."
+        "The model misses the observations by more than the scatter of the trials: fitted numbers compensate for it "
+        "(model discrepancy) and hold for these tails alone."
     ),
     "not-identifiable": (
-        "The observations hardly determine a number, or only a combination of several. Its value comes from the prior."
-        " Fix one of them, state its uncertainty, or measure what separates them."
+        "The observations hardly determine a number, or only a combination of several: its value comes from the "
+        "prior. Fix one of them, or state its uncertainty."
     ),
     "prior-decides": (
-        "A fitted number lies far from the median of its prior, or piles up at an end of it, so that the prior decides"
-        " the interval. The model, a unit or the robot may be wrong."
+        "A fitted number lies far from the median of its prior, or at an end of it. The model, a unit or the robot "
+        "may be wrong."
     ),
     "outlier": (
         "A trial or a tail differs from the others by far more than they scatter. It still counts. Check the row and "
         "the video."
     ),
     "friction-assumed": (
-        "The fit needs an assumption about friction that the observations do not test. Rates that are predicted from "
-        "it depend on the assumption."
+        "The fit needs an assumption about friction that the observations do not test, and predicted rates depend on "
+        "it."
     ),
     "intervals-incomplete": (
-        "Intervals leave a source of error out, or rest on too few trials, draws or robots to be trusted. Repeat "
-        "trials, state uncertainties, or take more draws."
+        "Intervals leave a source of error out, or rest on too few trials, draws or robots. Repeat trials, state "
+        "uncertainties, or take more draws."
     ),
-    "drag-order": (
-        "The drag factor of a narrower channel is below that of a wider one, though its wall is closer. Channels may "
-        "be mixed up."
-    ),
+    "drag-order": "The drag factor of a narrower channel is below that of a wider one. Channels may be mixed up.",
     "units-doubtful": (
         "Numbers look as if they were in another unit or of another sign. Check Hz against rad/s, and that all rates "
         "are signed about the same axis."
@@ -152,54 +134,46 @@ CAUTIONS = {
     "design-at-limit": "The best design lies at an end of a range, or a better one lies outside. Widen the range.",
     "design-tie": (
         "The lead of the best design is smaller than the error of its objective, or a field has no effect. Choose by "
-        "cost or by what is easy to make."
+        "cost."
     ),
     "without-answer": (
         "Some robots, poses or candidates have no answer; the note gives the first and why. They are left out of "
         "rankings and bands."
     ),
     "models-differ": (
-        "The compared models differ in what they include (walls, calibration, coupling), not in their theory alone. "
-        "Their differences contain that."
+        "The compared models differ in what they include (walls, calibration, coupling), not in their theory alone."
     ),
     "coupling-left-out": "The model has no coupling between body and tail; its drag is missing.",
     "axial-only": "The model gives resistances along and about the motor axis alone; the other entries are unknown.",
     "cannot-resolve": (
-        "With this camera and view a rate or length cannot be resolved. The note says by which margin. Raise the frame"
-        " rate, or narrow the view."
+        "With this camera and view a rate or length cannot be resolved. Raise the frame rate, or narrow the view."
     ),
     "pixel-size-unknown": (
-        "Nothing states the size of a pixel, so that lengths and speeds have no unit. Give `--view-width`, "
-        "`markers.length_per_pixel`, or a video that shows the ruler."
+        "Lengths and speeds have no unit. Give `--view-width`, `markers.length_per_pixel`, or a video that shows the "
+        "ruler."
     ),
     "setup-incomplete": (
-        "The setup lacks something about the experiment, such as uncertain heights, stripes, or values other than "
-        "those of the example. Fill in the named fields."
+        "The setup lacks something about the experiment, such as uncertain heights or stripes. Fill in the named "
+        "fields."
     ),
     "not-measured": "A video, or a quantity of it, could not be measured; the note says why.",
     "swims-backwards": (
-        "With this sign of the tail rate the robot moves backwards. Forward are positive rates of a right-handed tail "
-        "and negative ones of a left-handed one."
+        "With this sign of the tail rate the robot moves backwards. Forward are positive rates of a right-handed "
+        "tail and negative ones of a left-handed one."
     ),
-    "mesh-not-closed": (
-        "A surface file is not a single closed body for programs that read it. Use the named unit, or repair it before"
-        " printing."
-    ),
+    "mesh-not-closed": "A surface file is not a single closed body. Use the named unit, or repair it before printing.",
     "physics-engine-fluid": (
-        "MuJoCo's own fluid model (ellipsoids) gives a helix no thrust and must stay off. Apply the forces of the "
-        "resistance matrix at every step."
+        "MuJoCo's own fluid model gives a helix no thrust and must stay off. Apply the forces of the resistance "
+        "matrix at every step."
     ),
     "out-of-picture": "The robot leaves the picture during the film, so that its trial is shorter than the film.",
     "aliased-film": (
-        "The tail turns too far from frame to frame to be seen as it turns. Lower the speed of the film, or raise its "
-        "frame rate."
+        "The tail turns too far from frame to frame to be seen as it turns. Lower the speed of the film, or raise "
+        "its frame rate."
     ),
-    "drawn-otherwise": (
-        "Fields are drawn at another sample or pose than the requested one; the note says which. Forces and pressures "
-        "in the lubrication film are not those of the run."
-    ),
+    "drawn-otherwise": "Fields are drawn at another sample or pose than the requested one; the note says which.",
     "incomplete-flow-field": (
-        "The flow field is that in unbounded fluid, though the robot is in a channel. Model `tube` includes the walls."
+        "The flow field is that in unbounded fluid, though the robot is in a channel. Use model `tube`."
     ),
     "remark": "A remark without a code of its own.",
 }
@@ -207,35 +181,27 @@ CAUTIONS = {
 
 INFORMATION = {
     "constant-torque": (
-        "With `drive.kind = 'torque'` the torque is the same at every rate, so that rates and speed fall as one over "
-        "the viscosity. Those of a motor whose torque falls with its rate fall less."
+        "With `drive.kind = 'torque'` rates and speed fall as one over the viscosity; those of a motor fall less."
     ),
     "model-chosen": (
-        "The model or the kind of motion was chosen from what is known of the robot. Name them to choose yourself "
-        "(`--model`, `--motion`)."
+        "The model or the kind of motion was chosen from what is known of the robot. `--model` and `--motion` name "
+        "others."
     ),
     "settled-basis": (
-        "Robots are compared held at a pose, or once their free motion is steady. The two differ in speed and perhaps "
-        "in order; a trial of some turns lies between them."
+        "Robots are compared held at a pose, or in their steady state; speed and order may differ, and a trial lies "
+        "between them."
     ),
     "reference-pose": (
-        "All designs are compared at the same pose, or with the same drag factors. Predict the best ones with model "
-        "`tube` and its band before you build them."
+        "All designs are compared at the same pose, or with the same drag factors. Predict the best ones with `tube` "
+        "and its band."
     ),
-    "interpolated": (
-        "Resistances are interpolated between computed robots or poses; the largest error of a prediction by that was "
-        "checked, and is stated."
-    ),
-    "input-unused": (
-        "Part of the input has no effect: columns that are not read, a seed without anything random. Nothing needs to "
-        "be done if that is meant."
-    ),
+    "interpolated": "Resistances are interpolated between computed robots or poses; the checked error is stated.",
+    "input-unused": "Part of the input has no effect, as columns that are not read or a seed without anything random.",
     "files": (
         "Files of an earlier result were removed or left in the folder, or a file is not written. The note says which."
     ),
     "table-not-kept": (
-        "There is no folder in which the table could be kept, so that the next command makes it again. Set "
-        "SPIRILLUM_CACHE to a folder that can be written to."
+        "There is no folder in which the table could be kept. Set SPIRILLUM_CACHE to a folder that can be written to."
     ),
     "lines-not-sent": "The network refused some of the lines. Check address and port.",
 }
@@ -243,58 +209,52 @@ INFORMATION = {
 
 _FAMILIES = {
     "aliased-tail aliased-body tail-turns-lost body-turns-lost counted-within-a-turn": (
-        "The rotation is too fast for the frame rate, or whole turns are missing, so that its rate or its sense is "
-        "ambiguous. Record with more frames a second, or state the expected rate."
+        "The rotation is too fast for the frame rate, or whole turns are missing. Record with more frames a second, "
+        "or state the expected rate."
     ),
     (
         "no-stripes stripe-order stripes-do-not-fit stripes-do-not-pass stripes-of-another-size stripes-under-glare "
         "stripes-unreadable uneven-stripes short-turn"
     ): (
-        "The stripes on the seal are not read as the robot file describes them, so that the rotation of the body is "
-        "uncertain or not given. Look at the annotated video; check number, order and widths of the stripes."
+        "The stripes are not read as the robot file describes them: the rotation of the body is uncertain or not "
+        "given. Check number, order and widths in the annotated video."
     ),
     "tail-unreadable tail-does-not-fit handedness mirrored": (
-        "The tail's phase cannot be read, or its handedness is not that of the robot file. Check `tail.handedness` and"
-        " the tail's dimensions; sharper and larger pictures show more."
+        "The tail's phase cannot be read, or its handedness is not that of the robot file. Check `tail.handedness` "
+        "and dimensions."
     ),
     "size-does-not-fit outline-does-not-fit scale-does-not-fit focal-lengths-differ ends-drift-apart outline-hops": (
-        "Size or outline of the robot in the picture differ from those of the robot file at this scale. Lengths and "
-        "speeds are less certain or not given. Check the robot file, the heights in the setup, and the ruler."
+        "Size or outline in the picture differ from the robot file at this scale. Lengths and speeds are less "
+        "certain or not given. Check the robot file, the heights and the ruler."
     ),
     "outline-alone": (
-        "The coloured seal was not found, and over a grid or through glass the outline of the body may follow what is"
-        " not the body's. Speed and tail rate are less certain or not given. Look at the named frame; a bright seal"
-        " or plain paper under the tube helps."
+        "The coloured seal was not found, and the outline may follow a grid or glass. Speed and tail rate are less "
+        "certain or not given. Use a bright seal or plain paper."
     ),
     "two-robots not-the-robot something-else-followed robot-stands-still nothing-moves does-not-advance one-picture": (
-        "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Look at the annotated"
-        " video; crop it to one robot."
+        "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Crop the video to "
+        "one robot."
     ),
     (
         "robot-not-seen robot-came-late robot-left-the-view robot-lost robot-partly-out-of-view edges-hidden standing-"
         "glare too-few-frames"
-    ): (
-        "The robot is out of view, hidden or not detected on part of the frames. What was measured on the other frames"
-        " is kept."
-    ),
+    ): ("The robot is out of view, hidden or not detected on part of the frames; the others count."),
     "nose-on-the-other-side moves-backwards cues-disagree": (
-        "The robot's direction in the picture does not agree with its motion or its shape, which would change all "
-        "signs. Check `robot.direction`."
+        "The robot's direction in the picture does not agree with its motion or shape. Check `robot.direction`."
     ),
     "camera-moved camera-rolled camera-swayed": (
-        "The camera moved or is tilted. Its motion is taken out where the background shows it; lengths and speeds are "
-        "less certain. Fix the camera."
+        "The camera moved or is tilted. Its motion is taken out where the background shows it; lengths and speeds "
+        "are less certain. Fix the camera."
     ),
     (
         "dropped-frames lost-frames repeated-frames uneven-steps unordered-times times-do-not-fit clock-in-doubt rate-"
         "replaced video-is-cut unreadable-frames frames-not-read video-ends-early"
     ): (
-        "Frames are missing, doubled or unevenly spaced, or the times of the video do not agree with its motion. Rates"
-        " depend on these times. Record with the camera's own time stamps, and do not edit the video."
+        "Frames are missing, doubled or unevenly spaced, or times do not agree with the motion. Record with the "
+        "camera's own time stamps, and do not edit the video."
     ),
     "pixels-not-square pixel-aspect-replaced pictures-turned slant-left-out sixteen-bit-images several-films": (
-        "The video file states its pictures in an unusual way, or a setting replaces what it states. Check that the "
-        "annotated video looks right."
+        "The video file states its pictures in an unusual way. Check that the annotated video looks right."
     ),
     "not-steady stray-frames stands-for-a-while reverses": (
         "A rate changes during the trial more than its errors allow, or some frames deviate. The rate is a mean over "
