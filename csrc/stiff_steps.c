@@ -362,9 +362,9 @@ static bool found_step(Run *run) {
 }
 
 EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double tolerance, double *memory, double *y,
-                       double *before, double *increments, double *gaps, const double *samples, double *states,
-                       const double *sizes, const double *limits, double rough, double *data, const double *table,
-                       int64_t count, int64_t sample_count, int64_t size, int64_t table_size) {
+                       double *before, double *increments, double *jacobian, double *gaps, const double *samples,
+                       double *states, const double *sizes, const double *limits, double rough, double *data,
+                       const double *table, int64_t count, int64_t sample_count, int64_t size, int64_t table_size) {
     Run run = {
         .robot = robot_opened(data, table, size, table_size),
         .sizes = (const Sizes *)sizes,
@@ -389,6 +389,7 @@ EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double toleranc
             interpolate((samples[answered] - s->time) / s->length, s->y, s->end, increments,
                         states + answered * STATES);
         run.memory->answered = (double)answered;
+        for (int i = 0; i < ACTING * ACTING; i++) jacobian[i] = s->jacobian[ACTS[i / ACTING]][i % ACTING];
         copy(s->y, before);
         copy(s->end, y);
         copy(run.rates, s->f);

@@ -214,8 +214,8 @@ def test_steps_are_those_of_another_method() -> None:
     sizes, limits = np.append(np.ones(19), [1e-6, 1.0]), np.array([np.inf, 0.0, 0.0, 0.0, np.inf])
     sizes[:3] = 0.01
     end = stiff_steps.advance(
-        2.0, True, 100_000, 1e-9, memory, y, y.copy(), np.zeros((8, 19)), np.ones(4), times, found, sizes, limits, 0.0,
-        data, none,
+        2.0, True, 100_000, 1e-9, memory, y, y.copy(), np.zeros((8, 19)), np.zeros((8, 8)), np.ones(4), times,
+        found, sizes, limits, 0.0, data, none,
     )  # fmt: skip
     assert (end, memory[stiff_steps.ANSWERED], memory[stiff_steps.TIME]) == (stiff_steps.DONE, 8.0, 2.0)
     assert found == pytest.approx(expected, abs=1e-6)

@@ -57,7 +57,7 @@ def intervals_of_free_motion(
             progress("draws of the posterior", number, len(places))
         held, links, _ = let_go(one, found.laid._replace(contact=posterior.contact(place)))
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
-        if fixed is None or abs(fixed.multipliers[0]) > STABLE:
+        if fixed is None or abs(fixed.multiplier) > STABLE:
             continue
         swum.append(means_over(held, links, fixed.state, fixed.turn.time, 1))
         steady.append(place)

@@ -55,6 +55,8 @@ _SAMPLES = 240
 """Samples of a turn over which means are taken."""
 _MOST_SAMPLES = 20_000
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
+_FEW_TURNS = 6
+"""Turns of the tail within which a trial reaches its steady motion."""
 _LIGHT = 1e-9
 """Weight in the fluid, over the forces that act, below which a robot has none."""
 
@@ -108,6 +110,7 @@ def free_motion(
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
     until: float | None = None,
+    turns_shown: int = 0,
     progress: Progress | None = None,
 ) -> FreeMotion:
     """Follow a robot after release in its tube to its steady motion.
@@ -122,6 +125,7 @@ def free_motion(
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: azimuth of the start and coefficient of dry friction.
         until: gap that it has to reach, m; None: no such gap.
+        turns_shown: of the tail in the path at least.
         progress: told what is being computed, how much is done, and of how much.
     """
     placed, asked = Placement.of(placement), InTube.of(in_tube)
@@ -154,7 +158,7 @@ def free_motion(
     heavy = load_size > _LIGHT * links.torque
     tell = progress or (lambda _what, _done, _total: None)
     sign = float(np.sign(held.tail_rotation_rate))
-    run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
+    run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell, turns_shown=turns_shown)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
     limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
     inertia = check_stokes_flow(batch, limits)
@@ -235,7 +239,7 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
     if weight and not links.weight.any():
         found.append(NO_WEIGHT)
     slow = run.lying.approach_time
-    if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
+    if run.lying.state == "steady" and slow > _FEW_TURNS * run.turn.time:
         words = (
             f"the steady motion is approached with a time constant of {slow:.3g} s, which a trial of some turns "
             "does not "

@@ -111,6 +111,7 @@ class _Run:
     gaps: Samples
     before: Samples
     increments: Samples = field(default_factory=lambda: np.zeros((8, rigid_links.STATES)))
+    jacobian: Samples = field(default_factory=lambda: np.zeros((8, 8)))
 
     @property
     def time(self) -> float:
@@ -222,8 +223,9 @@ def _stretch(
         while True:
             watched = run.gaps.copy()
             status = stiff_steps.advance(
-                target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments, run.gaps,
-                inside[done:], states[done:], sizes, limits, robot.roughness, data, robot.table,
+                target, clip, _STEPS, robot.tolerance, run.memory, run.state, run.before, run.increments,
+                run.jacobian, run.gaps, inside[done:], states[done:], sizes, limits, robot.roughness, data,
+                robot.table,
             )  # fmt: skip
             done += int(run.memory[stiff_steps.ANSWERED])
             tell(run.time)

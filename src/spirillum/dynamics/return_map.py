@@ -9,6 +9,7 @@ run.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -39,10 +40,20 @@ STEPS = ("time", "x", "roll", "gap", "azimuth", "pitch", "yaw", "contact_force",
 _SIZES = np.array([1.0, 0.1, 100.0, 1.0])
 """Weights of azimuth (rad), logarithm of the gap, pitch (rad) and yaw (rad) in the size of a change."""
 _LONGEST = np.array([0.3, 1.0, 0.05, 0.1])
-"""Longest steps of Newton's method."""
-_ROUNDS, _RELAXING = 10, 8
-_STILL, _SMALLEST = 1e-8, 2e-4
-"""Size of a turn's change below which nothing changes at all; of a step of Newton's method that is the last."""
+"""Longest steps of the search."""
+_ROUNDS, _FIRST_TURNS = 25, 4.0
+"""Steps of the search at most; turns of the tail that the first one is over."""
+_GROWTH = (0.25, 10.0)
+"""By what the turns that a step is over are multiplied at least and at most."""
+_STILL, _SMALLEST, _SMALL = 1e-8, 2e-4, 2e-2
+"""Size of a turn's change below which nothing changes at all; of a step of Newton's method that is the last; of a step
+after which no turn is needed for what dies out within one."""
+_APART = 0.01 * _LONGEST
+"""Distances from a fixed point at which its multiplier is measured."""
+_LITTLE = 1e-6
+"""Differences of a state's components over their sizes and the gap."""
+_TAIL, _ANGLES = 4, [0, 4, 5]
+"""Where a chart has the angle of the tail, and angles that are the same after a turn."""
 
 
 class Turn(NamedTuple):
@@ -54,6 +65,8 @@ class Turn(NamedTuple):
     """How long it takes, s."""
     steps: Samples
     """What is in `STEPS` at each step, all from the start of the turn, (n, 9)."""
+    tangent: Samples
+    """Derivative of what acts (`stiff_steps.ACTING`) after `time` by that at its start, (8, 8)."""
 
 
 @dataclass
@@ -76,15 +89,16 @@ class ReturnMap:
         memory = np.zeros(stiff_steps.MEMORY)
         memory[stiff_steps.STEP] = _FIRST * robot.turn
         gaps = np.ones(robot.gap_count + stiff_steps.WATCHED)
-        increments, before = np.zeros((8, rigid_links.STATES)), y.copy()
+        increments, before, jacobian = np.zeros((8, rigid_links.STATES)), y.copy(), np.zeros((8, 8))
         stiff_steps.watched(y, 0.0, data, robot.table, limits, robot.roughness, gaps)
         nothing, none = np.empty(0), np.empty((0, rigid_links.STATES))
         begun = observed_at(robot, y)[kernel.TURN], y[rigid_links.PHASE]
         noted: list[tuple[float, ...]] = []
+        jacobians: list[Samples] = []
         while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
             status = stiff_steps.advance(
-                np.inf, _ON, 1, self.tolerance, memory, y, before, increments, gaps, nothing, none, sizes,
-                limits, robot.roughness, data, robot.table,
+                np.inf, _ON, 1, self.tolerance, memory, y, before, increments, jacobian, gaps, nothing, none,
+                sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
             time = float(memory[stiff_steps.TIME])
             if status == stiff_steps.STUCK:
@@ -94,11 +108,13 @@ class ReturnMap:
             if time > _STALLED * robot.turn:
                 raise InputError("the tail hardly turns there; allowed: a stronger drive, or motion 'held'")
             noted.append(_noted(time, y, data))
+            jacobians.append(jacobian.copy())
         end, share = self._at_the_angle(before, y, increments, begun)
         last = float(memory[stiff_steps.LAST_TIME])
         time = last + share * (float(memory[stiff_steps.TIME]) - last)
         steps = np.array(noted)
-        return Turn(end, time, steps[steps[:, 0] <= time])
+        tangent = _tangent(np.array([0.0, *steps[:-1, 0], time]), np.array(jacobians))
+        return Turn(end, time, steps[steps[:, 0] <= time], tangent)
 
     def _turned(self, y: Samples, turn: float, begun: tuple[float, float]) -> float:
         """Angle by which the tail has turned relative to the nearest wall, rad."""
@@ -123,6 +139,16 @@ class ReturnMap:
         return inner.copy(), share
 
 
+def _tangent(times: Samples, jacobians: Samples) -> Samples:
+    """Derivative of a state by that at the start, by the Jacobians at the beginning of steps (Magnus, order 2)."""
+    from scipy.linalg import expm
+
+    after = np.concatenate([jacobians[1:], jacobians[-1:]])
+    factors = expm(np.diff(times)[:, None, None] * 0.5 * (jacobians + after))
+    found: Samples = reduce(lambda total, factor: factor @ total, factors)
+    return found
+
+
 def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
     return (
         time,
@@ -141,15 +167,14 @@ class FixedPoint(NamedTuple):
     """The turn from there."""
     state: Samples
     """The state at its start, (19,)."""
-    multipliers: np.ndarray
-    """By what small distances from it are multiplied in a turn, complex, largest first."""
+    multiplier: complex
+    """By what a small distance from it is multiplied in a turn, after some turns."""
 
 
 def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint | None:
-    """The fixed point near a state by Newton's method, if it is found.
+    """The fixed point to which the motion from a state leads, if it is found.
 
-    After each step some turns let go by what dies out within a few, such as gaps. It is looked for with longer
-    steps in time than those of a run, and settled with these.
+    It is looked for with longer steps in time than those of a run, and settled with these.
 
     Args:
         turns: the map.
@@ -158,55 +183,76 @@ def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint 
     """
     free = np.arange(0 if heavy else 1, 4)
     place = _Place(replace(turns, tolerance=_SEARCHING), state)
-    near = _newton(place, place.coordinates(state), free)
+    near = _continued(place, place.coordinates(state), free, _FIRST_TURNS)
     if near is None:
         return None
     place = _Place(turns, place.state(near.x))
-    found = _newton(place, near.x, free)
+    found = _continued(place, near.x, free, np.inf)
     if found is None:
         return None
-    multipliers = _multipliers(place, found, free)
-    return FixedPoint(found.turn, place.state(found.x), multipliers[np.argsort(-np.abs(multipliers))])
+    return FixedPoint(found.turn, place.state(found.x), _multiplier(place, found, free))
 
 
-class _Found(NamedTuple):
-    """Where Newton's method has ended."""
+def _multiplier(place: _Place, found: _Change, free: np.ndarray) -> complex:
+    """The leading eigenvalue of the derivative, which may be close to 1: by turns from both sides of the point."""
+    values, right = np.linalg.eig(found.derivative[np.ix_(free, free)])
+    number = int(np.argmax(np.abs(values)))
+    left, along = np.linalg.inv(right)[number], np.zeros(4, dtype=complex)
+    along[free] = right[:, number]
+    multiplier = 0.0j
+    for unit, part in ((1.0, along.real), (1.0j, along.imag)):
+        if part.any():
+            length = float(np.min(_APART / np.maximum(np.abs(part), 1e-300)))
+            ahead, behind = place.change(found.x + length * part), place.change(found.x - length * part)
+            if ahead is None or behind is None:
+                return complex(values[number])
+            moved = part + (ahead.change - behind.change) / (2.0 * length)
+            multiplier += unit * complex(left @ moved[free])
+    return multiplier
+
+
+class _Change(NamedTuple):
+    """A turn from coordinates."""
 
     x: Samples
     """Coordinates of the pose, (4,)."""
     turn: Turn
     """The turn from there."""
+    change: Samples
+    """What it changes, (4,)."""
     derivative: Samples
-    """Derivative of the map there, by differences to one side."""
+    """Derivative of the coordinates after it by those at its start, (4, 4)."""
 
 
-def _newton(place: _Place, x: Samples, free: np.ndarray) -> _Found | None:
-    """Newton's method for the fixed point of the return map, from coordinates (4,); None where it fails."""
-    found = place.change(x)
+def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Change | None:
+    """The fixed point of the return map to which coordinates, (4,), lead; None where the search fails.
+
+    Pseudo-transient continuation: implicit Euler steps over turns of the tail, more of them as the change of a turn
+    falls, and at last Newton's method (C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35:508, 1998). What dies out
+    within a turn, such as gaps in contact, does so in one turn after each step.
+    """
+    here = place.change(x)
     for _ in range(_ROUNDS):
-        if found is None:
+        if here is None:
             return None
-        turn, change = found
-        place.current = float(turn.state[rigid_links.CURRENT])
-        size = _size(change[free])
-        derivative = _derivative(place, x, turn, free)
-        if derivative is None:
-            return None
-        step = np.zeros(4)
-        step[free] = np.linalg.lstsq(np.eye(free.size) - derivative, change[free], rcond=None)[0]
+        size = _size(here.change[free])
+        slope = np.eye(free.size) - here.derivative[np.ix_(free, free)]
+        newton, step = np.zeros(4), np.zeros(4)
+        newton[free] = np.linalg.lstsq(slope, here.change[free], rcond=None)[0]
         if size < _STILL:  # where many places are brought back, a step would go to another of them
-            return _Found(x, turn, derivative)
-        if _size(step[free]) < _SMALLEST:
-            last = place.change(x + step)
-            return _Found(x, turn, derivative) if last is None else _Found(x + step, last[0], derivative)
+            return here
+        if _size(newton[free]) < _SMALLEST:
+            return place.change(here.x + newton) or here
+        step[free] = np.linalg.lstsq(slope + np.eye(free.size) / turns, here.change[free], rcond=None)[0]
         share = min(1.0, float(np.min(_LONGEST / np.maximum(np.abs(step), 1e-300))))
-        for tried in (share, 0.25 * share):
-            x_new, found = place.relaxed(x + tried * step)
-            if found is not None and _size(found[1][free]) < size:
-                break
-        else:
-            return None
-        x = x_new
+        new = place.change(here.x + share * step)
+        if new is not None and _size(step[free]) > _SMALL:
+            new = place.change(new.x + new.change)
+        if new is None:
+            turns *= 0.1
+            continue
+        turns *= float(np.clip(size / _size(new.change[free]), *_GROWTH))
+        here = new
     return None
 
 
@@ -215,28 +261,10 @@ def _size(change: Samples) -> float:
 
 
 def _wrapped(change: Samples) -> Samples:
-    """A change of coordinates with that of the azimuth between -pi and pi."""
-    return np.array([(change[0] + np.pi) % (2.0 * np.pi) - np.pi, *change[1:]])
-
-
-def _derivative(place: _Place, x: Samples, turn: Turn, free: np.ndarray, *, sign: float = 1.0) -> Samples | None:
-    """Derivative of the map over the free coordinates, by differences to one side."""
-    after = place.coordinates(turn.state)
-    columns = []
-    for column in free:
-        moved = x.copy()
-        moved[column] += sign * place.step(x)[column]
-        found = place.change(moved)
-        if found is None:
-            return None
-        columns.append(_wrapped(place.coordinates(found[0].state) - after)[free] / (moved - x)[column])
-    return np.stack(columns, axis=1)
-
-
-def _multipliers(place: _Place, found: _Found, free: np.ndarray) -> np.ndarray:
-    """Eigenvalues of the derivative: one close to 1 needs differences to both sides."""
-    behind = _derivative(place, found.x, found.turn, free, sign=-1.0)
-    return np.linalg.eigvals(found.derivative if behind is None else 0.5 * (found.derivative + behind))
+    """A change of a chart with those of its angles between -pi and pi."""
+    found = change.copy()
+    found[_ANGLES] = (found[_ANGLES] + np.pi) % (2.0 * np.pi) - np.pi
+    return found
 
 
 class _Place:
@@ -253,20 +281,7 @@ class _Place:
 
     def coordinates(self, state: Samples) -> Samples:
         """Coordinates of a state, (4,)."""
-        seen = observed_at(self._robot, state)
-        return np.array(
-            [
-                seen[kernel.AZIMUTH],
-                self._closeness(state),
-                seen[kernel.WALL_PITCH],
-                seen[kernel.WALL_YAW],
-            ]
-        )
-
-    def step(self, x: Samples) -> Samples:
-        """Small changes of the coordinates."""
-        close = min(1.0, float(np.exp(x[1])) / self._robot.length)
-        return np.array([min(0.05 * close, 1e-4), 1e-3, 5e-4 * close, min(0.05 * close, 1e-4)])
+        return self._chart(state)[:4]
 
     def state(self, x: Samples) -> Samples:
         """The state at coordinates, (19,)."""
@@ -281,22 +296,40 @@ class _Place:
         found[rigid_links.CURRENT] = self.current
         return found
 
-    def change(self, x: Samples) -> tuple[Turn, Samples] | None:
-        """The turn from coordinates and what it changes, (4,); None where there is none."""
+    def change(self, x: Samples) -> _Change | None:
+        """The turn from coordinates, (4,); None where there is none."""
         try:
-            turn = self._turns.after(self.state(x))
+            start = self.state(x)
+            turn = self._turns.after(start)
         except (InputError, ValueError):
             return None
-        return turn, _wrapped(self.coordinates(turn.state) - x)
+        self.current = float(turn.state[rigid_links.CURRENT])
+        rates = np.empty(rigid_links.STATES)
+        stiff_steps.rates(rates, 0.0, turn.state, self._robot.data, self._robot.table)
+        after, rate = self._chart_derivative(turn.state), rates[list(stiff_steps.ACTING)]
+        moved = after @ turn.tangent @ np.linalg.inv(self._chart_derivative(start))[:, :4]
+        drift = after @ rate  # the turn ends where the tail is at its angle again
+        derivative = moved[:4] - np.outer(drift[:4], moved[_TAIL]) / drift[_TAIL]
+        return _Change(x, turn, _wrapped(self._chart(turn.state) - self._chart(start))[:4], derivative)
 
-    def relaxed(self, x: Samples) -> tuple[Samples, tuple[Turn, Samples] | None]:
-        """The coordinates some turns later, and what the next turn changes."""
-        for _ in range(_RELAXING):
-            found = self.change(x)
-            if found is None:
-                return x, None
-            x = x + found[1]
-        return x, self.change(x)
+    def _chart(self, state: Samples) -> Samples:
+        """What acts as these four coordinates, angles of tail and body against the wall, |q| and current, (8,)."""
+        seen, attitude = observed_at(self._robot, state), state[rigid_links.ATTITUDE : rigid_links.PHASE]
+        tail = seen[kernel.TURN] + state[rigid_links.PHASE]
+        place = seen[kernel.AZIMUTH], self._closeness(state), seen[kernel.WALL_PITCH], seen[kernel.WALL_YAW]
+        return np.array([*place, tail, seen[kernel.TURN], np.linalg.norm(attitude), state[rigid_links.CURRENT]])
+
+    def _chart_derivative(self, state: Samples) -> Samples:
+        """Derivative of the chart by what acts, (8, 8)."""
+        sizes = _LITTLE * self._robot.step_sizes()
+        sizes[: rigid_links.PHASE] *= min(1.0, float(np.exp(self._closeness(state))) / self._robot.length)
+        columns = []
+        for at in stiff_steps.ACTING:
+            ahead, behind = state.copy(), state.copy()
+            ahead[at] += sizes[at]
+            behind[at] -= sizes[at]
+            columns.append(_wrapped(self._chart(ahead) - self._chart(behind)) / (ahead[at] - behind[at]))
+        return np.stack(columns, axis=1)
 
     def _closeness(self, state: Samples) -> float:
         """Mean logarithm of the body's gaps (m): unlike the smallest gap it is smooth where the nearest end changes."""

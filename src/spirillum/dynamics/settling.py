@@ -94,6 +94,8 @@ def lubrication_resistance(viscosity: float, length: float, radius: float, tube_
 
 _SHARE = 0.2
 """Gap until which drainage is timed over that at the start, where none is given."""
+_TURNS = 30
+"""Turns of the tail that the path shows at least."""
 _FILMS = 5
 """Gaps at which the film is stated."""
 _SAMPLES = 400
@@ -275,6 +277,7 @@ def settle(
         roughness=roughness,
         in_tube=in_tube,
         until=gap,
+        turns_shown=_TURNS,
         progress=progress,
     )
     last = _SHARE * free.start_gap if gap is None else gap

@@ -1,7 +1,7 @@
 """Asymptotic motion of a robot after release in its tube: the run, and its steady state.
 
-The run is followed turn by turn. Now and then the place that a turn brings back is looked for from where the run has
-come (`turn_map`); found and stable, it is what the run approaches, often for many minutes.
+The run is followed turn by turn. Now and then the fixed point of the return map to which it leads is looked for
+(`return_map`); found and stable, it is what the run approaches, often for many minutes.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from spirillum.swimming.steady_state import State, SteadyState
 
 _MOST_TURNS = 300
 """Turns that are followed at most."""
-_BLOCK = 30
-"""Turns between two searches for the fixed point of the return map."""
+_SEARCHES = (10, *range(30, _MOST_TURNS + 1, 30))
+"""Turns after which the fixed point of the return map is searched for."""
 STABLE = 1.0 + 1e-4
 """Largest multiplier of a motion that stays where it is."""
 _PLACES = {name: place for place, name in enumerate(STEPS)}
@@ -89,7 +89,14 @@ class LongRun(NamedTuple):
 
 
 def long_run(
-    robot: TubeRobot, state: Samples, sign: float, *, heavy: bool, until: float | None, progress: Progress
+    robot: TubeRobot,
+    state: Samples,
+    sign: float,
+    *,
+    heavy: bool,
+    until: float | None,
+    progress: Progress,
+    turns_shown: int = 0,
 ) -> LongRun:
     """Follow a robot in its tube to where its motion no longer changes.
 
@@ -100,10 +107,12 @@ def long_run(
         heavy: whether weight or buoyancy tells one azimuth from another.
         until: gap that the run has to reach before anything is looked for, m; None: no such gap.
         progress: told what is being computed, how much is done, and of how much.
+        turns_shown: of the path at least, where a steady motion is found.
     """
     turns, path = ReturnMap(robot, sign), Path()
     states, ended = [state], ""
-    while path.turns < _MOST_TURNS:
+    found, followed = None, 0.0
+    while path.turns < _MOST_TURNS and (found is None or path.turns < turns_shown):
         progress("free motion in the tube: turns of the tail", path.turns, _MOST_TURNS)
         try:
             turn = turns.after(state)
@@ -118,21 +127,25 @@ def long_run(
         if abs(path.of("azimuth")[-1] - path.of("azimuth")[0]) > 4.0 * np.pi and heavy:
             return _around(path, turn, states)
         waiting = until is not None and path.of("gap").min() > until
-        if path.turns % _BLOCK == 0 and not waiting:
+        if found is None and path.turns in _SEARCHES and not waiting:
             progress("free motion in the tube: its steady place", path.turns, _MOST_TURNS)
-            found = fixed_place(turns, state, heavy=heavy)
-            if found is not None and np.all(np.abs(found.multipliers) < STABLE):
-                progress("free motion in the tube", _MOST_TURNS, _MOST_TURNS)
-                largest = float(np.abs(found.multipliers[0]))
-                slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - STABLE else float("nan")
-                name: State = "steady" if heavy else "orbits"
-                return LongRun(path, found.turn, found.state, found.turn.time, _lying(name, found.turn, path, slow))
+            place = fixed_place(turns, state, heavy=heavy)
+            found = place if place is not None and abs(place.multiplier) < STABLE else None
+            followed = float(path.of("time")[-1])
+    if found is not None:
+        progress("free motion in the tube", _MOST_TURNS, _MOST_TURNS)
+        largest = abs(found.multiplier)
+        slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - STABLE else float("nan")
+        name: State = "steady" if heavy else "orbits"
+        lying = _lying(name, found.turn, followed, slow)
+        return LongRun(path, found.turn, found.state, found.turn.time, lying)
+    followed = float(path.of("time")[-1])
     if not ended:
-        ended = f"the motion still changes after {path.of('time')[-1]:.4g} s, and was not followed on"
-    return LongRun(path, turn, states[-2], turn.time, _lying("changing", turn, path, float("nan"), ended))
+        ended = f"the motion still changes after {followed:.4g} s, and was not followed on"
+    return LongRun(path, turn, states[-2], turn.time, _lying("changing", turn, followed, float("nan"), ended))
 
 
-def _lying(state: State, turn: Turn, path: Path, approach: float, ended: str = "") -> SteadyState:
+def _lying(state: State, turn: Turn, followed: float, approach: float, ended: str = "") -> SteadyState:
     steps = {name: turn.steps[:, place] for name, place in _PLACES.items()}
     azimuth = np.unwrap(steps["azimuth"])
     time = np.append(steps["time"], turn.time)
@@ -151,7 +164,7 @@ def _lying(state: State, turn: Turn, path: Path, approach: float, ended: str = "
         yaw=mean(steps["yaw"]),
         orbit_rate=0.0 if state == "steady" else float(slope),
         contact_force=mean(steps["contact_force"]),
-        time=float(path.of("time")[-1]),
+        time=followed,
         approach_time=approach,
         ended=ended,
     )

@@ -26,8 +26,6 @@ from spirillum.swimming.steady_quantities import STEADY
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.dynamics.settling import Settling
-
 ASSUMPTION = "contact assumed, not validated"
 """What a released motion rests on."""
 _POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth": "azimuth"}
@@ -97,17 +95,18 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     return ReleasedMotion(values, basis)
 
 
-def steady_of(follow: Callable[[], Settling]) -> ReleasedMotion:
+def steady_of(follow: Callable[[], Prediction]) -> ReleasedMotion:
     """Return the steady motion of a released robot.
 
     Args:
-        follow: follows it there, as `spirillum.settle` does.
+        follow: predicts its free motion in the tube.
     """
     try:
-        found = follow()
+        motion = follow()
     except InputError as error:
         return ReleasedMotion(reason=str(error))
-    motion, lying = found.prediction, found.lying
+    lying = motion.lying
+    assert lying is not None  # noqa: S101 - a free motion in the tube has one
     basis: dict[str, Any] = {
         "assumption": ASSUMPTION,
         "state": state_of(lying, motion.warnings),

@@ -13,7 +13,7 @@ from spirillum.dynamics.trial import steady_of, trial_of, why_not_released
 from spirillum.dynamics.trial_unknowns import TrialSample, open_unknowns, samples_of, with_interval
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.errors import InputError
-from spirillum.fitted.fit import Fit
+from spirillum.fitted.fit import Fit, read_fit
 from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
@@ -66,10 +66,11 @@ class TrialRequest:
 
     def steady(self) -> ReleasedMotion:
         """Return the steady motion."""
-        from spirillum.dynamics.settling import settle  # its equations are compiled
+        from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
-        still = self.in_tube.model_copy(update={"wait": None})
-        return steady_of(lambda: settle(self._resolved(), in_tube=still, **self._shared()))
+        still, shared = self.in_tube.model_copy(update={"wait": None}), self._shared()
+        fit = read_fit(shared.pop("calibration"))
+        return steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=fit, **shared).prediction)
 
     def _run(self, held: Prediction, **sampled: Any) -> ReleasedMotion:
         """The trial, with some settings of a sample in place of those of the request."""

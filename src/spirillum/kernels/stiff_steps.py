@@ -19,6 +19,9 @@ WATCHED = 3
 CHANNEL, MIDDLE, NOSE, TIP, MOST_CHARGE = 0, 1, 2, 3, 4
 LIMITS = 5
 
+ACTING = (1, 2, 3, 4, 5, 6, 7, 9)
+"""Components of the state on which the rates depend: position across the tube, attitude, tail phase, current."""
+
 # Memory between calls: time, length of the next step; time and length of the last step taken; samples answered.
 TIME, STEP, LAST_TIME, LAST_STEP, ANSWERED = 0, 1, 2, 3, 4
 MEMORY = 5
@@ -91,7 +94,7 @@ def interpolate(
     """Fill the state inside a step, of order 4, at a share of it from 0 to 1."""
 
 
-@native("memory", "y", "before", "increments", "gaps", "states", "data")
+@native("memory", "y", "before", "increments", "jacobian", "gaps", "states", "data")
 def advance(
     stop: float,
     clip: bool,  # noqa: FBT001 - an argument of C
@@ -101,6 +104,7 @@ def advance(
     y: Float64[Array, "19"],
     before: Float64[Array, "19"],
     increments: Float64[Array, "8 19"],
+    jacobian: Float64[Array, "8 8"],
     gaps: Float64[Array, "watched"],
     samples: Float64[Array, "samples"],
     states: Float64[Array, "samples 19"],
@@ -121,6 +125,7 @@ def advance(
         y: the state, (19,); changed.
         before: result, the state at the beginning of the last step.
         increments: result, those of the last step, (8, 19).
+        jacobian: result, derivatives of the rates of what acts (`ACTING`) at the beginning of the last step, 1/s.
         gaps: what is watched, at `y`; changed.
         samples: increasing times, s: those in the steps taken are answered.
         states: result, the states at the samples, (n, 19).
