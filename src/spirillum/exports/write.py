@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.axial_robot import PARAMETERS, AxialRobot, axial_robot
+from spirillum.dynamics.axial_robot import AxialRobot, axial_robot
 from spirillum.envelope import as_json, envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports.descriptions import FLUID_WARNING, check_inertia, mjcf_text, sidecar_of, urdf_text
@@ -379,7 +379,7 @@ def _unit_of(axial: AxialRobot, target: Path) -> Export:
 
 def _equations(axial: AxialRobot) -> dict[str, Any]:
     """Where the numbers of an FMU are from, and which they are."""
-    numbers = zip(PARAMETERS, axial.values, strict=True)
+    numbers = axial.parameters.items()
     return {
         **axial.prediction.answered_by,
         "friction": axial.prediction.friction,

@@ -2,7 +2,8 @@
  * A robot in axial motion, as a co-simulation FMU (FMI 3.0), on the equations and the integrator of `spirillum.simulate`:
  * drive.c and axial.c are those of the package. Inputs stay constant over a step.
  *
- * robot.h, written with this file, holds the robot: TOKEN, FLOW_INPUT, and VALUES, in the order of the enumerations.
+ * robot.h, written with this file, holds the robot: TOKEN, FLOW_INPUT, VALUES, in the order of the enumerations, and CURVE,
+ * that of a motor whose torque stands in place of the current (0: of none).
  */
 #include <math.h>
 #include <stdbool.h>
@@ -61,7 +62,7 @@ typedef struct {
     char name[128];
 } Robot;
 
-static const double START[PARAMETERS] = VALUES;
+static const double START[PARAMETERS] = VALUES, TORQUES[25] = CURVE;
 
 static fmi3Status failed(Robot *robot, const char *message) {
     if (robot && robot->log) robot->log(robot->environment, fmi3Error, "logStatusError", message);
@@ -73,6 +74,8 @@ static fmi3Status failed(Robot *robot, const char *message) {
 /* See axial.c; pieces of a step as in a run of `simulate`. */
 void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
                    double fineness, int64_t count);
+void advance_on_curve(const double *parameters, double *states, double dt, const double *duty, const double *flow,
+                      const double *curve, int64_t count);
 static const double FINENESS = 16.0;
 
 static double moved(const double *p, int per_torque, int per_flow, double current, double flow) {
@@ -103,7 +106,10 @@ static double output(const Model *m, int which) {
 /* One step; false where the numbers have no motion. */
 static bool advance(Model *m, double length) {
     const double duty = duty_of(m);
-    advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
+    if (TORQUES[0] > 0.0)
+        advance_on_curve(m->p, m->state, length, &duty, &m->flow, TORQUES, 1);
+    else
+        advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
     return isfinite(m->state[CURRENT]) && isfinite(m->state[CHARGE]);
 }
 

@@ -17,8 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
 from spirillum.display import fitted_words
-from spirillum.dynamics.axial_robot import OUTPUTS, PARAMETERS, AxialRobot
+from spirillum.dynamics.axial_robot import PARAMETERS, AxialRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
 from spirillum.quantities import QUANTITIES
@@ -92,7 +94,7 @@ def sources() -> dict[str, bytes]:
 
 def token_of(axial: AxialRobot, written: Mapping[str, bytes]) -> str:
     """Token with which an importer instantiates the FMU: a checksum of its numbers and its sources."""
-    said = repr((axial.robot.name, axial.values, axial.flow, axial.duty)).encode()
+    said = repr((axial.robot.name, axial.values, axial.prediction.batch.curve, axial.flow, axial.duty)).encode()
     return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
 
 
@@ -101,10 +103,12 @@ def header_text(axial: AxialRobot, token: str) -> str:
     values = ",\n".join(
         f"    {value!r} /* {item.name}, {item.unit} */" for item, value in zip(PARAMETERS, axial.values, strict=True)
     )
+    curve = np.zeros(1) if axial.curve is None else axial.curve
     lines = "{ \\\n" + values.replace("\n", " \\\n") + " \\\n}"
     return (
         f'#define TOKEN "{token}"\n#define FLOW_INPUT {int(axial.flow is not None)}\n'
-        f"#define START_DUTY {axial.duty!r}\n#define START_FLOW {axial.flow or 0.0!r}\n#define VALUES {lines}\n"
+        f"#define START_DUTY {axial.duty!r}\n#define START_FLOW {axial.flow or 0.0!r}\n"
+        f"#define CURVE {{ {', '.join(map(repr, curve.tolist()))} }}\n#define VALUES {lines}\n"
     )
 
 
@@ -180,11 +184,11 @@ def _variables(axial: AxialRobot) -> list[_Variable]:
         found.append(
             _Variable("Float64", flow.name, _FLOW, "input", "continuous", flow.meaning, flow.unit, repr(axial.flow))
         )
-    for place, name in enumerate(OUTPUTS):
+    for name, place in axial.outputs.items():
         item = QUANTITIES[name]
         found.append(_Variable("Float64", name, _FIRST_OUTPUT + place, "output", "continuous", item.meaning, item.unit))
-    for place, (parameter, value) in enumerate(zip(PARAMETERS, axial.values, strict=True)):
-        reference = _FIRST_PARAMETER + place
+    for parameter, value in axial.parameters.items():
+        reference = _FIRST_PARAMETER + PARAMETERS.index(parameter)
         found.append(
             _Variable(
                 "Float64",
