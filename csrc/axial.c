@@ -170,6 +170,22 @@ EXPORT void advance_axial(const double *parameters, double *states, double dt, c
     }
 }
 
+/* The same of robots whose motor has a curve, its torque in place of the current: it is constant over a step. */
+EXPORT void advance_on_curve(const double *parameters, double *states, double dt, const double *duty, const double *flow,
+                             const double *curve, int64_t count) {
+    for (int64_t n = 0; n < count; n++) {
+        const AxialRobot *p = (const AxialRobot *)parameters + n;
+        AxialState *state = (AxialState *)states + n;
+        const double sense = p->motor.polarity, coasting = sense * (p->tail_flow - p->body_flow) * flow[n];
+        const double torque = sense * curve_torque((const Curve *)curve, duty[n], coasting, p->tail - p->body);
+        state->current = torque;
+        state->position += (p->speed * torque + p->speed_flow * flow[n]) * dt;
+        state->tail_angle += (p->tail * torque + p->tail_flow * flow[n]) * dt;
+        state->body_angle += (p->body * torque + p->body_flow * flow[n]) * dt;
+        state->squared_current += torque * torque * dt;
+    }
+}
+
 /* Derivative of the state, which rests on the current alone. */
 EXPORT void axial_rates(const double *parameters, double current, double duty, double flow, double *out) {
     const AxialRobot *p = (const AxialRobot *)parameters;

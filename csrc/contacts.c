@@ -78,39 +78,71 @@ bool tail_reaches(const Wire *wire, const State *y, const double rotation[3][3],
     return radius - farthest - wire->amplitude - wire->radius < height;
 }
 
+/* Point, tangent and its change by the distance from the root on a helix of one size, in body axes. */
+static void helix_at(const Wire *wire, double phase, double xi, double at[3][3]) {
+    const double shrink = wire->taper > 0 ? exp(-wire->taper * xi) : 0.0;
+    const double r = wire->amplitude * (1.0 - shrink), r_1 = wire->amplitude * wire->taper * shrink;
+    const double r_2 = -wire->taper * r_1, x = wire->root - xi, k = wire->hand_k;
+    const double angle = k * x + phase, c = cos(angle), s = sin(angle);
+    const double found[3][3] = {{x, r * c, r * s},
+                                {-1.0, r_1 * c + k * r * s, r_1 * s - k * r * c},
+                                {0.0, (r_2 - k * k * r) * c + 2.0 * k * r_1 * s, (r_2 - k * k * r) * s - 2.0 * k * r_1 * c}};
+    for (int n = 0; n < 3; n++)
+        for (int i = 0; i < 3; i++) at[n][i] = found[n][i];
+}
+
+/* The same on any other wire: a cubic between the stations about xi, with their points and tangents. */
+static void line_at(const Station *s, double phase, double xi, double at[3][3]) {
+    const double h = s[1].xi - s[0].xi, t = (xi - s[0].xi) / h, c = cos(phase), sine = sin(phase);
+    const double weights[3][4]
+        = {{1.0 - t * t * (3.0 - 2.0 * t), t * (1.0 - t) * (1.0 - t) * h, t * t * (3.0 - 2.0 * t), t * t * (t - 1.0) * h},
+           {6.0 * t * (t - 1.0) / h, (1.0 - t) * (1.0 - 3.0 * t), 6.0 * t * (1.0 - t) / h, t * (3.0 * t - 2.0)},
+           {(12.0 * t - 6.0) / (h * h), (6.0 * t - 4.0) / h, (6.0 - 12.0 * t) / (h * h), (6.0 * t - 2.0) / h}};
+    for (int n = 0; n < 3; n++) {
+        const double *w = weights[n];
+        double p[3];
+        for (int i = 0; i < 3; i++)
+            p[i] = w[0] * s[0].point[i] + w[1] * s[0].slope[i] + w[2] * s[1].point[i] + w[3] * s[1].slope[i];
+        at[n][0] = p[0];
+        at[n][1] = c * p[1] - sine * p[2];
+        at[n][2] = sine * p[1] + c * p[2];
+    }
+}
+
 /* A point of the centreline: in body axes, across the tube, d^2, and d(d^2/2)/dxi once and twice. */
 typedef struct {
     double point[3], side, up, square, first, second;
 } WirePoint;
 
-static WirePoint wire_point(const Wire *wire, const State *state, const double rotation[3][3], double xi) {
-    const double shrink = wire->taper > 0 ? exp(-wire->taper * xi) : 0.0;
-    const double r = wire->amplitude * (1.0 - shrink), r_1 = wire->amplitude * wire->taper * shrink;
-    const double r_2 = -wire->taper * r_1, x = wire->root - xi, k = wire->hand_k;
-    const double angle = k * x + state->phase, c = cos(angle), s = sin(angle);
-    const double y_1 = r_1 * c + k * r * s, z_1 = r_1 * s - k * r * c;
-    const double y_2 = (r_2 - k * k * r) * c + 2.0 * k * r_1 * s, z_2 = (r_2 - k * k * r) * s - 2.0 * k * r_1 * c;
-    WirePoint at = {.point = {x, r * c, r * s}};
-    double across[2];
+static WirePoint wire_point(const Wire *wire, const Station *stations, const State *state, const double rotation[3][3],
+                            double xi) {
+    double at[3][3], across[2];
+    if (wire->hand_k != 0.0)
+        helix_at(wire, state->phase + stations->turn, xi, at);
+    else
+        line_at(stations + (xi > stations[1].xi), state->phase, xi, at);
+    WirePoint found = {.point = {at[0][0], at[0][1], at[0][2]}};
     for (int n = 0; n < 2; n++) {
         const double *row = rotation[n + 1];
-        const double d = state->position[n + 1] + row[0] * x + row[1] * at.point[1] + row[2] * at.point[2];
-        const double d_1 = -row[0] + row[1] * y_1 + row[2] * z_1, d_2 = row[1] * y_2 + row[2] * z_2;
-        across[n] = d;
-        at.square += d * d;
-        at.first += d * d_1;
-        at.second += d_1 * d_1 + d * d_2;
+        double d[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = (k == 0 ? state->position[n + 1] : 0.0) + row[0] * at[k][0] + row[1] * at[k][1] + row[2] * at[k][2];
+        across[n] = d[0];
+        found.square += d[0] * d[0];
+        found.first += d[0] * d[1];
+        found.second += d[1] * d[1] + d[0] * d[2];
     }
-    at.side = across[0];
-    at.up = across[1];
-    return at;
+    found.side = across[0];
+    found.up = across[1];
+    return found;
 }
 
-/* Where the wire is farthest from the tube's axis; bracket: where to look, from, first guess, to, m from the root. */
-Nearest wire_nearest(const Wire *wire, const State *y, const double rotation[3][3], double radius,
-                     const double bracket[3]) {
+/* Where the wire is farthest from the tube's axis; bracket: where to look, from, first guess, to, from the root; stations:
+ * those of the bracket. */
+Nearest wire_nearest(const Wire *wire, const Station *stations, const State *y, const double rotation[3][3],
+                     double radius, const double bracket[3]) {
     double low = bracket[0], xi = bracket[1], high = bracket[2];
-    WirePoint p = wire_point(wire, y, rotation, xi);
+    WirePoint p = wire_point(wire, stations, y, rotation, xi);
     for (int round = 0; round < 50; round++) {
         *(p.first > 0 ? &low : &high) = xi;
         if ((xi == bracket[0] && p.first <= 0) || (xi == bracket[2] && p.first >= 0)) break; /* an end of the wire */
@@ -118,7 +150,7 @@ Nearest wire_nearest(const Wire *wire, const State *y, const double rotation[3][
         if (!(low < next && next < high)) next = 0.5 * (low + high);
         const double moved = fabs(next - xi);
         xi = next;
-        p = wire_point(wire, y, rotation, xi);
+        p = wire_point(wire, stations, y, rotation, xi);
         if (moved < 1e-13 * wire->length) break;
     }
     const double distance = larger(sqrt(p.square), 1e-9 * radius);
@@ -163,8 +195,10 @@ EXPORT double ring_gap(const double *y, const double *rotation, double radius, c
     return told(site_nearest((const Site *)site, (const State *)y, axes, radius), normal, point, j);
 }
 
-EXPORT double crest(const double *y, const double *rotation, double radius, const double *wire, const double *bracket,
-                    double *normal, double *point, double *j) {
+EXPORT double crest(const double *y, const double *rotation, double radius, const double *wire, const double *stations,
+                    const double *bracket, double *normal, double *point, double *j, int64_t count) {
+    (void)count;
     const double (*axes)[3] = (const double (*)[3])rotation;
-    return told(wire_nearest((const Wire *)wire, (const State *)y, axes, radius, bracket), normal, point, j);
+    const Station *about = (const Station *)stations;
+    return told(wire_nearest((const Wire *)wire, about, (const State *)y, axes, radius, bracket), normal, point, j);
 }

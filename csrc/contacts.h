@@ -13,12 +13,13 @@ typedef struct {
 
 typedef struct {
     double radius, amplitude, taper; /* m; m; taper over length, 1/m (0: none) */
-    double hand_k, root, length;     /* h k, rad/m; x of the root and axial length, m */
+    double hand_k, root, length;     /* h k, rad/m (0: no helix of one size); x of the root and axial length, m */
 } Wire;
 
-/* A station along a wire: distance from the root and its place at phase 0, m; angle of its wire against the first. */
+/* A station along a wire: its distance from the root, m, or any coordinate that increases; place at phase 0, m, and
+ * its derivative by that; angle of its wire against the first. */
 typedef struct {
-    double xi, x, y, z, turn;
+    double xi, point[3], slope[3], turn;
 } Station;
 
 /* A place of the robot near the wall. */
@@ -40,8 +41,8 @@ double asperity_load(double gap, double height, double load);
 double asperity_energy(double gap, double height, double load);
 Nearest site_nearest(const Site *site, const State *y, const double rotation[3][3], double radius);
 bool tail_reaches(const Wire *wire, const State *y, const double rotation[3][3], double radius, double height);
-Nearest wire_nearest(const Wire *wire, const State *y, const double rotation[3][3], double radius,
-                     const double bracket[3]);
+Nearest wire_nearest(const Wire *wire, const Station *stations, const State *y, const double rotation[3][3],
+                     double radius, const double bracket[3]);
 void sliding_rows(const Nearest *at, const double rotation[3][3], double rotor, double rows[2][RATES]);
 
 typedef struct {

@@ -123,7 +123,7 @@ static void add_contact(Touch *t, const Nearest *at, double rotor) {
 /* Squared distance of a station of the wire from the tube's axis, m^2. */
 static double station_square(const Touch *t, const Station *station) {
     const double c = cos(t->y->phase), s = sin(t->y->phase);
-    const double at[3] = {station->x, c * station->y - s * station->z, s * station->y + c * station->z};
+    const double *p = station->point, at[3] = {p[0], c * p[1] - s * p[2], s * p[1] + c * p[2]};
     double d[2];
     for (int n = 0; n < 2; n++) {
         const double *row = t->rotation[n + 1];
@@ -146,9 +146,8 @@ static void touch_wire(Touch *t) {
         const bool tip = k == last || at[1].turn != at->turn;
         if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
             const double bracket[3] = {at[first ? 0 : -1].xi, at->xi, at[tip ? 0 : 1].xi};
-            State turned = *t->y;
-            turned.phase += at->turn;
-            const Nearest nearest = wire_nearest(robot->wire, &turned, t->rotation, tube->radius, bracket);
+            const Station *about = at - (first ? 0 : 1);
+            const Nearest nearest = wire_nearest(robot->wire, about, t->y, t->rotation, tube->radius, bracket);
             t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
             add_contact(t, &nearest, 1.0);
         }

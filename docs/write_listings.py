@@ -55,7 +55,9 @@ def items(rows: Rows) -> str:
 
 
 def _cell(text: str) -> str:
-    return " ".join(str(text).split()).replace("|", "\\|").replace("<", "&lt;") or " "
+    """Text of a cell, whose code spans show `<` as it is."""
+    parts = " ".join(str(text).split()).replace("|", "\\|").split("`")
+    return "`".join(part if n % 2 else part.replace("<", "&lt;") for n, part in enumerate(parts)) or " "
 
 
 def _parts_of(annotation: Any) -> Iterator[Any]:

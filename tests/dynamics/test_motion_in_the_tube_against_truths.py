@@ -24,6 +24,7 @@ from spirillum.dynamics.turning_field import Field
 from spirillum.errors import InputError
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
 from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.prediction import Prediction, predict
@@ -327,7 +328,7 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
         if site is not None:
             return contacts.ring_gap(state, rotation, 0.02, site, normal, point, j)
         bracket = np.array([0.03, 0.035, 0.045])
-        return contacts.crest(state, rotation, 0.02, links.wire, bracket, normal, point, j)
+        return contacts.crest(state, rotation, 0.02, links.wire, links.stations, bracket, normal, point, j)
 
     for site in (*sites, None):
         j = np.empty(7)
@@ -385,6 +386,78 @@ def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
                 assert found == pytest.approx(dense, abs=1e-9)
             smallest = min(smallest, dense)
         assert smallest < 1.5e-3
+
+
+def _curve() -> list[list[float]]:
+    """A right-handed centre line that widens and bends off the axis, as one that was measured."""
+    x = np.linspace(0.0, 60.0, 81)
+    r = 1.0 + x / 40.0
+    return np.stack([x, r * np.cos(x / 4.0) + 0.2 * np.sin(x / 20.0), r * np.sin(x / 4.0)], axis=1).tolist()  # type: ignore[no-any-return]
+
+
+TAILS: dict[str, dict[str, Any]] = {
+    "starts": {"starts": 3},
+    "cone": {"amplitude": {"from": "1 mm", "to": "3 mm"}, "wavelength": {"from": "20 mm", "to": "30 mm"}, "starts": 2},
+    "narrowing": {"amplitude": {"from": "3 mm", "to": "1 mm"}},
+    "table": {"amplitude": [["0 mm", "1 mm"], ["20 mm", "3 mm"], ["60 mm", "2 mm"]], "handedness": "left"},
+    "curve": {"curve": _curve()},
+    "smoothed": {"curve": _curve(), "curve_tolerance": "10 um", "starts": 2},
+}
+
+
+@pytest.mark.parametrize("tail", TAILS)
+@pytest.mark.parametrize("pitch", [0.02, 0.07])
+def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float) -> None:
+    """Its gap is that of dense points of its wires, and closes as its gradient says."""
+    steady, links, _ = made(overrides={"tail": TAILS[tail]})
+    dense = [swept.position for swept in [centreline_of(steady.robot, np.linspace(0.0, 1.0, 40001) * 0.06)]]
+    points = np.concatenate([dense[0] @ turn.T for turn in steady.robot.tail.form.rotations])
+    state = laid_down(steady.robot, links, StartPlace(gap=3e-4, pitch=pitch))
+    found, true = [], []
+    for phase in np.linspace(0.0, 2 * np.pi, 7):
+        state[rigid_links.PHASE] = phase
+        y = points[:, 1] * np.cos(phase) - points[:, 2] * np.sin(phase)
+        z = points[:, 1] * np.sin(phase) + points[:, 2] * np.cos(phase)
+        up = state[2] + points[:, 0] * np.sin(pitch) + z * np.cos(pitch)
+        true.append(0.02 - 0.0005 - np.hypot(y, up).max())
+        found.append(links.gaps(state)[-1])
+    seen = np.isfinite(found)
+    assert np.asarray(found)[seen] == pytest.approx(np.asarray(true)[seen], abs=5e-9)
+
+
+def near_the_wall(steady: Prediction, links: TubeRobot) -> StartPlace:
+    """Nose up until the tail's roughness is at the wall."""
+    places = (StartPlace(gap=3e-4, pitch=pitch) for pitch in np.arange(0.06, 0.12, 1e-4))
+    return next(p for p in places if links.gaps(laid_down(steady.robot, links, p))[-1] < ROUGH.roughness)
+
+
+def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
+    x = np.linspace(0.0, 60.0, 121)
+    k = 2 * np.pi / 25.0
+    points = np.stack([x, 2.5 * np.cos(k * x), 2.5 * np.sin(k * x)], axis=1).tolist()
+    curve = made(overrides={"tail": {"curve": points}})
+    helix = made(overrides={"tail.taper": "none"})
+    gaps = []
+    for steady, links, _ in (curve, helix):
+        own = links.stations[np.argmin(links.stations[:, contacts.STATION_XI])]
+        turn = np.arctan2(own[contacts.STATION_POINT + 2], own[contacts.STATION_POINT + 1])
+        state = laid_down(steady.robot, links, near_the_wall(*curve[:2]))
+        row = []
+        for phase in np.linspace(0.0, 2 * np.pi, 9):
+            state[rigid_links.PHASE] = phase - turn
+            row.append(links.gaps(state)[-1])
+        gaps.append(row)
+    assert np.isfinite(gaps[0]).sum() > 2
+    assert gaps[0] == pytest.approx(gaps[1], abs=1e-7)
+
+
+@pytest.mark.parametrize("tail", ["cone", "curve"])
+def test_energy_is_balanced_while_any_tail_touches(made: Any, tail: str) -> None:
+    steady, links, run = made(overrides={"tail": TAILS[tail]})
+    found = run(near_the_wall(steady, links), 1.0)
+    assert float(found.contact_force.max()) > 0.0
+    assert float(found.tail_gap.min()) < ROUGH.roughness
+    assert left_of_energy(found) < 1e-5
 
 
 def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:

@@ -93,3 +93,27 @@ def test_wrong_input_is_a_sentence() -> None:
         sp.linear_system(WIDE, model="rft", duty=1.5)
     with pytest.raises(sp.InputError, match="without one in the placement"):
         sp.linear_system(WIDE, model="rft", flow=1e-3)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_motor_with_a_curve_is_that_of_simulate_and_predict(reverse: bool) -> None:
+    curve = {"drive.rates": ["0 Hz", "2 Hz", "5 Hz"], "drive.torques": ["0.2 mN m", "0.18 mN m", "0 N m"]}
+    polarity = {"drive.polarity": "reverse"} if reverse else {}
+    robot = sp.load(WIDE, **{"drive.kind": "torque-speed", "friction.reading": "none"}, **curve, **polarity)
+    run = sp.simulate(robot, model="rft", motion="held", timing={"duration": 0.2})
+    system = sp.control_system(robot, model="rft")
+    time = run["time"].values
+    found = outputs_of(system, control.input_output_response(system, time, np.ones_like(time), **FINE))
+    for name, values in found.items():
+        expected = run[name].values
+        np.testing.assert_allclose(values, expected, atol=1e-6 * np.abs(expected).max(), rtol=0, err_msg=name)
+    placed = {"gap": "0.5 mm", "pitch": 0.0, "flow": 1e-3}
+    steady = sp.predict(robot, model="tube", placement=placed)
+    at = sp.linear_system(robot, model="tube", placement=placed)
+    for name in ("forward_velocity", "tail_rotation_rate", "drive_torque"):
+        assert at.outputs[name] == pytest.approx(getattr(steady, name), rel=1e-7), name
+    at = sp.linear_system(robot, model="tube", placement=placed, duty=0.8)
+    whole = sp.control_system(robot, model="tube", placement=placed).linearize([0.0] * 3, [0.8, 1e-3], eps=1e-7)
+    for name in ("A", "B", "C", "D"):
+        own, other = getattr(at.system, name), getattr(whole, name)
+        np.testing.assert_allclose(own, other, atol=1e-5 * max(np.abs(other).max(), 1e-12), err_msg=name)

@@ -94,6 +94,22 @@ def test_run_by_fmpy_is_that_of_simulate(units: dict[str, Path]) -> None:
 
 
 @needs_compiler
+def test_a_motor_with_a_curve_runs_as_simulate_runs_it(tmp_path: Path) -> None:
+    curve = {"drive.rates": ["0 Hz", "2 Hz", "5 Hz"], "drive.torques": ["0.2 mN m", "0.18 mN m", "0 N m"]}
+    robot = sp.load(WIDE, **{"drive.kind": "torque-speed", "friction.reading": "none"}, **curve)
+    sp.export(robot, tmp_path / "curve.fmu", model="rft")
+    run = sp.simulate(robot, model="rft", motion="held", timing={"duration": 0.2, "on": [(0.0, 0.1)]})
+    names = ["position", "tail_angle", "body_angle", "forward_velocity", "drive_torque"]
+    switched = {"time": [0.0, 0.1, 0.1, 0.2], "remote": [True, True, False, False], "duty": [1.0] * 4}
+    found = simulated(tmp_path / "curve.fmu", switched, stop=0.2, step=0.005, output=names)
+    for name in names:
+        scale = float(np.abs(run[name].values).max())
+        assert found[name][-1] == pytest.approx(float(run[name].values[-1]), abs=1e-9 * scale), name
+    described = fmpy.read_model_description(str(tmp_path / "curve.fmu"))
+    assert not [item.name for item in described.modelVariables if item.name.startswith(("battery", "motor."))]
+
+
+@needs_compiler
 def test_steps_of_any_length_give_the_same_run(units: dict[str, Path]) -> None:
     on = {"time": [0.0, 0.2], "remote": [True, True], "duty": [0.6, 0.6]}
     many, few = (simulated(units["plain"], on, stop=0.2, step=step) for step in (0.001, 0.1))

@@ -114,9 +114,31 @@ def test_wrong_curves_are_a_sentence(fields: dict[str, Any], sentence: str) -> N
     assert sentence in str(caught.value)
 
 
-def test_what_needs_a_current_refuses_a_curve() -> None:
-    with pytest.raises(sp.InputError, match=r"drive\.kind = 'torque-speed'; allowed: 'dc-motor'"):
-        sp.simulate(with_curve(), model="rft", motion="held", timing={"duration": 0.1})
+@pytest.mark.parametrize("hand", ["right", "left"])
+def test_axial_motion_is_that_of_the_steady_states(hand: str) -> None:
+    """A run, a batch and its switching: the torque follows the duty at once."""
+    robot = with_curve(**{"tail.handedness": hand})
+    steady = sp.predict(robot, model="rft")
+    run = sp.simulate(robot, model="rft", motion="held", timing={"duration": 2.0, "on": [(0.0, 0.5)]})
+    assert float(run.position[-1]) == pytest.approx(0.5 * steady.forward_velocity, rel=1e-9)
+    assert float(run.drive_torque[0]) == pytest.approx(steady.drive_torque, rel=1e-12)
+    assert float(run.dissipated_energy[-1]) == pytest.approx(0.5 * steady.dissipated_power, rel=1e-9)
+    assert not {"motor_current", "electrical_energy", "battery_voltage"} & set(run.data_vars)
+    batch = sp.AxialBatch(robot, 4, model="rft", ranges={"viscosity": (1.0, 5.0)}, seed=3)
+    batch.step(0.5)
+    found = batch.observe()
+    factor = batch._viscosity
+    for n in range(4):
+        thick = with_curve(
+            **{"tail.handedness": hand, "fluid.viscosity": f"{float(robot.fluid.viscosity * factor[n])!r} Pa s"}
+        )
+        one = sp.predict(thick, model="rft")
+        for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "drive_torque"):
+            assert found[name][n] == pytest.approx(getattr(one, name), rel=1e-9), name
+    batch.step(1.0, remote=False)
+    assert batch.observe()["position"] == pytest.approx(found["position"], rel=1e-12)
+    with pytest.raises(sp.InputError, match=r"ranges\.battery\.voltage is not a number that can be drawn"):
+        sp.AxialBatch(robot, 2, model="rft", ranges={"battery.voltage": (1.0, 2.0)})
 
 
 def test_speed_of_ecoli_against_viscosity_misses_the_measured_decay_as_stated() -> None:

@@ -6,6 +6,7 @@ import atexit
 import errno
 import gc
 import os
+import re
 import signal
 import sys
 import threading
@@ -147,7 +148,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BaseException as error:
         if isinstance(error, OSError):
             _flushed(sys.stdout)
-        code = _explained(error)
+        code = _explained(error, sys.argv[1:] if arguments is None else arguments)
         if code is None:
             raise
         return code
@@ -167,7 +168,17 @@ def _check_names(arguments: Sequence[str]) -> None:
             raise InputError(f"an empty word after {word[:60]}; allowed: a name or a value")
 
 
-def _explained(error: BaseException) -> int | None:
+def _with_setting(sentence: str, arguments: Sequence[str]) -> str:
+    """The sentence on a robot, naming `--set` where that gave the field that it blames."""
+    words = [after for before, after in pairwise(arguments) if before == "--set"]
+    words += [word.removeprefix("--set=") for word in arguments if word.startswith("--set=")]
+    for field in {word.partition("=")[0].strip() for word in words} - {""}:
+        if re.match(rf"\S[^:]*: {re.escape(field)}[^\w]", sentence):
+            return f"--set over {sentence}"
+    return sentence
+
+
+def _explained(error: BaseException, arguments: Sequence[str] = ()) -> int | None:
     """Return the sentence of an error that is the user's; None for one that is ours."""
     from typer import Abort
 
@@ -177,7 +188,7 @@ def _explained(error: BaseException) -> int | None:
         kept = str(error) if isinstance(error, Abort) else ""
         return _fail(f"interrupted; {kept}" if kept else _KEPT, 130)
     if isinstance(error, InputError):
-        return _fail(str(error), 2)
+        return _fail(_with_setting(str(error), arguments), 2)
     if isinstance(error, MemoryError):
         return _fail(TOO_LARGE, 2)
     if isinstance(error, OSError) and (sentence := _of_place(error)):

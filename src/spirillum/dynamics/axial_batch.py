@@ -35,9 +35,10 @@ _LARGEST_FACTOR = 1e3
 """Of friction and viscosity."""
 
 
-def checked_ranges(robot: Robot, ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
+def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
     """Ranges by name, each low and high: `friction` and `viscosity` as factors, others of `PARAMETERS` in SI."""
-    allowed = [*FACTORS, *(name for name in _NAMES if name not in _FIXED)]
+    robot = axial.robot
+    allowed = [*FACTORS, *(item.name for item in axial.parameters if item.name not in _FIXED)]
     found = {}
     for name, given in (ranges or {}).items():
         if name not in allowed:
@@ -157,7 +158,8 @@ class AxialBatch:
         """Put robots at rest.
 
         Args:
-            robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+            robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` or
+                `torque-speed` drive.
             count: how many.
             model: a hydrodynamic model, or `auto`.
             friction: reading of the friction; None: the robot's own.
@@ -177,13 +179,15 @@ class AxialBatch:
             robot, model=model, friction=friction, calibration=calibration, placement=placement
         )
         """The robot that they are sampled around."""
-        self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.axial.robot, ranges)
+        self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.axial, ranges)
         self._pool: Samples | None = None if posterior is None else posterior_numbers(self.axial, posterior, _POOL)
         self._rng = np.random.default_rng(seed)
         self.time: Samples = np.zeros(count)
         """Time since each was reset, s."""
         self.states: Samples = np.zeros((count, kernel.STATES))
-        """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7)."""
+        """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7).
+
+        Of a motor with a curve the torque, N m, stands in place of the current."""
         self.numbers: Samples = np.tile(np.array(self.axial.values), (count, 1))
         """Numbers of each robot in the order of `axial_robot.PARAMETERS`."""
         self.warnings: tuple[Note, ...] = self.axial.prediction.warnings
@@ -271,19 +275,20 @@ class AxialBatch:
         asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
         states = self.states.copy()
-        kernel.advance(self.numbers, states, number, asked, carried, 1.0)
+        self.axial.advance(self.numbers, states, number, asked, carried)
         self._check_stokes(self._rates(states, carried), carried)
         self.states, self._duty, self._flow = states, asked, carried
         self.time += number
 
     def observe(self) -> dict[str, Samples]:
         """True values by name: the states, rates and speed."""
-        found = {name: self.states[:, place].copy() for place, name in enumerate(STATES)}
+        found = {name: self.states[:, STATES.index(name)].copy() for name in self.axial.states}
         found |= self._rates(self.states, self._flow)
-        found["battery_voltage"] = self.numbers[:, kernel.VOLTAGE] - self.numbers[:, kernel.INTERNAL] * np.abs(
-            self.states[:, kernel.CURRENT]
-        )
-        return found
+        current = self.states[:, kernel.CURRENT]
+        if self.axial.curve is not None:
+            return found | {"drive_torque": current.copy()}
+        voltage = self.numbers[:, kernel.VOLTAGE] - self.numbers[:, kernel.INTERNAL] * np.abs(current)
+        return found | {"battery_voltage": voltage}
 
     def _rates(self, states: Samples, flow: Samples) -> dict[str, Samples]:
         """Speed and rates in some states, by name."""

@@ -7,6 +7,9 @@ duty d, imposed mean flow U_m, polarity p and joint torque tau = K_m I, (17) and
     L dI/dt = p d V(|I|) - R(|I|) I - K_b (omega - Omega),
     (U, Omega, omega) = (a, b, c)_tau tau + (a, b, c)_m U_m.
 
+A motor with a curve of torque against rate has no current: its torque stands in its place, with a torque constant of 1,
+and follows duty and flow at once.
+
 Runs of `simulate`, batches, systems of python-control and FMUs all rest on these numbers and equations.
 """
 
@@ -33,6 +36,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.motor import packed_curve
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.reynolds import body_reynolds, check_stokes_flow, flow_limit, reynolds_limits, tail_reynolds
 from spirillum.swimming.steady import calibrated_balance
@@ -91,6 +95,10 @@ OUTPUTS = (
 """Outputs; quantities of the registry."""
 
 
+_ELECTRIC = ("motor_current", "battery_charge_used", "battery_voltage", "electrical_power")
+"""States and outputs that a motor with a curve does not have."""
+
+
 @dataclass(frozen=True)
 class AxialRobot:
     """The numbers of a robot in axial motion, SI; rates and current signed about +x."""
@@ -98,18 +106,21 @@ class AxialRobot:
     prediction: Prediction
     """The steady motion, with robot, model and friction."""
     values: tuple[float, ...]
-    """Of `PARAMETERS`."""
+    """Of `PARAMETERS`; those of motor and battery say nothing of a motor with a curve."""
 
     @classmethod
     def of(cls, steady: Prediction) -> AxialRobot:
         """The robot of a prediction, in axial motion."""
-        motor = steady.batch.electrics
-        if steady.batch.drive != "dc-motor" or motor is None:
-            raise InputError(
-                f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a current that changes"
-            )
-        response = responses(steady, steady.batch, np.array([steady.effective_friction]))[0]
-        return cls(steady, (*(float(column[0]) for column in motor.columns), *response.tolist()))
+        batch, motor = steady.batch, steady.batch.electrics
+        if batch.curve is not None:
+            own = np.zeros(kernel.SPEED)
+            own[[kernel.TORQUE, kernel.INDUCTANCE, kernel.POLARITY]] = 1.0, 1.0, batch.curve.sense * batch.hand[0]
+        elif batch.drive == "dc-motor" and motor is not None:
+            own = np.array([column[0] for column in motor.columns])
+        else:
+            raise InputError(f"drive.kind = '{batch.drive}' in axial motion; allowed: 'dc-motor' or 'torque-speed'")
+        response = responses(steady, batch, np.array([steady.effective_friction]))[0]
+        return cls(steady, (*own.tolist(), *response.tolist()))
 
     @property
     def robot(self) -> Robot:
@@ -132,10 +143,47 @@ class AxialRobot:
         """The numbers as an array, (18,)."""
         return np.array(self.values)
 
+    @cached_property
+    def curve(self) -> Samples | None:
+        """Curve of the motor as C takes it; None for a DC-motor."""
+        curve = self.prediction.batch.curve
+        return None if curve is None else packed_curve(curve)
+
     @property
-    def parameters(self) -> dict[str, float]:
-        """The numbers by name."""
-        return dict(zip((item.name for item in PARAMETERS), self.values, strict=True))
+    def parameters(self) -> dict[AxialParameter, float]:
+        """The numbers that its equations have."""
+        first = 0 if self.curve is None else kernel.POLARITY
+        return dict(list(zip(PARAMETERS, self.values, strict=True))[first:])
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Those of `STATES` that it has."""
+        return STATES if self.curve is None else tuple(name for name in STATES if name not in _ELECTRIC)
+
+    @property
+    def outputs(self) -> dict[str, int]:
+        """Its outputs, quantities of the registry, and their places among `OUTPUTS`."""
+        if self.curve is None:
+            return {name: place for place, name in enumerate(OUTPUTS)}
+        other = {"motor_torque": "drive_torque"}
+        return {other.get(name, name): place for place, name in enumerate(OUTPUTS) if name not in _ELECTRIC}
+
+    def advance(
+        self, numbers: Samples, states: Samples, dt: float, duty: Samples, flow: Samples, fineness: float = 1.0
+    ) -> None:
+        """Take robots with its motor over a time; arguments as of `kernels.axial_motor.advance`."""
+        if self.curve is None:
+            kernel.advance(numbers, states, dt, duty, flow, fineness)
+        else:
+            kernel.advance_on_curve(numbers, states, dt, duty, flow, self.curve)
+
+    def steady_current(self, numbers: Samples, duty: float, flow: float) -> float:
+        """Current at which it no longer changes, A; the torque of a motor with a curve, N m."""
+        if self.curve is None:
+            return steady_current(numbers, duty, flow)
+        found = np.zeros((1, kernel.STATES))
+        self.advance(numbers[None], found, 0.0, np.array([duty]), np.array([flow]))
+        return float(found[0, kernel.CURRENT])
 
     def check_steady(self, duty: float, flow: float) -> list[Note]:
         """Refuse a robot that moves far outside Stokes flow where a duty and a flow have become steady.
@@ -143,7 +191,7 @@ class AxialRobot:
         Returns:
             A warning for each Reynolds number that is too large for an accurate answer.
         """
-        batch, current = self.prediction.batch, steady_current(self.numbers, duty, flow)
+        batch, current = self.prediction.batch, self.steady_current(self.numbers, duty, flow)
         speed, tail, _ = motion(self.numbers, current, flow)
         limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, tail))
         return list(check_stokes_flow(batch, [*limits, flow_limit(batch, flow)]).values())

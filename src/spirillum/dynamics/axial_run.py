@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import STEADY, run_averages, stretches_on
-from spirillum.dynamics.axial_robot import OUTPUTS, AxialRobot, outputs
+from spirillum.dynamics.axial_robot import AxialRobot, outputs
 from spirillum.dynamics.record import run_attributes
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.errors import InputError
@@ -44,9 +44,11 @@ def _advanced(robot: AxialRobot, time: Samples, duty: Samples) -> Samples:
     """States at times, (n, 7): a batch of one, from sample to sample."""
     numbers, still = robot.numbers[None], np.zeros(1)
     states = np.zeros((time.size, kernel.STATES))
+    if robot.curve is not None:  # its torque is there at once
+        states[:1, kernel.CURRENT] = robot.steady_current(robot.numbers, float(duty[0]), 0.0)
     for n in range(1, time.size):
         states[n] = states[n - 1]
-        kernel.advance(numbers, states[n : n + 1], time[n] - time[n - 1], duty[n : n + 1], still, _FINENESS)
+        robot.advance(numbers, states[n : n + 1], time[n] - time[n - 1], duty[n : n + 1], still, _FINENESS)
     return states
 
 
@@ -91,17 +93,18 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
     import xarray as xr
 
     steady, p = robot.prediction, robot.numbers
-    series = dict(zip(OUTPUTS, outputs(p, states.T, duty, 0.0), strict=True))
-    series |= {"duty": duty, **_electrics(steady.batch.electrics, p, duty, states)}
+    found = outputs(p, states.T, duty, 0.0)
+    series = {name: found[place] for name, place in robot.outputs.items()}
+    motor = steady.batch.electrics if robot.curve is None else None
+    series |= {"duty": duty, **_electrics(motor, p, duty, states)}
     # Without inertia torques are in proportion to the current, and powers to its square.
-    share, square = states[:, kernel.CURRENT] / steady.motor_current, states[:, kernel.SQUARE] / steady.motor_current**2
-    slip = p[kernel.TAIL] - p[kernel.BODY]
+    whole = steady.motor_current if robot.curve is None else steady.drive_torque
+    share, square = states[:, kernel.CURRENT] / whole, states[:, kernel.SQUARE] / whole**2
     series |= {
         "tail_torque": steady.tail_torque * np.abs(share),
         "shaft_power": steady.shaft_power * share**2,
         "friction_power": steady.friction_power * share**2,
         "dissipated_power": steady.dissipated_power * share**2,
-        "conversion_energy": (p[kernel.EMF] - p[kernel.TORQUE]) * slip * p[kernel.TORQUE] * states[:, kernel.SQUARE],
         "friction_energy": steady.friction_power * square,
         "dissipated_energy": steady.dissipated_power * square,
     }
@@ -124,15 +127,17 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
 
 
 def _electrics(motor: Electrics | None, p: Samples, duty: Samples, states: Samples) -> dict[str, Samples]:
-    """Resistance and energies of the motor, from the battery to the winding, by name."""
-    assert motor is not None  # noqa: S101 - an axial robot has one
-    current, square = states[:, kernel.CURRENT], states[:, kernel.SQUARE]
+    """Resistance and energies of a DC-motor, from the battery to the winding, by name."""
+    if motor is None:
+        return {}
+    current, square, slip = states[:, kernel.CURRENT], states[:, kernel.SQUARE], p[kernel.TAIL] - p[kernel.BODY]
     drawn = np.cumsum(duty * np.diff(square, prepend=0.0))  # the current drives in its own sense throughout
     return {
         "motor_resistance": winding_resistance(motor, np.abs(current)),
         "electrical_energy": p[kernel.VOLTAGE] * states[:, kernel.CHARGE] - p[kernel.INTERNAL] * drawn,
         "resistive_energy": states[:, kernel.HEAT],
         "magnetic_energy": 0.5 * p[kernel.INDUCTANCE] * current**2,
+        "conversion_energy": (p[kernel.EMF] - p[kernel.TORQUE]) * slip * p[kernel.TORQUE] * square,
     }
 
 
@@ -148,7 +153,7 @@ def _averages(
     }
     found = run_averages(
         dataset["time"].values,
-        {name: (dataset[of].values, unit) for name, (of, unit) in integrals.items()},
+        {name: (dataset[of].values, unit) for name, (of, unit) in integrals.items() if of in dataset},
         stretches_on(switches, end),
         by_turn=False,
     )

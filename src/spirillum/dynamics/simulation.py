@@ -78,9 +78,9 @@ def simulate(  # noqa: PLR0913 - the options of the command
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
         model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`; or `auto`: what the posterior or the
             calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
-        motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
-            `free`, but `held` where the model is that of a posterior or calibration and knows the axial entries only,
-            or was fitted to one place in the tube without dry friction.
+        motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` or
+            `torque-speed` drive. None: `free`, but `held` where the model is that of a posterior or
+            calibration and knows the axial entries only, or was fitted to one place in the tube without dry friction.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.

@@ -18,6 +18,7 @@ from spirillum.dynamics.free_robot import FreeRobot, drive_of, friction_of, torq
 from spirillum.errors import InputError
 from spirillum.kernels import contacts, rigid_links, tube_table
 from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
 
@@ -27,6 +28,8 @@ FRICTION_COEFFICIENT = 0.1
 _SLIDING_SHARE = 1e-4
 """Sliding speed below which dry friction is made smooth, over that of a body turning as fast as the tail."""
 _STATIONS_PER_TURN = 24
+_LINE_STATIONS_PER_TURN = 64
+"""Where the wire is a cubic between them: off by less than a millionth of the amplitude."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class TubeRobot(FreeRobot):
     sites: Samples
     """Sites of body and coupling that can touch (n, 5), see `kernels.contacts`."""
     stations: Samples
-    """Stations along the wires (m, 5), see `kernels.contacts`."""
+    """Stations along the wires (m, 8), see `kernels.contacts`."""
     flow: Samples
     """Imposed mean flow (k, 2)."""
     names: tuple[str, ...]
@@ -141,16 +144,15 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     bound = robot.fluid.cavitation_pressure
     tube[kernel.CAVITATION] = np.inf if bound is None else bound
     names, sites = _sites(robot)
-    wire = _wire(robot)
     return TubeRobot(
         friction=friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective),
         weight=heavy,
         drive=drive,
         table=np.ascontiguousarray(table),
         tube=tube,
-        wire=wire,
+        wire=_wire(robot),
         sites=sites,
-        stations=_stations(robot, wire),
+        stations=_stations(robot),
         flow=np.ascontiguousarray(around.flow, dtype=float),
         names=(*names, "tail"),
         length=half,
@@ -188,18 +190,32 @@ def _wire(robot: Robot) -> Samples:
     found = np.zeros(contacts.WIRE)
     found[contacts.WIRE_RADIUS], found[contacts.AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
     found[contacts.TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
-    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength
+    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength if tail.form.is_helix else 0.0
     found[contacts.ROOT], found[contacts.LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
     return found
 
 
-def _stations(robot: Robot, wire: Samples) -> Samples:
-    tail = robot.tail
-    xi = np.linspace(0.0, tail.length, 1 + int(np.ceil(_STATIONS_PER_TURN * tail.length / tail.wavelength)))
-    taper = wire[contacts.TAPER]
-    r = wire[contacts.AMPLITUDE] * (1.0 - np.exp(-taper * xi) if taper > 0 else np.ones_like(xi))
-    x = wire[contacts.ROOT] - xi
-    angle = wire[contacts.HAND_K] * x
-    wires = [(angle + turn, turn) for turn in tail.form.turns]
-    rows = [np.stack([xi, x, r * np.cos(at), r * np.sin(at), np.full(xi.size, turn)], axis=1) for at, turn in wires]
+def _stations(robot: Robot) -> Samples:
+    """Stations along the wires: of a helix of one size to find its crests, of any other the line itself."""
+    form = robot.tail.form
+    xi = _station_places(robot)
+    line = centreline_of(robot, xi)
+    parts = (line.position, line.tangent * line.stretch[:, None])
+    rows = [
+        np.column_stack([xi, *(part @ turned.T for part in parts), np.full(xi.size, turn)])
+        for turn, turned in zip(form.turns, form.rotations, strict=True)
+    ]
     return np.ascontiguousarray(np.concatenate(rows))
+
+
+def _station_places(robot: Robot) -> Samples:
+    """Distances of the stations from the root, m."""
+    tail = robot.tail
+    if tail.form.is_helix:
+        count = _STATIONS_PER_TURN * tail.length / tail.wavelength
+        return np.linspace(0.0, tail.length, 1 + int(np.ceil(count)))
+    if tail.form.curve:
+        return tail.length * tail.form.centre.shares(_LINE_STATIONS_PER_TURN * tail.form.centre.turns)
+    _, shortest = tail.form.widths(tail.amplitude, tail.wavelength)
+    count = _LINE_STATIONS_PER_TURN * tail.length / float(np.min(shortest))
+    return np.linspace(0.0, tail.length, 1 + int(np.ceil(count)))

@@ -408,7 +408,9 @@ def _equations(model: FmuModel) -> dict[str, Any]:
         "motion": model.motion,
         "friction": model.prediction.friction,
         "inputs": ["remote", "duty", *(["mean_flow"] if model.flow is not None else [])],
-        "parameters": {item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in model.parameters},
+        "parameters": {
+            item.name: quantity(item.value, item.unit, meaning=item.meaning) for item in model.parameters.values()
+        },
     }
 
 

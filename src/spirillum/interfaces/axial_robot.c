@@ -1,6 +1,7 @@
 /* A robot in axial motion, on the equations and the integrator of `spirillum.simulate`: axial.c of csrc/.
  *
- * VALUES of robot.h are the parameters, in the order of the enumeration.
+ * VALUES of robot.h are the parameters, in the order of the enumeration; CURVE is that of a motor whose torque stands in
+ * place of the current (0: of none).
  */
 #include <string.h>
 
@@ -18,12 +19,14 @@ enum {
 };
 _Static_assert(VALUE_COUNT == PARAMETERS && STATE_COUNT == STATE && OUTPUT_COUNT == OUTPUTS, "the numbers of robot.h");
 
-static const double START[PARAMETERS] = VALUES;
+static const double START[PARAMETERS] = VALUES, TORQUES[25] = CURVE;
 static const double FINENESS = 16.0; /* pieces of a step as in a run of `simulate` */
 
 /* See axial.c. */
 void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
                    double fineness, int64_t count);
+void advance_on_curve(const double *parameters, double *states, double dt, const double *duty, const double *flow,
+                      const double *curve, int64_t count);
 
 void start_model(Model *m) {
     memset(m, 0, sizeof *m);
@@ -41,7 +44,10 @@ void observe_model(Model *m) { (void)m; }
 
 const char *advance_model(Model *m, double length) {
     const double duty = duty_of(m);
-    advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
+    if (TORQUES[0] > 0.0)
+        advance_on_curve(m->p, m->state, length, &duty, &m->flow, TORQUES, 1);
+    else
+        advance_axial(m->p, m->state, length, &duty, &m->flow, FINENESS, 1);
     m->time += length;
     const bool finite = isfinite(m->state[CURRENT]) && isfinite(m->state[CHARGE]);
     return finite ? NULL : "the motor's current cannot be integrated with these numbers";

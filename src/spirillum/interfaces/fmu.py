@@ -114,8 +114,8 @@ class FmuModel:
     """Files of csrc/ with its equations, and headers."""
     outputs: Mapping[int, FmuVariable]
     """By their place in the C source."""
-    parameters: tuple[FmuVariable, ...]
-    """Numbers that an importer can set."""
+    parameters: Mapping[int, FmuVariable]
+    """Numbers that an importer can set, by their place in the C source."""
     defined: Mapping[str, str]
     """Numbers of the C source by name."""
     arrays: Mapping[str, Samples]
@@ -134,7 +134,7 @@ def _output(name: str, label: str = "", unit: str = "") -> FmuVariable:
 
 def axial_model(axial: AxialRobot) -> FmuModel:
     """The FMU of a robot in axial motion."""
-    numbers = ", ".join(map(_number, axial.values))
+    curve = np.zeros(1) if axial.curve is None else axial.curve
     return FmuModel(
         prediction=axial.prediction,
         motion="held to the axis of its channel",
@@ -142,12 +142,18 @@ def axial_model(axial: AxialRobot) -> FmuModel:
         flow=axial.flow,
         source="axial_robot.c",
         equations=("axial.c", "drive.c", *_HEADERS),
-        outputs={place: _output(name) for place, name in enumerate(OUTPUTS)},
-        parameters=tuple(
-            FmuVariable(item.name, item.meaning, item.unit, value)
-            for item, value in zip(PARAMETERS, axial.values, strict=True)
-        ),
-        defined={"STATE": str(AXIAL_STATES), "OUTPUTS": str(len(OUTPUTS)), "VALUES": f"{{ {numbers} }}"},
+        outputs={place: _output(name) for name, place in axial.outputs.items()},
+        parameters={
+            PARAMETERS.index(item): FmuVariable(item.name, item.meaning, item.unit, value)
+            for item, value in axial.parameters.items()
+        },
+        defined={
+            "STATE": str(AXIAL_STATES),
+            "OUTPUTS": str(len(OUTPUTS)),
+            "PARAMETERS": str(len(PARAMETERS)),
+            "VALUES": _list(axial.values),
+            "CURVE": _list(curve.tolist()),
+        },
         arrays={},
     )
 
@@ -189,8 +195,9 @@ def free_model(plant: Plant) -> FmuModel:
         source="free_robot.c",
         equations=(*(f"{name}.c" for name in (*_MOTION, "drive")), *_HEADERS, *_MOTION_HEADERS),
         outputs=dict(enumerate(names)),
-        parameters=(),
+        parameters={},
         defined={
+            "PARAMETERS": "0",
             "STATE": str(state),
             "OUTPUTS": str(len(_FREE) + len(_ELECTRICAL) + sum(size for _, size in _VECTORS.values())),
             "GAPS": str(links.gap_count),
@@ -216,6 +223,11 @@ def _number(value: float) -> str:
     return repr(float(value)) if math.isfinite(value) else f"({'-' if value < 0 else ''}INFINITY)"
 
 
+def _list(values: Iterable[float]) -> str:
+    """Numbers as C takes them for an array."""
+    return f"{{{', '.join(map(_number, values))}}}"
+
+
 def _sources(model: FmuModel) -> dict[str, bytes]:
     """The C sources by name, those of csrc/ among them."""
     here = files(__package__)
@@ -224,10 +236,7 @@ def _sources(model: FmuModel) -> dict[str, bytes]:
     found = {name: here.joinpath(name).read_bytes() for name in (model.source, *_PLUMBING)}
     found |= {name: csrc.joinpath(name).read_bytes() for name in model.equations}
     if model.arrays:
-        lines = (
-            f"const double {name}[] = {{{', '.join(map(_number, values.tolist()))}}};"
-            for name, values in model.arrays.items()
-        )
+        lines = (f"const double {name}[] = {_list(values.tolist())};" for name, values in model.arrays.items())
         found["robot_numbers.c"] = "\n".join(["#include <math.h>", *lines, ""]).encode()
     return found
 
@@ -245,7 +254,6 @@ def _header(model: FmuModel, token: str) -> str:
         "FLOW_INPUT": str(int(model.flow is not None)),
         "START_DUTY": _number(model.duty),
         "START_FLOW": _number(model.flow or 0.0),
-        "PARAMETERS": str(len(model.parameters)),
         **model.defined,
     }
     return "".join(f"#define {name} {value}\n" for name, value in defined.items())
@@ -339,7 +347,7 @@ def _variables(model: FmuModel) -> list[tuple[str, dict[str, str]]]:
     for place, item in model.outputs.items():
         if not (item.name == flow.name and model.flow is not None):
             found.append(variable(_FIRST_OUTPUT + place, "output", "continuous", item))
-    for place, item in enumerate(model.parameters):
+    for place, item in model.parameters.items():
         found.append(variable(_FIRST_PARAMETER + place, "parameter", "fixed", item))
     return found
 

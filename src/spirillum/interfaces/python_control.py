@@ -14,18 +14,17 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.axial_robot import (
     INPUTS,
-    OUTPUTS,
-    PARAMETERS,
     STATES,
     AxialRobot,
     axial_robot,
+    motion,
     outputs,
     rates,
     slopes,
-    steady_current,
 )
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
+from spirillum.kernels import axial_motor as kernel
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of
@@ -80,7 +79,8 @@ def control_system(
     system's `params` are the robot's numbers, see `axial_robot.PARAMETERS`, and can be changed in a response.
 
     Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` or
+            `torque-speed` drive.
         model: a hydrodynamic model, or `auto`.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
@@ -96,14 +96,32 @@ def control_system(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
     axial.check_steady(1.0, axial.flow or 0.0)
+    places = list(axial.outputs.values())
+
+    def whole(x: Samples, u: Samples, params: Mapping[str, float]) -> tuple[Samples, Samples, float, float]:
+        """All numbers and states of `PARAMETERS` and `STATES`, and the inputs."""
+        (duty, flow), numbers = _inputs_of(u), axial.numbers.copy()
+        numbers[-len(params) :] = [params[item.name] for item in axial.parameters]
+        if axial.curve is not None:
+            x = np.array([axial.steady_current(numbers, duty, flow), *x, 0.0])
+        return numbers, x, duty, flow
+
+    def changes(_t: float, x: Samples, u: Samples, params: Mapping[str, float]) -> Samples:
+        numbers, x, duty, flow = whole(x, u, params)
+        found = rates(numbers, float(x[0]), duty, flow)
+        return found[[STATES.index(name) for name in axial.states]]
+
+    def seen(_t: float, x: Samples, u: Samples, params: Mapping[str, float]) -> Samples:
+        return np.asarray(outputs(*whole(x, u, params))[places])
+
     return library.nlsys(
-        lambda _t, x, u, params: rates(_numbers(params), float(x[0]), *_inputs_of(u))[: len(STATES)],
-        lambda _t, x, u, params: outputs(_numbers(params), x, *_inputs_of(u)),
+        changes,
+        seen,
         name=axial.robot.name,
         inputs=_inputs(axial),
-        states=list(STATES),
-        outputs=list(OUTPUTS),
-        params=axial.parameters,
+        states=list(axial.states),
+        outputs=list(axial.outputs),
+        params={item.name: value for item, value in axial.parameters.items()},
     )
 
 
@@ -121,7 +139,8 @@ def linear_system(
     """A robot in axial motion, linearised in closed form where a duty and a flow have become steady.
 
     Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` or
+            `torque-speed` drive.
         duty: duty of the point, 0 to 1; None: the drive's own.
         flow: mean flow of the point, with its unit or a float in m/s; None: that of the placement.
         model: a hydrodynamic model, or `auto`.
@@ -146,8 +165,8 @@ def linear_system(
     at_flow = (axial.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
     inertia = axial.check_steady(at_duty, at_flow)
     numbers = axial.numbers
-    current = steady_current(numbers, at_duty, at_flow)
-    a, b, c, d = slopes(numbers, current, at_duty)
+    current = axial.steady_current(numbers, at_duty, at_flow)
+    a, b, c, d = slopes(numbers, current, at_duty) if axial.curve is None else _slopes_on_curve(axial, at_duty, at_flow)
     inputs = _inputs(axial)
     count = len(inputs)
     system = library.ss(
@@ -157,15 +176,15 @@ def linear_system(
         d[:, :count],
         name=axial.robot.name,
         inputs=inputs,
-        states=list(STATES),
-        outputs=list(OUTPUTS),
+        states=list(axial.states),
+        outputs=list(axial.outputs),
     )
     steady = outputs(numbers, np.array([current, 0.0, 0.0, 0.0, 0.0]), at_duty, at_flow)
     return LinearSystem(
         system=system,
         inputs=dict(zip(inputs, (at_duty, at_flow), strict=False)),
-        outputs=dict(zip(OUTPUTS, steady.tolist(), strict=True)),
-        time_constant=-1.0 / float(a[0, 0]),
+        outputs={name: float(steady[place]) for name, place in axial.outputs.items()},
+        time_constant=-1.0 / float(a[0, 0]) if axial.curve is None else 0.0,
         warnings=tuple(dict.fromkeys((*axial.prediction.warnings, *inertia))),
     )
 
@@ -182,6 +201,20 @@ def _inputs_of(u: Samples) -> tuple[float, float]:
     return min(max(float(u[0]), 0.0), 1.0), float(u[1]) if len(u) > 1 else 0.0
 
 
-def _numbers(params: Mapping[str, float]) -> Samples:
-    """A system's parameters in the order of `PARAMETERS`."""
-    return np.array([params[item.name] for item in PARAMETERS])
+def _slopes_on_curve(axial: AxialRobot, duty: float, flow: float) -> tuple[Samples, Samples, Samples, Samples]:
+    """As `slopes`, of a motor with a curve, whose torque follows duty and flow at once."""
+    p, torque = axial.numbers, axial.steady_current(axial.numbers, duty, flow)
+    per_torque, per_flow = motion(p, 1.0, 0.0), motion(p, 0.0, 1.0)
+    _, tail, body = per_torque * torque + per_flow * flow
+    sense, curve = p[kernel.POLARITY], axial.prediction.batch.curve
+    assert curve is not None  # noqa: S101 - of such a motor alone
+    rate, rates, torques = sense * (tail - body), np.array(curve.rates), np.array(curve.torques)
+    piece = int(np.clip(np.searchsorted(rates, rate) - 1, 0, rates.size - 2))
+    slope = 0.0 if rate < 0.0 else (torques[piece + 1] - torques[piece]) / (rates[piece + 1] - rates[piece])
+    full = torques[piece] + slope * (rate - rates[piece])  # at the duty 1
+    left = 1.0 - duty * slope * (per_torque[1] - per_torque[2])
+    by_input = np.array([sense * full, duty * slope * (per_flow[1] - per_flow[2])]) / left  # of the torque
+    moved = np.outer(per_torque, by_input)
+    moved[:, 1] += per_flow
+    d = np.vstack([np.zeros((3, 2)), moved, moved[1] - moved[2], by_input])
+    return np.zeros((3, 3)), moved, np.eye(len(d), 3), d

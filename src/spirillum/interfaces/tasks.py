@@ -108,6 +108,9 @@ class TaskEnvironment(ABC):
         if not self.dt <= self.duration <= 1e5:
             raise InputError(f"duration = {self.duration:g} s; allowed: {self.dt:.3g} to 100000 s")
         loaded, placed = load(robot), Placement.of(placement)
+        if loaded.drive is None or loaded.drive.kind != "dc-motor":
+            kind = "none" if loaded.drive is None else loaded.drive.kind
+            raise InputError(f"drive.kind = '{kind}'; allowed: 'dc-motor', whose current the task measures")
         chosen = choose_model(model, loaded, placement=placed).model
         if chosen == "tube" and self.lab.pulse.velocity and placed.flow is None and placed.ends is None:
             placed = placed.model_copy(update={"flow": 0.0})

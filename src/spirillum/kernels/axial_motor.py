@@ -39,6 +39,21 @@ def advance(
     """
 
 
+@native("states")
+def advance_on_curve(
+    parameters: Float64[Array, "count 18"],
+    states: Float64[Array, "count 7"],
+    dt: float,
+    duty: Float64[Array, "count"],
+    flow: Float64[Array, "count"],
+    curve: Float64[Array, "25"],
+) -> None:
+    """Take robots whose motor has a curve over a time; arguments as of `advance` and `drive.curve_torques`.
+
+    Their torque constant is 1, and the column of the current holds the torque, N m.
+    """
+
+
 @native("out", symbol="axial_rates")
 def rates(parameters: Float64[Array, "18"], current: float, duty: float, flow: float, out: Float64[Array, "7"]) -> None:
     """Fill d/dt of the state of one robot at a current, A, a duty and an imposed mean flow, m/s."""

@@ -11,13 +11,15 @@ from spirillum.kernels.native import Array, Float64, native
 SITE_X, SITE_RING, SITE_HALF, SITE_BALL, SITE_ROTOR = 0, 1, 2, 3, 4  # m; last: 1 where it turns with the rotor
 SITE = 5
 
-# The wire: radius and amplitude, m; taper over length, 1/m (0: none); h k, rad/m; x of the root and axial length, m.
+# The wire: radius and amplitude, m; taper over length, 1/m (0: none); h k, rad/m (0: no helix of one size); x of the
+# root and axial length, m.
 WIRE_RADIUS, AMPLITUDE, TAPER, HAND_K, ROOT, LENGTH = 0, 1, 2, 3, 4, 5
 WIRE = 6
 
-# A station along a wire: distance from the root, m, its place at phase 0, m, and the angle of its wire, rad.
-STATION_XI, STATION_X, STATION_Y, STATION_Z, STATION_TURN = 0, 1, 2, 3, 4
-STATION = 5
+# A station along a wire: distance from the root, m; its place at phase 0, m, and the derivative of that by it, both
+# (x, y, z); the angle of its wire, rad.
+STATION_XI, STATION_POINT, STATION_SLOPE, STATION_TURN = 0, 1, 4, 7
+STATION = 8
 
 
 @native()
@@ -59,6 +61,7 @@ def crest(
     rotation: Float64[Array, "3 3"],
     radius: float,
     wire: Float64[Array, "6"],
+    stations: Float64[Array, "count 8"],
     bracket: Float64[Array, "3"],
     normal: Float64[Array, "3"],
     point: Float64[Array, "3"],
@@ -66,7 +69,8 @@ def crest(
 ) -> float:
     """Return the gap between the wall and the wire where it is farthest from the tube's axis, m.
 
-    Arguments as of `ring_gap`; `bracket` is where along the wire to look: from, first guess, to; m from the root.
+    Arguments as of `ring_gap`; `bracket` is where along the wire to look: from, first guess, to; m from the root;
+    `stations` are those that it spans, two or three.
     """
 
 

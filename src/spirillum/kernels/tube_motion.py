@@ -52,7 +52,7 @@ def packed(
         tube: the tube, (9,) up to the numbers of sites and stations.
         wire: the wire, see `contacts`, (6,).
         sites: sites of body and coupling, see `contacts`, (n, 5).
-        stations: stations along the wire, see `contacts`, (m, 4).
+        stations: stations along the wires, see `contacts`, (m, 8).
         flow: imposed mean flow: times, s, and velocities, m/s, (k, 2); straight between them, constant beyond.
     """
     numbers = np.array([len(sites), len(stations)], dtype=float)

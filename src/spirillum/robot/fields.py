@@ -60,6 +60,7 @@ __all__ = [
     "Viscosity",
     "Voltage",
     "Yaw",
+    "all_metadata",
     "default_of",
     "field_values",
     "kind_of",
@@ -160,7 +161,7 @@ def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
     """All fields of a section and the sections within it."""
     for name, info in type(section).model_fields.items():
         value = getattr(section, name)
-        kinds = [item for item in _all_metadata(info) if isinstance(item, Kind)]
+        kinds = [item for item in all_metadata(info) if isinstance(item, Kind)]
         if isinstance(value, Section):
             yield from field_values(value, f"{path}{name}.")
         elif isinstance(value, dict):
@@ -172,7 +173,7 @@ def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
 
 def kind_of(section: Section, path: str) -> Kind | None:
     """Kind of quantity of a field; None for anything else."""
-    kinds = [item for item in _all_metadata(_info_of(section, path)) if isinstance(item, Kind)]
+    kinds = [item for item in all_metadata(_info_of(section, path)) if isinstance(item, Kind)]
     return kinds[0] if kinds else None
 
 
@@ -190,7 +191,7 @@ def _info_of(section: Section, path: str) -> FieldInfo:
     return fields[name]
 
 
-def _all_metadata(info: FieldInfo) -> list[Any]:
+def all_metadata(info: FieldInfo) -> list[Any]:
     """Metadata of a field, also of one that may be None (there it sits inside the union)."""
     inside = [item for part in get_args(info.annotation) for item in getattr(part, "__metadata__", ())]
     return [*info.metadata, *inside]

@@ -141,7 +141,7 @@ def _channel_limits(b: RobotBatch) -> list[Limit]:
             "coupling-wider-than-channel",
         ),
         Limit.of(
-            "tail.amplitude",
+            "tail.curve: amplitude" if b.form.curve else "tail.amplitude",
             b.amplitude,
             "less than",
             across,
@@ -219,7 +219,7 @@ def _spacing_and_curvature(b: RobotBatch) -> tuple[PerRobot, PerRobot]:
 
 def _tail_limits(b: RobotBatch) -> list[Limit]:
     spacing, curvature = _spacing_and_curvature(b)
-    whose = "" if b.form.curve else " of the coil (tail.wavelength, tail.amplitude)"
+    whose = " of tail.curve" if b.form.curve else " of the coil (tail.wavelength, tail.amplitude)"
     between = " or wires (tail.starts)" if b.form.starts > 1 else ""
     bend = "curve's" if b.form.curve else "coil's"
     return [

@@ -249,7 +249,7 @@ def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
     if tail.taper is not None:
         rise = np.arange(0.0, min(40.0, tail.taper), 0.05) * tail.length / tail.taper
         xi = np.unique(np.concatenate([xi, rise]))
-    line = _along(robot, xi)
+    line = centreline_of(robot, xi)
     bend = np.linalg.norm(np.diff(line.tangent, axis=0), axis=1)
     arc = np.linalg.norm(np.diff(line.position, axis=0), axis=1)
     first = 0
@@ -262,12 +262,12 @@ def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
     count = max(4, int(np.ceil(fineness * _PER_TURN * (turned[-1] - turned[first]) / (2.0 * np.pi))))
     spaced = np.interp(np.linspace(turned[first], turned[-1], count + 1), turned, xi)
     spaced[-1] = tail.length
-    line = _along(robot, spaced)
+    line = centreline_of(robot, spaced)
     return TailLine(line.position, line.tangent, spaced)
 
 
-def _along(robot: Robot, xi: Samples) -> Centreline:
-    """The wire's centreline at phase 0."""
+def centreline_of(robot: Robot, xi: Samples, phase: float = 0.0) -> Centreline:
+    """The first wire's centreline at axial distances from its root, m."""
     tail = robot.tail
     numbers = {
         "root": 0.5 * robot.body.length + robot.coupling.length,
@@ -276,6 +276,6 @@ def _along(robot: Robot, xi: Samples) -> Centreline:
         "length": tail.length,
         "taper": np.inf if tail.taper is None else tail.taper,
         "hand": robot.hand,
-        "phase": 0.0,
+        "phase": phase,
     }
     return centreline(xi, form=tail.form, **{name: np.full(1, value) for name, value in numbers.items()})

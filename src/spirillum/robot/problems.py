@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.robot.fields import all_metadata
 
 _OTHERWISE = {
     "tail.turns": "tail.length over tail.wavelength is the number of turns",
@@ -79,7 +80,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
         allowed = list(_fields_at(model, names[:-1]))
         hint = f": {_OTHERWISE[field]}" if field in _OTHERWISE else did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
-    return [_refused(problem, field)]
+    return [_refused(problem, field, _range_at(model, names))]
 
 
 def refused_value(error: ValidationError, field: str) -> str:
@@ -87,9 +88,11 @@ def refused_value(error: ValidationError, field: str) -> str:
     return _refused(error.errors(include_url=False)[0], field)
 
 
-def _refused(problem: Mapping[str, Any], field: str) -> str:
-    """A sentence of field, value, and what is allowed."""
+def _refused(problem: Mapping[str, Any], field: str, bounds: str = "") -> str:
+    """A sentence of field, value, and what is allowed: both bounds of a range where they are known."""
     shown, words = clipped(problem.get("input")), _allowed(problem, field)
+    if bounds and problem["type"] in ("greater_than_equal", "less_than_equal") and field not in _IN_ITS_RANGE:
+        words = bounds
     given = problem.get("input")
     if isinstance(given, float) and math.isnan(given):  # the limit that was looked at first says little
         return f"{field or 'the file'} = nan is no number; allowed: {words}"
@@ -136,6 +139,17 @@ def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
             found = _section(model.model_fields[name].annotation)
             model = found or model
     return tuple(model.model_fields)
+
+
+def _range_at(model: type[BaseModel], names: Sequence[str]) -> str:
+    """Both bounds of the number that a location leads to; empty where there are not two."""
+    for name in names[:-1]:
+        info = model.model_fields.get(name)
+        model = (info and _section(info.annotation)) or model
+    if not names or (info := model.model_fields.get(names[-1])) is None:
+        return ""
+    found = [getattr(item, name) for name in ("ge", "le") for item in all_metadata(info) if hasattr(item, name)]
+    return f"{found[0]:g} to {found[1]:g}" if len(found) == 2 else ""
 
 
 def _section(annotation: Any) -> type[BaseModel] | None:

@@ -158,6 +158,13 @@ class CentreLine:
         """Smallest axial distance from the root, m."""
         self.winding, self.turns = _turns(first / speed[:, None])
 
+    def shares(self, count: float) -> Samples:
+        """At least so many parameters, those between which it is a cubic among them."""
+        knots = self._spline.x
+        steps = int(np.ceil(count / (len(knots) - 1)))
+        found: Samples = np.append(np.linspace(knots[:-1], knots[1:], steps, endpoint=False).T.ravel(), 1.0)
+        return found
+
     def at(self, share: Values) -> tuple[Values, Values]:
         """Points (..., 3), m, and derivatives by the parameter."""
         return self._spline(share), self._spline(share, 1)

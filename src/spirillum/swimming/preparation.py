@@ -195,11 +195,6 @@ def check_usual_resolution(options: ModelOptions) -> None:
 
 def table_for(batch: RobotBatch, *, progress: Callable[[str, int, int], None] | None = None) -> TubeTable:
     """Return the table, with yawed poses, for motion of the first robot of a batch in its tube; made if missing."""
-    if not batch.form.is_helix:
-        raise InputError(
-            "motion in the tube finds contacts of tail and wall only on helices of one wavelength and amplitude; "
-            "allowed: such a tail, or a prediction at a given pose"
-        )
     return prepared_tables([_asked(batch)], stage="yaw", workers=_WORKERS, progress=progress)[0]
 
 

@@ -16,11 +16,11 @@ from matplotlib.patches import FancyArrowPatch
 from spirillum.arrays import Samples, Values
 from spirillum.errors import InputError
 from spirillum.papers.biorob2012.evidence import GLOBAL_DROP, LARGEST_REYNOLDS, Evidence
+from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
 from spirillum.view.figures.scene import FAINT, HALO, INK
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
-from spirillum.view.figures.solids import centreline_of
 from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, label_of_model, look_of_model, new_figure, styled
@@ -150,9 +150,9 @@ def frenet_frames(robot: Robot, xi: Samples) -> FrenetFrames:
     """
     step = 1e-5 * robot.tail.length
     ahead, behind = (
-        centreline_of(robot, np.clip(xi + sign * step, 0.0, robot.tail.length), 0.0)[1] for sign in (1.0, -1.0)
+        centreline_of(robot, np.clip(xi + sign * step, 0.0, robot.tail.length)).tangent for sign in (1.0, -1.0)
     )
-    position, tangent = centreline_of(robot, xi, 0.0)
+    position, tangent, _ = centreline_of(robot, xi)
     bend = ahead - behind
     bend = bend - np.sum(bend * tangent, axis=1, keepdims=True) * tangent
     size = np.linalg.norm(bend, axis=1, keepdims=True)
@@ -179,7 +179,7 @@ def frenet_figure(robot: Robot) -> Figure:
     tail = robot.tail
     unit = tail.amplitude
     xi = np.linspace(0.0, tail.length, _POINTS)
-    wire = centreline_of(robot, xi, 0.0)[0] / unit
+    wire = centreline_of(robot, xi).position / unit
     middle = wire.mean(axis=0)
     marked = frenet_frames(robot, np.array(_MARKED) * tail.length)
     reach = 0.085 * tail.length / unit

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
 from spirillum.arrays import Values
-from spirillum.robot.geometry import centreline
+from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
 
 Metal = tuple[str, str, str]
@@ -40,29 +40,12 @@ def draw_solid(axes: Axes, x: Values, radius: Values, colours: Metal, *, order: 
     axes.plot(np.concatenate([x, x[::-1]]), edge, color="#2b3a44", linewidth=0.8, zorder=order + 0.1)
 
 
-def centreline_of(robot: Robot, xi: Values, phase: float) -> tuple[Values, Values]:
-    """Points of the wire's centreline and its unit tangents, (n, 3), m, at axial distances `xi` (n,) from the root."""
-    tail = robot.tail
-    found = centreline(
-        xi,
-        wavelength=np.array(tail.wavelength),
-        amplitude=np.array(tail.amplitude),
-        length=np.array(tail.length),
-        taper=np.array(np.inf if tail.taper is None else tail.taper),
-        root=np.array(0.5 * robot.body.length + robot.coupling.length),
-        hand=np.array(robot.hand),
-        phase=np.array(phase),
-        form=tail.form,
-    )
-    return found.position, found.tangent
-
-
 def wire_lines(robot: Robot, phase: float, unit: float) -> list[Values]:
     """Points (x, y, z) of each wire's centreline from its root on, in `unit`."""
     tail = robot.tail
     count = int(np.clip(max(90 * tail.length / tail.wavelength, 8 * len(tail.curve or ())), 200, _LARGEST_WIRE))
     xi = np.linspace(0.0, tail.length, count)
-    return [centreline_of(robot, xi, float(phase + turn))[0] / unit for turn in tail.form.turns]
+    return [centreline_of(robot, xi, float(phase + turn)).position / unit for turn in tail.form.turns]
 
 
 def crests(robot: Robot, phase: float, unit: float) -> Values:
