@@ -110,6 +110,8 @@ _LINE_ERROR = 0.1
 """Standard error of a line's position, pixels."""
 _CORRELATED = 12.0
 """Points of a ruler with correlated errors, as they share a window."""
+_HUBER = 3.0 / math.sqrt(_CORRELATED)
+"""Residual from which on Huber's loss is linear, standard errors."""
 _FOCAL = (0.2, 250.0)
 """Plausible focal lengths over the picture's width."""
 _MODEL = 3e-4
@@ -189,7 +191,7 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
         )
     sources = {"lens and outline": _MODEL, "fit of the lines": own}
     for name, spread in _uncertain(setup).items():
-        longer, shorter = (_changed(optics, spacing, height, name, step) for step in (_STEP, -_STEP))
+        longer, shorter = (_changed(_Geometry(optics, spacing, height), name, step) for step in (_STEP, -_STEP))
         sources[name] = abs(fit.response(longer, shorter)) / (2.0 * _STEP) * spread
     flags = []
     if lens is not None and abs(lens.focal / optics.focal - 1.0) > 0.02 + 3.0 * lens.focal_error / lens.focal:
@@ -249,6 +251,11 @@ class _Geometry(NamedTuple):
     """Spacing of the ruler's lines, m."""
     height: float
     """Height of the ruler, m."""
+
+    @property
+    def distance(self) -> float:
+        """Distance of the ruler's lines below the lens, pixels."""
+        return self.spacing / self.optics.moved({"axis_height": self.height}).length_per_pixel
 
 
 class _Fit:
@@ -326,7 +333,7 @@ class _Fit:
         width = np.array([_PRIOR_TILT, _PRIOR_TILT, 10.0, _PRIOR_K1])[: len(self.names) - 1]
         prior = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]
         residuals = self._residuals(numbers, start, spacing, height) / self.scale
-        small = np.clip(residuals, -3.0 / np.sqrt(_CORRELATED), 3.0 / np.sqrt(_CORRELATED))
+        small = np.clip(residuals, -_HUBER, _HUBER)
         beyond = residuals - small  # Huber's loss, linear for outliers
         weighted = small + np.sign(beyond) * (np.sqrt(small**2 + 2 * np.abs(small) * np.abs(beyond)) - np.abs(small))
         return np.concatenate([weighted, (numbers[1:] + prior) / width])
@@ -346,14 +353,20 @@ def _uncertain(setup: Setup) -> dict[str, float]:
     return {name: share for name, share in found.items() if share > 0.0}
 
 
-def _changed(optics: Optics, spacing: float, height: float, name: str, step: float) -> _Geometry:
-    """A fitted camera before its ruler, with one number of the setup changed by a relative step."""
-    far = step * optics.height
+def _changed(before: _Geometry, name: str, step: float) -> _Geometry:
+    """A fitted camera before its ruler, with one number of the setup changed by a relative step.
+
+    Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
+    """
+    optics, far = before.optics, step * before.optics.height
     if name == "markers.spacing":
-        return _Geometry(optics, spacing * (1.0 + step), height)
-    if name == "markers.height":
-        return _Geometry(optics, spacing, height + far)
-    if name == "tank.index":
-        return _Geometry(optics.moved({"index": optics.index * (1.0 + step)}), spacing, height)
-    field = {"camera.height": "height", "robot.axis_height": "axis_height", "tank.surface": "surface"}[name]
-    return _Geometry(optics.moved({field: getattr(optics, field) + far}), spacing, height)
+        after = before._replace(spacing=before.spacing * (1.0 + step))
+    elif name == "markers.height":
+        after = before._replace(height=before.height + far)
+    elif name == "tank.index":
+        after = before._replace(optics=optics.moved({"index": optics.index * (1.0 + step)}))
+    else:
+        field = {"camera.height": "height", "robot.axis_height": "axis_height", "tank.surface": "surface"}[name]
+        after = before._replace(optics=optics.moved({field: getattr(optics, field) + far}))
+    focal = optics.focal * before.distance / after.distance
+    return after._replace(optics=after.optics.moved({"focal": focal}))
