@@ -42,6 +42,7 @@ EXPORT void edge_places(const double pose[3], const double *factors, const doubl
                         double axis_height, const Camera *camera, double (*pixels)[2], double (*directions)[2],
                         double *size, double (*slopes)[3], int64_t count) {
     const double c = cos(pose[2]), s = sin(pose[2]), step = 1e-4; /* m */
+    double share = 0.0;
     edge_points(pose, factors, normals, reach, pixels, count);
     for (int64_t i = 0; i < count; i++) {
         const double *normal = normals[i], local[2] = {pixels[i][0], pixels[i][1]};
@@ -49,7 +50,7 @@ EXPORT void edge_places(const double pose[3], const double *factors, const doubl
         for (int k = 0; k < 2; k++) {
             const double x = local[0] + k * step * normal[0], y = local[1] + k * step * normal[1];
             const double point[3] = {pose[0] + c * x - s * y, pose[1] + s * x + c * y, axis_height};
-            pixel_of_point(camera, point, ends[k]);
+            pixel_near(camera, point, &share, ends[k]);
         }
         const double d_u = (ends[1][0] - ends[0][0]) / step, d_v = (ends[1][1] - ends[0][1]) / step;
         const double far = sqrt(d_u * d_u + d_v * d_v);

@@ -24,15 +24,18 @@ static Place place_at(const float *picture, int64_t width, int64_t channels, dou
     return place;
 }
 
-/* Value of a channel; `next` and `below` are the steps to the next pixel and to that below. */
-static double value_at(const Place *p, int64_t channel, int64_t next, int64_t below) {
-    double total = 0.0;
-    for (int j = 0; j < 4; j++) {
-        const float *line = p->first + channel + j * below;
-        const double left = p->along[0] * (double)line[0] + p->along[1] * (double)line[next];
-        total += p->down[j] * (left + p->along[2] * (double)line[2 * next] + p->along[3] * (double)line[3 * next]);
+/* Values of one or three channels; `below` is the step to the pixel below. */
+static inline void values_at(const Place *p, int64_t channels, int64_t below, double *values, int64_t apart) {
+    double column[12];
+    for (int64_t n = 0; n < 4 * channels; n++) {
+        const float *line = p->first + n;
+        const double upper = p->down[0] * (double)line[0] + p->down[1] * (double)line[below];
+        column[n] = upper + p->down[2] * (double)line[2 * below] + p->down[3] * (double)line[3 * below];
     }
-    return total;
+    for (int64_t c = 0; c < channels; c++) {
+        const double left = p->along[0] * column[c] + p->along[1] * column[channels + c];
+        values[c * apart] = left + p->along[2] * column[2 * channels + c] + p->along[3] * column[3 * channels + c];
+    }
 }
 
 EXPORT void profiles_across(const float *picture, const double origin[2], const double (*pixels)[2],
@@ -49,8 +52,10 @@ EXPORT void profiles_across(const float *picture, const double origin[2], const 
                 continue;
             }
             const Place place = place_at(picture, width, channels, u, v);
-            for (int64_t c = 0; c < channels; c++)
-                profile[c * count * length] = value_at(&place, c, channels, width * channels);
+            if (channels == 1) /* loops of known length become vector instructions */
+                values_at(&place, 1, width, profile, 0);
+            else
+                values_at(&place, 3, 3 * width, profile, count * length);
         }
     }
 }
@@ -62,12 +67,13 @@ typedef struct {
 
 static Trend trend_of(const double *values, int64_t length) {
     const double size = (double)length, half = 0.5 * (size - 1.0), spread = size * (size * size - 1.0) / 12.0;
-    Trend found = {0.0, 0.0};
+    double sum = 0.0, moment = 0.0;
+#pragma omp simd reduction(+ : sum, moment)
     for (int64_t k = 0; k < length; k++) {
-        found.mean += values[k];
-        found.slope += values[k] * ((double)k - half);
+        sum += values[k];
+        moment += values[k] * ((double)k - half);
     }
-    return (Trend){found.mean / size, found.slope / spread};
+    return (Trend){sum / size, moment / spread};
 }
 
 EXPORT void shifts_of_profiles(const double *profiles, const double *templates, const double *slopes, double *shifts,
@@ -77,6 +83,7 @@ EXPORT void shifts_of_profiles(const double *profiles, const double *templates, 
         const double *profile = profiles + i * length, *template = templates + i * length, *slope = slopes + i * length;
         const Trend own = trend_of(profile, length), bent = trend_of(slope, length);
         double pp = 0.0, ps = 0.0, ss = 0.0, pq = 0.0, sq = 0.0, qq = 0.0; /* products of p, p' and q */
+#pragma omp simd reduction(+ : pp, ps, ss, pq, sq, qq)
         for (int64_t k = 0; k < length; k++) {
             const double at = (double)k - half, p = template[k];
             const double q = profile[k] - own.mean - own.slope * at, s = slope[k] - bent.mean - bent.slope * at;

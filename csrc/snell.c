@@ -10,19 +10,18 @@ enum { STEPS = 30 };
  * 1e-9 it is exact to rounding.
  *
  * d: horizontal distance of the point from the lens; a: height of the lens above the surface; b: depth of the point
- * below it; n: refractive index below the surface over that above.
+ * below it; n: refractive index below the surface over that above; s: first guess, between 0 and d.
  */
-static double surface_crossing(double d, double a, double b, double n) {
-    if (d <= 0.0 || n == 1.0) return d * a / (a + b);
-    double low = 0.0, high = d, s = d * a / (a + b / n);
+static double surface_crossing(double d, double a, double b, double n, double s) {
+    double low = 0.0, high = d;
     for (int k = 0; k < STEPS; k++) {
-        const double rest = d - s, up = sqrt(s * s + a * a), down = sqrt(rest * rest + b * b);
-        const double value = s / up - n * rest / down;
+        const double rest = d - s, up = 1.0 / sqrt(s * s + a * a), down = 1.0 / sqrt(rest * rest + b * b);
+        const double value = s * up - n * rest * down;
         if (value > 0.0)
             high = s;
         else
             low = s;
-        const double step = value / (a * a / (up * up * up) + n * b * b / (down * down * down));
+        const double step = value / (a * a * (up * up * up) + n * b * b * (down * down * down));
         s -= step;
         if (fabs(step) < 1e-9 * d) break;
         if (s <= low || s >= high) s = 0.5 * (low + high);
@@ -30,14 +29,18 @@ static double surface_crossing(double d, double a, double b, double n) {
     return s;
 }
 
-void pixel_of_point(const Camera *c, const double point[3], double pixel[2]) {
+void pixel_near(const Camera *c, const double point[3], double *share, double pixel[2]) {
     const double across = sqrt(point[0] * point[0] + point[1] * point[1]);
     const double above = c->height - c->surface, below = c->surface - point[2];
     double x = point[0], y = point[1], z = point[2] - c->height;
     if (below > 0.0) {
-        const double share = across > 0.0 ? surface_crossing(across, above, below, c->index) / across : 0.0;
-        x *= share;
-        y *= share;
+        if (!(0.0 < *share && *share < 1.0)) *share = above / (above + below / c->index);
+        if (across <= 0.0 || c->index == 1.0)
+            *share = across > 0.0 ? above / (above + below) : 0.0;
+        else
+            *share = surface_crossing(across, above, below, c->index, *share * across) / across;
+        x *= *share;
+        y *= *share;
         z = -above;
     }
     const double ahead = -(c->back[0] * x + c->back[1] * y + c->back[2] * z);
@@ -48,6 +51,11 @@ void pixel_of_point(const Camera *c, const double point[3], double pixel[2]) {
     const double stretch = 1.0 + r2 * (c->k1 + r2 * c->k2);
     pixel[0] = c->centre_u + c->focal * a * stretch;
     pixel[1] = c->centre_v - c->focal * b * stretch;
+}
+
+void pixel_of_point(const Camera *c, const double point[3], double pixel[2]) {
+    double share = 0.0;
+    pixel_near(c, point, &share, pixel);
 }
 
 /* Tangent of the angle to the optical axis whose distorted image is `far`, by Newton's method. */
@@ -94,7 +102,8 @@ void point_of_pixel(const Camera *c, const double pixel[2], double level, double
 }
 
 EXPORT void pixels_of_points(const double (*points)[3], const Camera *camera, double (*pixels)[2], int64_t count) {
-    for (int64_t i = 0; i < count; i++) pixel_of_point(camera, points[i], pixels[i]);
+    double share = 0.0;
+    for (int64_t i = 0; i < count; i++) pixel_near(camera, points[i], &share, pixels[i]);
 }
 
 EXPORT void points_of_pixels(const double (*pixels)[2], double level, const Camera *camera, double (*points)[3],

@@ -17,6 +17,10 @@ _Static_assert(sizeof(Camera) == 17 * sizeof(double), "the layout of a packed ca
 /* Pixel (u, v) at which the camera sees a point; NaN behind it. */
 void pixel_of_point(const Camera *camera, const double point[3], double pixel[2]);
 
+/* The same; `share` is that of the horizontal distance at which the ray to a close point crosses the surface, and becomes
+ * that of this one. Unless it is between 0 and 1, the search begins anywhere. */
+void pixel_near(const Camera *camera, const double point[3], double *share, double pixel[2]);
+
 /* Point at the height `level` on the ray of a pixel; NaN where the ray does not reach it. */
 void point_of_pixel(const Camera *camera, const double pixel[2], double level, double point[3]);
 

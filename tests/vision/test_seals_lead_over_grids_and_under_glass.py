@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from remembered import remembered
+from spirillum.live.tracker import LiveTracker
 from spirillum.vision.camera.optics import Optics
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.body import BodyFinder
@@ -57,15 +58,19 @@ def film(flat_pictures):
     return flat_pictures.Flat(velocity=2e-3, fps=8.0, frames=24, start=(0.012, 0.001), ruler=False, fine=4)
 
 
-def measured(film, folder, *, clear):
-    """The track of the frames on paper, without errors of the scale."""
+def written(film, folder, *, clear):
+    """The setup, without errors of the scale, beside the frames on paper."""
     (folder / "film").mkdir()
     for index, time in enumerate(film.times):
         cv2.imwrite(str(folder / "film" / f"{index:02d}.png"), on_paper(film, time, clear=clear)[:, :, ::-1])
     path = folder / "setup.toml"
     path.write_text(replace(film, ruler=False).setup_text())
-    setup, robot = load_setup(path)
-    return follow(folder / "film", setup, robot)
+    return path
+
+
+def measured(film, folder, *, clear):
+    """The track of the frames on paper."""
+    return follow(folder / "film", *load_setup(written(film, folder, clear=clear)))
 
 
 @pytest.mark.parametrize("clear", [0.0, 0.9])
@@ -80,6 +85,20 @@ def test_the_speed_over_a_grid_is_the_robots(film, tmp_path, clear):
     assert abs(turned) < 0.1  # of two; a pixel across the seal is 0.06
     assert track.cues["seal"].share == 1.0
     assert track.cues["tail"].share > 0.9
+
+
+def test_a_live_robot_of_glass_over_a_grid_is_followed_by_its_seal(film, tmp_path):
+    setup = written(film, tmp_path, clear=0.9)
+    tracker = LiveTracker(setup, learn_from=tmp_path / "film")
+    seen = [tracker.update(on_paper(film, time, clear=0.9), time) for time in film.times]
+    assert all(one.seen for one in seen)
+    time, x = np.array([(one.time, one.x) for one in seen]).T
+    along = np.polyfit(time, x - film.truth(time)["x"], 1)[0] * np.ptp(time)
+    trial = tracker.summary()
+    assert abs(along) < 0.3 * trial.track.scale.length_per_pixel
+    assert trial.track.cues["seal"].share == 1.0
+    speed = trial.quantities["forward_velocity"]
+    assert speed.low < film.velocity < speed.high
 
 
 def test_a_seal_is_found_and_placed_whatever_lies_under_the_body(film, tmp_path):

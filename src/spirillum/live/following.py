@@ -32,9 +32,11 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
 from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.constants import VISIBILITY
+from spirillum.vision.track.cues import CUES
 from spirillum.vision.track.direction import align_with_path
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.track.learning import InitialDetection
+from spirillum.vision.track.lone_outline import OutlineCheck
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
 from spirillum.vision.track.steps import FrameTracker
@@ -147,7 +149,15 @@ _NOT_WHOLE = "the robot is partly out of view"
 class Following:
     """A robot that is known, and what was seen of it."""
 
-    def __init__(self, video: Video, setup: Setup, robot: Robot, learnt: InitialDetection, window: float) -> None:
+    def __init__(
+        self,
+        video: Video,
+        setup: Setup,
+        robot: Robot,
+        learnt: InitialDetection,
+        outline: OutlineCheck,
+        window: float,
+    ) -> None:
         """Begin.
 
         Args:
@@ -155,9 +165,10 @@ class Following:
             setup: its setup.
             robot: the robot.
             learnt: camera, scale, and the robot as it looks.
+            outline: what cover and background leave open of its outline.
             window: time over which rates are taken, s.
         """
-        self.video, self.setup, self.robot, self.learnt = video, setup, robot, learnt
+        self.video, self.setup, self.robot, self.learnt, self.outline = video, setup, robot, learnt, outline
         ruled = setup.markers.spacing is not None
         self.follower = FrameTracker(learnt.known, learnt.still, ahead=False)
         self.body, self.tail = CausalAngle(learnt.known.stripes.period), CausalAngle(2.0 * math.pi)
@@ -169,7 +180,7 @@ class Following:
             learnt.sight.scale, known.start.body, known.size, setup.markers.spacing, tail_size
         )
         self.roll, rolled = (0.0, ()) if ruled else self._roll()
-        self.always = (*learnt.sight.flags, *size_flags, *rolled, *_synthetic(video))
+        self.always = (*learnt.sight.flags, *size_flags, *rolled, *outline.flags, *_synthetic(video))
         self.moved: tuple[Flag, ...] = ()
         self.flags: tuple[Flag, ...] = (*self.always, *learnt.flags)
         self.next_check = -math.inf
@@ -286,13 +297,14 @@ class Following:
         body_size = max(STRIPE_ERROR, body_error if math.isfinite(body_error) else 0.0)
         tail_size = max(PHASE_ERROR, tail_error if math.isfinite(tail_error) else 0.0)
         grid = 2.0 * math.pi * known[_VELOCITY] / pixel
+        cue = self.outline.drift if self.learnt.known.start.body.seal is None else CUES.colour_drift
         returning = {
             _VELOCITY: (PIXEL_ERROR * pixel, (grid, known[_TAIL], known[_BODY], around)),
             _BODY: (body_size, (known[_BODY], around)),
             _TAIL: (tail_size, (known[_TAIL], 2.0 * known[_TAIL])),
         }
         drifts = {
-            _VELOCITY: math.hypot(DRIFT_PIXELS if striped else DRIFT_BARE, self.learnt.glare.drift) * pixel,
+            _VELOCITY: pixel * math.hypot(DRIFT_PIXELS if striped else DRIFT_BARE, self.learnt.glare.drift, cue),
             _BODY: max(DRIFT_ANGLE, body_size / 2.0),
             _TAIL: max(DRIFT_ANGLE, tail_size / 2.0),
         }
@@ -323,7 +335,8 @@ class Following:
         flags = (*self.moved, *self.learnt.sight.flags, *self.learnt.flags)
         if not self.follower.record.time:
             raise InputError(f"{name} has no frame after the robot was learnt; allowed: a longer one")
-        track = track_of(self.video, self.setup, self.learnt, self.follower.record, flags)
+        record, outline = self.follower.record, self.outline
+        track = track_of(self.video, self.setup, self.learnt, record, flags, outline=outline)
         return trial_of(track, self.robot, name)
 
 

@@ -31,7 +31,6 @@ from spirillum.measurement.trials import MEASURED, Measured, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
 from spirillum.version import versions
 from spirillum.view.annotate import annotated_film, frame_of_film
-from spirillum.view.figures.measurement import measurement_figures
 from spirillum.vision.camera.camera import opened
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
@@ -56,6 +55,8 @@ def write_measurement_report(
     Returns:
         Names of the files, as seen from the folder.
     """
+    from spirillum.view.figures.measurement import measurement_figures
+
     pictures = measurement_figures(measurement)
     steps = len(pictures) + 1
     embedded = draw_pictures(pictures, folder, lambda _name, done: tell("figures and report", done, steps))

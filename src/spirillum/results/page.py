@@ -6,11 +6,12 @@ import base64
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spirillum.files import output_folder
-from spirillum.view.figures.sheet import Picture
-from spirillum.view.figures.style import save
+
+if TYPE_CHECKING:
+    from spirillum.view.figures.sheet import Picture
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ def draw_pictures(
         tell: called with the name of the next figure and the number of figures drawn.
         largest_svg: a vector picture up to this size is embedded as it is, bytes; others as pixels.
     """
+    from spirillum.view.figures.style import save
+
     figures = output_folder(folder / "figures", folder)
     found = []
     for done, (name, picture) in enumerate(pictures.items()):

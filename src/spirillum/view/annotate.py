@@ -84,14 +84,15 @@ class Annotator:
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
 
-    def draw(self, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
-        """Return a copy of a frame with the tracking result, reduced to at most 1920 pixels.
+    def draw(self, image: np.ndarray, seen: AnnotatedFrame, *, in_place: bool = False) -> np.ndarray:
+        """Return a frame with the tracking result, reduced to at most 1920 pixels.
 
         Args:
             image: RGB bytes, (h, w, 3).
             seen: the tracking result.
+            in_place: draw on the image itself where it has the size, not on a copy.
         """
-        picture, times = self._reduced(image)
+        picture, times = self._reduced(image, in_place=in_place)
         pose = seen.pose
         if pose is None:
             self._write(picture, (f"t = {seen.time:.2f} s", "robot not seen"))
@@ -120,11 +121,12 @@ class Annotator:
         )
         return picture
 
-    def _reduced(self, image: np.ndarray) -> tuple[np.ndarray, int]:
-        """A copy of a frame, reduced if it is large, and how many times."""
+    def _reduced(self, image: np.ndarray, *, in_place: bool) -> tuple[np.ndarray, int]:
+        """A frame to draw on, reduced if it is large, and how many times."""
         times = -(-max(image.shape[:2]) // _LARGEST)
         if times == 1:
-            return np.ascontiguousarray(image).copy(), 1
+            own = in_place and image.flags.c_contiguous and image.flags.writeable
+            return (image if own else image.copy(order="C")), 1
         height, width = (size // times for size in image.shape[:2])
         whole = np.ascontiguousarray(image[: height * times, : width * times])
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
@@ -256,7 +258,7 @@ def annotated_film(
     kept: list[np.ndarray] = []
 
     def drawn(index: int, image: np.ndarray, seen: AnnotatedFrame) -> np.ndarray:
-        picture = annotator.draw(image, seen)
+        picture = annotator.draw(image, seen, in_place=True)  # nobody looks at the frame any more
         if seen.pose is not None and (not kept or index & (index - 1) == 0):
             kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
         return picture

@@ -217,9 +217,14 @@ def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
     """
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
-    engine = figure.get_layout_engine()
+    engine, dpi = figure.get_layout_engine(), figure.dpi
+    if engine is not None and not isinstance(engine, PlaceHolderLayoutEngine):
+        figure.dpi = DPI
+        with styled():
+            engine.execute(figure)  # once: else it takes a drawing of its own before each of the two
+        figure.dpi = dpi
+        figure.set_layout_engine("none")
     save_as(figure, png)
-    figure.set_layout_engine("none")  # it is laid out: once more would take as long as to draw it
     save_as(figure, svg)
     figure.set_layout_engine(engine)
     return png, svg

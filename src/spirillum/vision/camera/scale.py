@@ -110,6 +110,8 @@ _LINE_ERROR = 0.1
 """Standard error of a line's position, pixels."""
 _CORRELATED = 12.0
 """Points of a ruler with correlated errors, as they share a window."""
+_HUBER = 3.0 / math.sqrt(_CORRELATED)
+"""Residual from which on Huber's loss is linear, standard errors."""
 _FOCAL = (0.2, 250.0)
 """Plausible focal lengths over the picture's width."""
 _MODEL = 3e-4
@@ -165,7 +167,7 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
     """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines.
 
     The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
-    of the setup, by finite differences of the fit.
+    of the setup, by the implicit derivative of the fit.
 
     Args:
         setup: the setup.
@@ -189,9 +191,8 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
         )
     sources = {"lens and outline": _MODEL, "fit of the lines": own}
     for name, spread in _uncertain(setup).items():
-        longer = _changed(fit, optics, setup, name, _STEP)
-        shorter = _changed(fit, optics, setup, name, -_STEP)
-        sources[name] = abs(np.log(longer / shorter)) / (2.0 * _STEP) * spread
+        longer, shorter = (_changed(_Geometry(optics, spacing, height), name, step) for step in (_STEP, -_STEP))
+        sources[name] = abs(fit.response(longer, shorter)) / (2.0 * _STEP) * spread
     flags = []
     if lens is not None and abs(lens.focal / optics.focal - 1.0) > 0.02 + 3.0 * lens.focal_error / lens.focal:
         flags.append(
@@ -241,6 +242,22 @@ def first_rotation(optics: Optics, lines: Lines) -> float:
     return 0.0 if abs(off) < _SMALL_ROLL else float(off)
 
 
+class _Geometry(NamedTuple):
+    """A camera before a ruler."""
+
+    optics: Optics
+    """The camera."""
+    spacing: float
+    """Spacing of the ruler's lines, m."""
+    height: float
+    """Height of the ruler, m."""
+
+    @property
+    def distance(self) -> float:
+        """Distance of the ruler's lines below the lens, pixels."""
+        return self.spacing / self.optics.moved({"axis_height": self.height}).length_per_pixel
+
+
 class _Fit:
     """Robust least squares fit of the camera's parameters, with a free offset of each strip."""
 
@@ -254,6 +271,10 @@ class _Fit:
         self.sense = 1.0
         """1 where the lines are counted towards the nose, -1 where they are counted away from it."""
         self.scale = _LINE_ERROR * np.sqrt(_CORRELATED)
+        self._steps: Samples = np.empty((0, 0))
+        """Pseudoinverse of the Jacobian at the fit: change of the parameters by that of the residuals."""
+        self._slopes: Samples = np.empty(0)
+        """Relative change of the length per pixel by that of the parameters at the fit."""
 
     def _optics(self, numbers: Samples, start: Optics) -> Optics:
         changes = dict(zip(self.names, numbers.tolist(), strict=True))
@@ -276,21 +297,10 @@ class _Fit:
 
         x = start.points(self.lines.pixels, height)[:, 0]
         self.sense = float(np.sign(np.nansum((x - np.nanmean(x)) * (self.lines.number - self.lines.number.mean()))))
-
-        prior_width = np.array([_PRIOR_TILT, _PRIOR_TILT, 10.0, _PRIOR_K1])[: len(self.names) - 1]
-        start_values = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]
-
-        def cost(numbers: Samples) -> Samples:
-            residuals = self._residuals(numbers, start, spacing, height) / self.scale
-            small = np.clip(residuals, -3.0 / np.sqrt(_CORRELATED), 3.0 / np.sqrt(_CORRELATED))
-            beyond = residuals - small  # Huber's loss, linear for outliers
-            weighted = small + np.sign(beyond) * (
-                np.sqrt(small**2 + 2 * np.abs(small) * np.abs(beyond)) - np.abs(small)
-            )
-            return np.concatenate([weighted, (numbers[1:] + start_values) / prior_width])
-
         found = least_squares(
-            cost, np.zeros(len(self.names)), x_scale=np.array([0.1, 0.02, 0.02, 0.02, 0.02][: len(self.names)])
+            lambda numbers: self._cost(numbers, start, spacing, height),
+            np.zeros(len(self.names)),
+            x_scale=np.array([0.1, 0.02, 0.02, 0.02, 0.02][: len(self.names)]),
         )
         optics = self._optics(found.x, start)
         residuals = self._residuals(found.x, start, spacing, height)
@@ -304,7 +314,29 @@ class _Fit:
             step[k] = 1e-4
             more, less = (self._optics(found.x + sign * step, start).length_per_pixel for sign in (1.0, -1.0))
             slopes[k] = np.log(more / less) / 2e-4
+        self._steps, self._slopes = np.linalg.pinv(found.jac), slopes
         return optics, residual, float(np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)))
+
+    def response(self, longer: _Geometry, shorter: _Geometry) -> float:
+        """Relative difference of the length per pixel between fits with two geometries, both close to the fitted one.
+
+        To first order, by the implicit function theorem: the residuals' change at fixed parameters, and the change of
+        the parameters that undoes it best.
+        """
+        still = np.zeros(len(self.names))
+        apart = self._cost(still, *longer) - self._cost(still, *shorter)
+        direct = np.log(longer.optics.length_per_pixel / shorter.optics.length_per_pixel)
+        return float(direct - self._slopes @ (self._steps @ apart))
+
+    def _cost(self, numbers: Samples, start: Optics, spacing: float, height: float) -> Samples:
+        """Residuals in standard errors with Huber's loss, and those of the prior."""
+        width = np.array([_PRIOR_TILT, _PRIOR_TILT, 10.0, _PRIOR_K1])[: len(self.names) - 1]
+        prior = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]
+        residuals = self._residuals(numbers, start, spacing, height) / self.scale
+        small = np.clip(residuals, -_HUBER, _HUBER)
+        beyond = residuals - small  # Huber's loss, linear for outliers
+        weighted = small + np.sign(beyond) * (np.sqrt(small**2 + 2 * np.abs(small) * np.abs(beyond)) - np.abs(small))
+        return np.concatenate([weighted, (numbers[1:] + prior) / width])
 
 
 def _uncertain(setup: Setup) -> dict[str, float]:
@@ -321,22 +353,20 @@ def _uncertain(setup: Setup) -> dict[str, float]:
     return {name: share for name, share in found.items() if share > 0.0}
 
 
-def _changed(fit: _Fit, optics: Optics, setup: Setup, name: str, step: float) -> float:
-    """Length per pixel after a refit with one number of the setup changed by a relative step."""
-    spacing, height = setup.markers.spacing, setup.markers.height
-    assert spacing is not None  # noqa: S101
-    assert height is not None  # noqa: S101
-    far, changes = step * setup.camera.height, {}
+def _changed(before: _Geometry, name: str, step: float) -> _Geometry:
+    """A fitted camera before its ruler, with one number of the setup changed by a relative step.
+
+    Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
+    """
+    optics, far = before.optics, step * before.optics.height
     if name == "markers.spacing":
-        spacing *= 1.0 + step
+        after = before._replace(spacing=before.spacing * (1.0 + step))
     elif name == "markers.height":
-        height += far
-    elif name == "camera.height":
-        changes["height"] = optics.height + far
-    elif name == "robot.axis_height":
-        return optics.moved({"axis_height": optics.axis_height + far}).length_per_pixel
+        after = before._replace(height=before.height + far)
     elif name == "tank.index":
-        changes["index"] = optics.index * (1.0 + step)
-    elif optics.surface is not None:
-        changes["surface"] = optics.surface + far
-    return fit.run(optics.moved(changes), spacing, height)[0].length_per_pixel
+        after = before._replace(optics=optics.moved({"index": optics.index * (1.0 + step)}))
+    else:
+        field = {"camera.height": "height", "robot.axis_height": "axis_height", "tank.surface": "surface"}[name]
+        after = before._replace(optics=optics.moved({field: getattr(optics, field) + far}))
+    focal = optics.focal * before.distance / after.distance
+    return after._replace(optics=after.optics.moved({"focal": focal}))

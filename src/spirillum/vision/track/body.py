@@ -103,7 +103,10 @@ class BodyFinder:
         self._scatter = self.contour.floor.copy()
         self.seal = SealEdges(self.contour, colours) if colours else None
         self._on_seal = np.empty(0, dtype=np.int64) if self.seal is None else self.seal.chosen
-        flank = np.isin(self.contour.group[self._on_seal], [GROUPS.index("left"), GROUPS.index("right")])
+        group = self.contour.group
+        self._cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
+        self._ends = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
+        flank = np.isin(group[self._on_seal], [GROUPS.index("left"), GROUPS.index("right")])
         self._seal_floor = np.where(flank, SEAL.floors[1], SEAL.floors[0])
         self._seal_scatter = self._seal_floor.copy()
         self.margin = int(self.half + 4 * OUTLINE.blur + 4)
@@ -349,7 +352,7 @@ class BodyFinder:
             found.append(
                 _Edges(seen.shifts, seen.known, variance, slopes[here], inside, np.isfinite(self._seal_scatter))
             )
-        return _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
+        return found[0] if len(found) == 1 else _Edges(*map(np.concatenate, zip(*found, strict=True)))
 
     def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0
@@ -386,10 +389,9 @@ class BodyFinder:
             return PoseFit(found, errors, fitting, share)
         count = len(self.contour.group)
         left = shifts - slopes @ change
-        elongation = _elongation(left[:count], slopes[:count], used[:count], self.contour.group)
-        cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
+        elongation = _elongation(left[:count], slopes[:count], used[:count], *self._ends)
         spread = max(level, 0.5) * np.sqrt(self._correlation)
-        return PoseFit(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, cue, spread))
+        return PoseFit(found, errors, fitting, share, elongation, cue_shifts(left, slopes, used, self._cue, spread))
 
 
 def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:
@@ -401,7 +403,7 @@ def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:
     return middle, mad_scale(stack - middle, axis=0), enough
 
 
-def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray) -> float:
+def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray, behind: np.ndarray) -> float:
     """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
 
     Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
@@ -410,9 +412,9 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray
         left: residual displacement of each edge along its normal, pixels, (n,).
         slopes: Jacobian of the displacements by the pose, (n, 3).
         used: weights of the edges, 0 for outliers, (n,).
-        group: index into `GROUPS` of each edge, (n,).
+        nose: mask of the edges of the nose, (n,).
+        behind: mask of those of rear and seal, (n,).
     """
-    nose, behind = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
     if min(np.count_nonzero(used[nose]), np.count_nonzero(used[behind])) < OUTLINE.fewest_at_end:
         return np.nan
     design = np.column_stack([slopes, np.where(nose, slopes[:, 0], 0.0)])

@@ -257,6 +257,12 @@ class StandingConstants:
     """Largest displacement along the channel of a robot that stands, pixels."""
     turned: float = radians(1.0)
     """Largest rotation of its body and of its tail, rad."""
+    blur: float = 2.0
+    """Standard deviation of the blur under which pictures are compared with their background, pixels."""
+    at_rest: float = 0.999
+    """Share of the pixels that change by noise alone where nothing moves."""
+    noise: float = 5.0
+    """Largest change by noise, of 255; it was 1.5 in empty tubes, and 30 and more with a slow robot."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.optional_dependencies import import_optional
 from spirillum.vision.camera.optics import BodyPose, Optics, opposite, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
@@ -113,6 +114,11 @@ def identify(
     standing = None if half else _standing(name, setup, stated, frames, still)
     if standing is not None and standing.robot:
         return standing
+    if standing is None and isinstance(found, InputError) and _nothing_moves(frames, still):
+        raise InputError(
+            f"{name}: nothing moves in its pictures, and no robot like '{stated.robot.name}' stands in them: the tube "
+            "seems to be empty; allowed: a robot in view, or one at rest with stripes and tail in view"
+        ) from found
     other = _at_another_size(name, setup, stated, frames, still, half=half)
     if other is not None:
         return other
@@ -171,6 +177,17 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
             if striped is None and found.stripes.fits and found.stripes_read > IDENTITY.sure_share:
                 striped = found._replace(robot=False, stands=True)
     return striped
+
+
+def _nothing_moves(frames: list[Frame], still: Samples) -> bool:
+    """Whether noise alone tells the frames from their background."""
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    for frame in frames:
+        image = frame.reduced(frame.image.shape[1] // still.shape[1])
+        change = cv2.GaussianBlur(np.subtract(image, still, dtype=np.float32), (0, 0), STANDING.blur).mean(axis=2)
+        if np.quantile(np.abs(change - np.median(change)), STANDING.at_rest) > STANDING.noise:
+            return False
+    return True
 
 
 def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:

@@ -7,6 +7,7 @@ evenly. How much two steps at once change the picture tells what one lost frame 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -59,7 +60,7 @@ class PictureChange:
         size = max(1, round(share * part.shape[1])), max(1, round(share * part.shape[0]))
         grey = cv2.resize(part, size, interpolation=cv2.INTER_AREA).astype(np.float32)
         grey = cv2.GaussianBlur(grey, (0, 0), PICTURE_CHANGE.blur)
-        found = [float(np.sqrt(np.mean(np.square(grey - other)))) for other in self._last]
+        found = [cv2.norm(grey, other) / math.sqrt(grey.size) for other in self._last]
         self._last = [grey, *self._last[:1]]
         one, two = [*found, np.nan, np.nan][:2]
         return one, two

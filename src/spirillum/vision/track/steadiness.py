@@ -53,6 +53,8 @@ STEADINESS = SteadinessConstants()
 
 _STEPS, _STILL = 8, 0.01
 """Most Gauss-Newton steps, and the step below which they end, pixels."""
+_ROW = 100
+"""Edge pixels that are interpolated side by side."""
 _THREADS, _LARGE = 2, 6_000_000
 """Threads, and the bytes of a picture from which on one has to do, for its memory."""
 
@@ -158,16 +160,19 @@ def shift_between(one: Samples, other: Samples) -> float:
     peaks = peaks[np.argsort(-correlation[tuple(peaks.T)])[: STEADINESS.most_peaks]].tolist()
     slope_u, slope_v = (0.5 * cv2.Sobel(one, cv2.CV_32F, *order, ksize=1)[inside] for order in ((1, 0), (0, 1)))
     steep = np.hypot(slope_u, slope_v)
-    edge = steep > np.quantile(steep, STEADINESS.smooth_share)
-    slopes, there = np.stack([slope_u[edge], slope_v[edge]], axis=1), one[inside][edge]
+    edge = np.flatnonzero(steep > np.quantile(steep, STEADINESS.smooth_share))
+    edge = edge[: edge.size // _ROW * _ROW]
+    if not edge.size:
+        return 0.0
+    slopes, there = np.stack([slope_u.flat[edge], slope_v.flat[edge]], axis=1), one[inside].flat[edge]
+    row_of, column_of = (at.reshape(-1, _ROW) + STEADINESS.reach for at in np.unravel_index(edge, steep.shape))
     found = []
     for row, column in [*peaks, [STEADINESS.reach, STEADINESS.reach]]:
         shift = np.array([column, row], dtype=float) - STEADINESS.reach
         residual = np.zeros(0)
         for _ in range(_STEPS):
-            back = np.array([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]])
-            moved = cv2.warpAffine(other, back, other.shape[::-1], flags=cv2.INTER_CUBIC)
-            residual = moved[inside][edge] - there
+            at_u, at_v = (column_of + shift[0]).astype(np.float32), (row_of + shift[1]).astype(np.float32)
+            residual = cv2.remap(other, at_u, at_v, cv2.INTER_CUBIC).ravel() - there
             scale = 3.0 * float(mad_scale(residual)) + 1e-3
             weight = np.clip(1.0 - (residual / scale) ** 2, 0.0, None) ** 2
             normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(2)

@@ -109,9 +109,10 @@ def edge_shifts(
         seen = levels[near]
         if near.sum() < WIDTHS.fewest or not np.isfinite(seen).all():
             continue
-        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])[..., None]  # of the stripe behind the edge
-        misses = seen - shade[near, 3:] - shade[near, :3] * (before + (after - before) * share)
-        losses = np.sum(misses**2, axis=(1, 2))
+        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])  # of the stripe behind the edge
+        behind = seen - shade[near, 3:] - shade[near, :3] * before  # what a share of 0 misses, and of 1 besides
+        step = shade[near, :3] * (after - before)
+        losses = np.sum(behind**2) + share**2 @ np.sum(step**2, axis=1) - 2.0 * share @ np.sum(behind * step, axis=1)
         best = int(np.argmin(losses))
         if not 0 < best < shifts.size - 1:
             continue
