@@ -3,6 +3,7 @@
 import ast
 import pickle
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,21 @@ from spirillum.notes import KINDS, LONGEST, Note, note_attributes, notes_in, sho
 ROOT = Path(__file__).parent.parent
 
 
+@cache
+def calls() -> list[tuple[str, list[ast.expr]]]:
+    """Names and arguments of the calls of notes and flags in the package."""
+    texts = (path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    nodes = (node for text in texts if "Note(" in text or "Flag(" in text for node in ast.walk(ast.parse(text)))
+    return [(getattr(node.func, "id", ""), node.args) for node in nodes if isinstance(node, ast.Call)]
+
+
 def literals(name: str) -> Iterator[tuple[str, str]]:
     """Codes, and sentences where they are literal, of all calls of a class in the package."""
-    for path in (ROOT / "src").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == name and len(node.args) > 1:
-                code, sentence = (item.value if isinstance(item, ast.Constant) else "" for item in node.args[:2])
-                if code:
-                    yield code, sentence
+    for called, arguments in calls():
+        if called == name and len(arguments) > 1:
+            code, sentence = (item.value if isinstance(item, ast.Constant) else "" for item in arguments[:2])
+            if code:
+                yield code, sentence
 
 
 def test_every_code_is_explained_and_every_explained_code_is_used() -> None:

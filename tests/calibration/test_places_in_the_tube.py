@@ -13,6 +13,7 @@ from scipy.optimize import root
 
 import spirillum as sp
 from spirillum import InputError
+from spirillum.calibration.calibrated import Calibrated
 from spirillum.fluid.tube.tabled import tabled
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
@@ -75,13 +76,22 @@ def on_asperities(name: str, roughness: float, coefficient: float, tail_rate: fl
 
 
 @pytest.fixture(scope="module")
-def one_gap(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with observations of a robot at one gap, and the posterior of the gap."""
-    folder = tmp_path_factory.mktemp("tube")
-    path = written(folder / "o.csv", {WIDE: by_table(WIDE, GAP)})
-    found = sp.calibrate(path, WIDE, model="tube", free="gap", sampling=SHORT)
-    write_calibration(found, folder / "fitted", figures=False)
-    return folder
+def observed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Observations of a robot at one gap."""
+    return written(tmp_path_factory.mktemp("tube") / "o.csv", {WIDE: by_table(WIDE, GAP)})
+
+
+@pytest.fixture(scope="module")
+def fitted(observed: Path) -> Calibrated:
+    """The gap that they give."""
+    return sp.calibrate(observed, WIDE, model="tube", free="gap", sampling=SHORT)
+
+
+@pytest.fixture(scope="module")
+def one_gap(observed: Path, fitted: Calibrated) -> Path:
+    """A folder with the observations, and the posterior of the gap."""
+    write_calibration(fitted, observed.parent / "fitted", figures=False)
+    return observed.parent
 
 
 def test_a_gap_that_explains_nothing_is_not_said_to_matter_nowhere(tmp_path: Path) -> None:
@@ -180,7 +190,7 @@ def test_intervals_of_gap_and_pitch_hold_what_was_planted(tmp_path: Path) -> Non
     assert any("as many free numbers as means of the speed" in warning for warning in found.warnings)
 
 
-def test_a_posterior_that_piles_up_at_the_end_of_its_prior_says_so(one_gap: Path, tmp_path: Path) -> None:
+def test_a_posterior_that_piles_up_at_the_end_of_its_prior_says_so(fitted: Calibrated, tmp_path: Path) -> None:
     """A robot a twentieth slower than at the least gap that a fit tries; at a gap inside, nothing is said."""
     speed, tail, body = by_table(WIDE, 1e-4)
     path = written(tmp_path / "slow.csv", {WIDE: (0.95 * speed, tail, 1.05 * body)}, error=0.005)
@@ -189,8 +199,7 @@ def test_a_posterior_that_piles_up_at_the_end_of_its_prior_says_so(one_gap: Path
     assert len(said) == 1
     assert "gap" in said[0]
     assert "at the lower end of its prior (0.0001 m)" in said[0]
-    inside = sp.calibrate(one_gap / "o.csv", WIDE, model="tube", free="gap", sampling=SHORT)
-    assert not any("of the posterior lies" in sentence for sentence in inside.warnings)
+    assert not any("of the posterior lies" in sentence for sentence in fitted.warnings)
 
 
 def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:

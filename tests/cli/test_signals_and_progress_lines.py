@@ -44,8 +44,12 @@ def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tup
         start_new_session=True,
     )
     assert process.stderr is not None
-    said = process.stderr.readline() if command[0] == "prepare" else ""
-    time.sleep(4.0)
+    if command[0] == "prepare":
+        said = process.stderr.readline()  # it is at work
+        time.sleep(0.5)
+    else:
+        said = ""
+        time.sleep(4.0)
     (os.killpg if group else os.kill)(process.pid, number)
     _, rest = process.communicate(timeout=60)
     end = time.monotonic() + 20.0

@@ -95,13 +95,14 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
     ("offset", "tolerance", "allowed"),
     [
         (0.2, 1e-2, 2e-7),
-        (0.53, 1e-2, 1e-4),
+        (0.45, 1e-2, 1e-4),
         pytest.param(0.2, 1e-3, 1e-8, marks=pytest.mark.slow),
+        pytest.param(0.53, 1e-2, 1e-4, marks=pytest.mark.slow),
         pytest.param(0.53, 4e-3, 2e-4, marks=pytest.mark.slow),
     ],
 )
 def test_a_capsule_that_is_hardly_pitched_is_level(offset: float, tolerance: float, allowed: float) -> None:
-    """On rings that meet every wave by themselves, however coarsely waves are cut; also over a film of 0.04 radii."""
+    """On rings that meet every wave by themselves, however coarsely waves are cut; also over a thin film."""
     level, hardly = (
         held_in_tube(Solids([(capsule(), 0)], Seat(1.0, offset, pitch), Fineness(tolerance=tolerance)), [])
         for pitch in (0.0, 1e-9)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
+from spirillum.measurement.measure import Measurement
 from spirillum.measurement.setup_template import setup_answer
 from spirillum.results.measurement import measure
 
@@ -39,8 +40,14 @@ def scene(flat_pictures: ModuleType, tmp_path_factory: pytest.TempPathFactory) -
     return Scene(film, setup, trial.track.picture[:, :2])
 
 
-def test_a_track_in_pixels_is_taken(scene: Scene) -> None:
-    (trial,) = measure(scene.film, scene.setup, track=scene.table(lambda places: places)).trials
+@pytest.fixture(scope="module")
+def taken(scene: Scene) -> Measurement:
+    """What is measured by the robot's own places."""
+    return measure(scene.film, scene.setup, track=scene.table(lambda places: places))
+
+
+def test_a_track_in_pixels_is_taken(taken: Measurement) -> None:
+    (trial,) = taken.trials
     assert [flag.name for flag in trial.flags if "track" in flag.name] == []
     assert trial.quantities["forward_velocity"].value == pytest.approx(2e-3, rel=0.01)
 
@@ -71,11 +78,13 @@ def test_a_track_that_cannot_be_compared_is_flagged(scene: Scene, monkeypatch: p
     assert "track-not-checked" in [flag.name for flag in trial.flags]
 
 
-def test_what_a_check_says_of_uncertainties_a_measurement_repeats(scene: Scene, tmp_path: Path) -> None:
+def test_what_a_check_says_of_uncertainties_a_measurement_repeats(
+    scene: Scene, taken: Measurement, tmp_path: Path
+) -> None:
     table = scene.table(lambda places: places)
     remark = [words for words in setup_answer(scene.setup)["warnings"] if "states no uncertainty" in words]
     assert len(remark) == 1
-    assert measure(scene.film, scene.setup, track=table).warnings.count(remark[0]) == 1
+    assert taken.warnings.count(remark[0]) == 1
     known = tmp_path / "known.toml"
     known.write_text('camera.height_uncertainty = "2 mm"\n' + scene.setup.read_text())
     assert remark[0] not in measure(scene.film, known, track=table).warnings

@@ -53,6 +53,18 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store
 
 
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same store, interrupted before its notes are summed up; nobody changes it."""
+    store = tmp_path_factory.mktemp("interrupted") / "study.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(regions, "BLOCK", 7)
+        patch.setattr(study_store, "_summed", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            sp.study(GRID, store=store)
+    return store
+
+
 def tree(folder: Path) -> dict[str, str]:
     """All files with what stands in them, as a hash."""
     files = [path for path in folder.rglob("*") if path.is_file()]
@@ -173,13 +185,10 @@ def test_what_was_spoilt_in_a_finished_store_is_made_again(
     "note", ["[]", '{"cautions": 3, "unanswered": 0}', '{"cautions": [[1]], "unanswered": 0}', "{"]
 )
 def test_a_spoilt_note_of_an_interrupted_store_is_made_again(
-    note: str, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+    note: str, tmp_path: Path, whole: Path, interrupted: Path
 ) -> None:
     store = tmp_path / "study.zarr"
-    with monkeypatch.context() as patch:
-        patch.setattr(study_store, "_summed", Mock(side_effect=KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            sp.study(GRID, store=store)
+    shutil.copytree(interrupted, store)
     next((store / "notes").iterdir()).write_text(note)
     sp.study(GRID, store=store)
     assert tree(store) == tree(whole)

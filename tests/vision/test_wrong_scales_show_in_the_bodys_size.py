@@ -13,7 +13,7 @@ from spirillum.vision.track.size import checked_scale
 pytest.importorskip("av")
 pytest.importorskip("cv2")
 
-FRAMES, FPS = 24, 4.0
+FRAMES, FPS = 12, 2.0
 SIZE = 2.0 * np.hypot(0.005, 0.2 / 35.0)
 """Two of the stated standard errors of the apparent size: half a body has 35 pixels here."""
 
