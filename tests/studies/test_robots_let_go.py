@@ -1,4 +1,4 @@
-"""Robots of a study that are let go answer as each does alone, and order the ranking."""
+"""Robots of a study that are released answer as each does alone, and order the ranking."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
 
 
 def ranked(*speeds: float) -> StudyRanking:
-    """Three held tails, with these speeds of steady motions as if they had been let go."""
+    """Three held tails, with these speeds of steady motions as if they had been released."""
     grid = {**LET["grid"], "wavelengths": ["15 mm", "20 mm", "25 mm"]}
     held = sp.study({**LET, "grid": grid, "settled": False})
     values = np.reshape(speeds, (1, 3, 1))
@@ -106,11 +106,11 @@ def test_nothing_fitted_goes_with_it(given: str, tmp_path) -> None:
 
 
 def test_robots_that_are_not_let_go_are_told_by_what_they_lack() -> None:
-    """A table, or room where they would be laid down; then nothing is said of what settled speeds are."""
+    """A table, or room at the initial pose; then no basis of settled speeds is given."""
     grid = {**LET["grid"], "amplitudes": ["2.4 mm", "9.3 mm"]}
     said = sp.study({**LET, "models": ["rft"], "grid": grid}).attrs["warnings"]
     assert "1 of 2 robots have no table with yawed poses and were not released, the first: " in said
-    assert "1 of 2 robots cannot lie where they would be laid down and were not let go, the first: " in said
+    assert "1 of 2 robots do not fit at the initial pose and were not released, the first: " in said
     assert "settled speeds assume" not in said
 
 

@@ -1,6 +1,6 @@
 """From observations to parameters, with what they are worth.
 
-Which hydrodynamic model is fitted where nobody names one: that with which `spirillum.predict` answers.
+Which hydrodynamic model is fitted where none is named: that with which `spirillum.predict` answers.
 A model without walls fitted to robots in a tube gives factors and friction that hold what the walls do: a friction
 planted in a tube comes back a fifth off. Where every observed robot has the table of its tube, `tube` is fitted.
 """

@@ -226,7 +226,7 @@ _LISTED = (
     ),
     FitParameter(
         "roughness",
-        "height of the asperities on which the robot lies, which decides its gap, one for all channels",
+        "height of the asperities on which the robot rests, which decides its gap, one for all channels",
         "m",
         "all",
         ("tube",),
@@ -300,7 +300,7 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
     for name in names:
         check_choice("free", name, PARAMETERS)
         if names.count(name) > 1:
-            raise InputError(f"free = '{name}' stands twice; allowed: once")
+            raise InputError(f"free = '{name}' is a duplicate; allowed: once")
         if model not in PARAMETERS[name].models:
             raise InputError(
                 f"free = '{name}' with model '{model}'; allowed: "
@@ -323,8 +323,8 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
         fields = {name: field for field, name in ASSUMABLE.items()}
         raise InputError(
             f"free = 'friction' together with {' and '.join(repr(name) for name in bound)}: B_eff of each tail takes "
-            "up its motor rate, which leaves nothing observed to tell them apart; allowed: shared_friction in place of "
-            f"friction, or the uncertainty of {fields[bound[0]]} stated (--assume-uncertainty "
+            "up its motor rate, which leaves no observation that distinguishes them; allowed: shared_friction in place "
+            f"of friction, or the uncertainty of {fields[bound[0]]} stated (--assume-uncertainty "
             f"{fields[bound[0]]}=5%) in place of freeing it"
         )
     return names

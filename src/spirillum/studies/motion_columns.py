@@ -182,4 +182,4 @@ def column_variables(
 def _meaning(name: str) -> str:
     """Meaning of a value of a trial."""
     end = name.rpartition("_")[2]
-    return "mean over a trial" if end not in ENDS else f"over what nobody states of a trial: {end} (90 % interval)"
+    return "mean over a trial" if end not in ENDS else f"over what is not stated of a trial: {end} (90 % interval)"

@@ -1,7 +1,7 @@
 """Robots of a study released in their tubes: the runs of an experiment with nothing fitted, and steady states.
 
 Publications do not report the initial placement. For the experiment, each robot makes the runs of a design of
-experiments over what decides: gap and pitch at which it is laid down, time until its motor is switched on, height of
+experiments over what decides: gap and pitch at release, time until its motor is switched on, height of
 the asperities, and coefficient of dry friction. Every run is one of `spirillum.simulate` with the model `tube`, read as
 a camera above the channel reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag
 by (15).
@@ -106,7 +106,7 @@ class LaidDownTask(OneRobot):
     @property
     def words(self) -> str:
         """Progress message."""
-        return f"laid down: {self.robot.with_tail}"
+        return f"runs after release: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -220,8 +220,7 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
         return []
     words = (
         f"{np.count_nonzero(~known)} of {known.size} runs of released robots have no answer: they leave their "
-        "table; use "
-        "other ranges in [laid_down]"
+        "table; use other ranges in [laid_down]"
     )
     return [Note("without-answer", words, ("laid_down",))]
 
@@ -254,7 +253,7 @@ class SettledTask(OneRobot):
     @property
     def words(self) -> str:
         """Progress message."""
-        return f"let go: {self.robot.with_tail}"
+        return f"steady state: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -350,7 +349,7 @@ def settled_variables(
     state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(STATES) - 1).astype("int8")
     about = {
         "units": "1",
-        "long_name": "what became of a robot that was let go",
+        "long_name": "outcome for a robot after release",
         "source": "free motion in the tube",
         "flag_values": np.arange(len(STATES), dtype="int8"),
         "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
