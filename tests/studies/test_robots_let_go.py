@@ -8,7 +8,7 @@ from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
 from spirillum.studies.ranking import LET_GO, StudyRanking, best_in_words, ranking_of
-from spirillum.studies.released_robots import STATES, SettledTask, not_settled
+from spirillum.studies.released_robots import SETTLED_STATES, SettledTask, not_settled
 from spirillum.studies.spec import Contact
 from spirillum.view.figures.comparison import ranking_picture
 
@@ -32,7 +32,7 @@ def let_go():
 
 def test_its_steady_motion_is_slower_than_held_and_beside_the_floor(let_go) -> None:
     here = let_go.squeeze()
-    assert STATES[int(here["settled"])] == "steady"
+    assert SETTLED_STATES[int(here["settled"])] == "steady"
     assert 0.0 < float(here["forward_velocity_settled"]) < float(here["forward_velocity"])
     assert 0.0 < float(here["gap_settled"]) < 2e-5  # on its asperities
     assert 0.0 < float(here["approach_time_settled"]) < 1e3
@@ -47,7 +47,7 @@ def test_each_robot_answers_as_alone(let_go) -> None:
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"):
         assert float(here[f"{name}_settled"]) == pytest.approx(getattr(alone, name), rel=1e-9)
     assert float(here["gap_settled"]) == pytest.approx(alone.lying.gap, rel=1e-9)
-    assert STATES[int(here["settled"])] == alone.lying.state
+    assert SETTLED_STATES[int(here["settled"])] == alone.lying.state
 
 
 def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:

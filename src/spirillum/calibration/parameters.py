@@ -253,6 +253,8 @@ DEFAULT_FREE = {
     "tube": ("gap", "friction"),
 }
 """Free parameters by default: those that the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
+_FREE_IN_TRIALS = ("friction_coefficient", "shared_friction")
+"""Free parameters of a fit of trials by default; without motor rates the first alone."""
 
 
 ASSUMABLE = {
@@ -290,12 +292,12 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
     """Names of the free parameters.
 
     Args:
-        free: names, or one text with commas; None: those that the paper fitted.
+        free: names, or one text with commas; None: the default ones.
         model: name of the model.
         released: trials are fitted, in which the run decides where the robot lies.
     """
     if free is None:
-        return DEFAULT_FREE[model]
+        return _FREE_IN_TRIALS if released else DEFAULT_FREE[model]
     names = listed_names(free)
     for name in names:
         check_choice("free", name, PARAMETERS)
@@ -341,8 +343,10 @@ _IN_PLACE_OF = {
 """Parameter to the field whose value a fit does not look at; priors of the others are around the robot's own values."""
 
 
-def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model: str) -> None:
-    """Refuse set fields of a robot that the observations replace, or a fit without having looked at them."""
+def check_not_set(
+    fields: Iterable[str], free: str | Sequence[str] | None, model: str, *, released: bool = False
+) -> None:
+    """Refuse set fields of a robot that the observations replace, or a fit, of trials if `released`, ignores."""
     asked = set(fields)
     observed = [field for field in OBSERVED if field in asked]
     if observed:
@@ -351,11 +355,11 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
             "allowed: other fields"
         )
     for known in _possible_models(model, free):
-        for name in free_names(free, known, released=True):
+        for name in free_names(free, known, released=released and known == WALLED):
             field = _IN_PLACE_OF.get(name, "").format(model=known)
             if field in asked:
                 raise InputError(
-                    f"{field} is set, and the fit of '{name}' does not look at it; allowed: one of them (--free names "
+                    f"{field} is set, and the fit of '{name}' ignores it; allowed: one of them (--free names "
                     "what is fitted)"
                 )
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.steady import swim
+from spirillum.swimming.steady_state import State
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -237,8 +238,8 @@ SETTLED = (
 """Quantities of a steady motion."""
 PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
 """Pose of a robot in it, and its time constant."""
-STATES = ("not followed", "steady", "orbits", "goes around", "changing")
-"""What became of a robot; the index in this list is the value in the dataset."""
+SETTLED_STATES = ("not followed", *get_args(State))
+"""Outcome for a robot; the index in this list is the value in the dataset."""
 
 
 @dataclass(frozen=True)
@@ -275,7 +276,7 @@ class SettledTask(OneRobot):
         found = motion.prediction
         lying = found.lying
         assert lying is not None  # noqa: S101 - a free motion has one
-        state = np.array([float(STATES.index(lying.state))])
+        state = np.array([float(SETTLED_STATES.index(lying.state))])
         if lying.state == "changing":  # its means depend on when they are taken
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
@@ -346,13 +347,13 @@ def settled_variables(
             name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
         )
         found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
-    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(STATES) - 1).astype("int8")
+    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(SETTLED_STATES) - 1).astype("int8")
     about = {
         "units": "1",
         "long_name": "outcome for a robot after release",
         "source": "free motion in the tube",
-        "flag_values": np.arange(len(STATES), dtype="int8"),
-        "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
+        "flag_values": np.arange(len(SETTLED_STATES), dtype="int8"),
+        "flag_meanings": " ".join(word.replace(" ", "-") for word in SETTLED_STATES),
     }
     about_error = attributes(
         "error_estimate",
