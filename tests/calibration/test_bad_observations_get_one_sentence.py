@@ -77,7 +77,7 @@ def test_wrong_observations_name_row_and_column(
         ({"method": "guess"}, "method = 'guess'"),
         ({"friction": "body"}, "friction = 'body'; allowed: rotor, paper"),
         ({"free": "drag"}, "free = 'drag'"),
-        ({"free": "body_drag,body_drag"}, "stands twice"),
+        ({"free": "body_drag,body_drag"}, "is a duplicate"),
         ({"free": "normal_factor"}, "free = 'normal_factor' with model 'sbt'"),
         ({"free": "friction,shared_friction"}, "one of them"),
         ({"free": "friction", "method": "least-squares"}, "nothing to fit"),

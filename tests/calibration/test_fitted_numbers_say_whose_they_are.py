@@ -106,7 +106,7 @@ def test_a_fit_refuses_a_field_that_it_does_not_look_at(run: Callable[..., Any],
     for setting, name in (("calibration.sbt.body_drag=30", "body_drag"), ("friction.effective=1e-9 N m s", "friction")):
         outcome = run("calibrate", str(tmp_path / "o.csv"), WIDE, "--set", setting)
         assert outcome.code == 2
-        assert f"{setting.split('=')[0]} is set, and the fit of '{name}' does not look at it" in outcome.err
+        assert f"{setting.split('=')[0]} is set, and the fit of '{name}' ignores it" in outcome.err
     outcome = run("calibrate", str(tmp_path / "o.csv"), WIDE, "--set", "fluid.viscosity=3 Pa s")
     assert "o.csv does not exist" in outcome.err
 

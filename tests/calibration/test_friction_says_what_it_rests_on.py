@@ -1,4 +1,4 @@
-"""B_eff rests on viscosity and motor constants: sensitivities, stated uncertainties, and what cannot be told apart."""
+"""B_eff rests on viscosity and motor constants: sensitivities, stated uncertainties, and what is not separable."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -171,7 +171,7 @@ def test_numbers_that_cannot_be_told_apart_are_refused_by_name(
     made: Callable[..., Path], free: str, model: str, named: set[str]
 ) -> None:
     """Torques scale with K_m, mu and B_eff together; motion per turn with ratios of resistances alone."""
-    with pytest.raises(sp.InputError, match="cannot be told apart by anything observed") as caught:
+    with pytest.raises(sp.InputError, match="cannot be distinguished by the observations") as caught:
         fitted(made(seed=1), PRESETS, free=free, model=model)
     words = str(caught.value).partition(": ")[2].partition(" cannot")[0]
     assert named <= set(words.replace(" and ", ", ").split(", "))

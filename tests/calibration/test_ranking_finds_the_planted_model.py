@@ -64,7 +64,7 @@ def test_equal_models_are_not_told_apart(made: Callable[..., Path]) -> None:
     fits = {"printed": sp.calibrate(path, WIDE, **settings), "exact": sp.calibrate(path, other, **settings)}
     ranking = ranked_fits(fits)
     assert not ranking.clear
-    assert "cannot be told apart" in ranking.verdict()
+    assert "cannot be distinguished" in ranking.verdict()
 
 
 def test_robots_that_cannot_be_left_out_name_no_winner(ranking: Any) -> None:
@@ -88,7 +88,7 @@ def test_a_few_tails_name_no_winner(ranking: Any, count: int) -> None:
     )
     short = replace(ranking, ranked=few)
     assert not short.clear
-    assert "too few to tell sbt and rft apart" in short.verdict()
+    assert "too few to distinguish sbt from rft" in short.verdict()
 
 
 @pytest.mark.parametrize(("count", "said"), [(1, "1 robot"), (2, "2 robots"), (3, "3 robots")])

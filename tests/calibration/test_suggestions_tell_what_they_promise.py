@@ -103,7 +103,7 @@ def test_a_tail_for_which_the_model_is_not_accurate_is_said(fitted: Path) -> Non
 
 def test_a_candidate_that_stands_twice_is_refused(fitted: Path) -> None:
     path = candidates(fitted, "40,20,2.5", "40,12,1.5", "40.0,20,2.50")
-    with pytest.raises(sp.InputError, match=r"candidates\.csv, .*wavelength_mm = 20, .* stands twice; allowed: each"):
+    with pytest.raises(sp.InputError, match=r"candidates\.csv, .*wavelength_mm = 20, .* is a duplicate; allowed: each"):
         sp.suggest(fitted / "posterior.nc", WIDE, candidates=path)
 
 

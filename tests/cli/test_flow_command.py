@@ -110,7 +110,7 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "no file is asked for"),
+        ([], "no file is requested"),
         (["-o", "flow.vti"], "does not end in .png or .pdf or .svg or .nc"),
         (["-o", "flow"], "does not end in"),
         (["--volume", "flow.png"], "does not end in .vti or .nc"),

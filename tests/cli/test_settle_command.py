@@ -41,7 +41,7 @@ def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -
     gap = answer["lying"]["gap"]
     assert gap["low"] <= gap["value"] <= gap["high"]
     assert f"{answer['drainage_time']['value']:.4g}" in tables.out
-    assert "on the way, as the gap first falls to 0.2 mm" in tables.out
+    assert "in transit, as the gap first falls to 0.2 mm" in tables.out
     assert "(mean over a turn of the tail, at least " in tables.out
     assert "found from the run at" in tables.out
     way = answer["way"]

@@ -138,7 +138,7 @@ def test_a_slow_remote_is_no_silent_camera(toy: Any) -> None:
 @pytest.mark.parametrize("asked", [np.nan, 1.5, -0.1])
 def test_a_wrong_command_ends_the_run_with_the_drive_off(toy: Any, asked: float) -> None:
     run = run_loop(toy(SPEED), Always(asked), lab(), 10.0)
-    assert run.ended.startswith("the controller asked for a duty of")
+    assert run.ended.startswith("the controller requested a duty of")
     assert run.moments[-1].values["duty"] == 0.0
     assert run.moments[-1].pose.position[0] == 0.0
 

@@ -57,7 +57,7 @@ def test_robots_that_stand_or_are_lost_are_counted_and_told() -> None:
     assert 0 < found.basis["without_answer"] < 0.2 * RUNS
     assert found.intervals["forward_velocity"].low > 1e-4
     said = " ".join(str(line) for line in released_columns({"trial": found.to_dict(), "steady": {"reason": "none"}}))
-    assert "trial, 90 % interval of the speed over what nobody states" in said
+    assert "trial, 90 % interval of the speed over what is not stated" in said
     assert "waiting time 1" in said
     none = over(lambda _: motion(0.0, "standing"))
     assert not none.intervals

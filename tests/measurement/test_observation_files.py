@@ -60,7 +60,7 @@ def test_one_trial_keeps_the_interval_that_it_states(tmp_path: Path) -> None:
         (["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_hz", "40,25,2.5,1"], "tail_rate_Hz"),
         (["channel_diameter_mm,wavelength_mm,tail_rate_Hz", "40,25,1"], "'amplitude_mm' is missing"),
         (["channel_diameter_mm,wavelength_mm,amplitude_mm", "40,25,2.5"], "no measured column"),
-        ([HEADER + ",robot", "a,40,25,2.5,1,1.0,1.2,-0.1,a"], "'robot' stands twice"),
+        ([HEADER + ",robot", "a,40,25,2.5,1,1.0,1.2,-0.1,a"], "'robot' is a duplicate"),
         ([HEADER, "a,40,25,2.5,1,fast,1.2,-0.1"], "row 2, column forward_velocity_mm_s: 'fast'"),
         ([HEADER, "a,40,25,2.5,1,nan,1.2,-0.1"], "row 2, column forward_velocity_mm_s: 'nan'"),
         ([HEADER, "a,40,25,2.5,1,1e999,1.2,-0.1"], "column forward_velocity_mm_s"),

@@ -253,7 +253,7 @@ def test_readings_between_other_marks(tmp_path: Path, mark: str) -> None:
         ("frame,x_pixel\n1,2\n", "column 'x_pixel' is unknown (did you mean x_px?)"),
         ("x_px\n1\n", "neither column 'frame' nor 'time_s' is there"),
         ("frame,video\n1,a\n", "holds no readings; allowed: at least one column of x_px"),
-        ("frame,x_px,x_px\n1,2,3\n", "column 'x_px' stands twice"),
+        ("frame,x_px,x_px\n1,2,3\n", "column 'x_px' is a duplicate"),
         ("frame,x_px\n1,2\n2,two\n", "row 3, column x_px: 'two'; allowed: a number, or empty"),
         ("frame,x_px\n1,2\n2,1_0\n", "row 3, column x_px: '1_0'"),
         ("frame,x_px\n1,inf\n", "row 2, column x_px: 'inf'"),
@@ -279,7 +279,7 @@ def test_a_bad_table_of_readings_is_one_sentence(tmp_path: Path, text: str, word
     [
         ("x,y\n1,2\n", "column 'frame' is missing"),
         ("x,y,frame,particle\n1,2,0,0\n1,2,1,1\n", "column particle: 2 particles; allowed: the robot's alone"),
-        ("x,y,frame\n1,2,0\n1,2,0\n", "frame 0 stands twice"),
+        ("x,y,frame\n1,2,0\n1,2,0\n", "frame 0 is a duplicate"),
         ("x,y,frame\n1,2,-1\n", "row 2, column frame: '-1'"),
         ("x,y,frame\n1,2,0\n15000,2,1\n", "row 3, column x: '15000'; allowed: 0 to 639, inside the picture"),
         (

@@ -108,14 +108,14 @@ def test_robots_lie_where_the_calibration_places_those_of_their_channel(tmp_path
     own = sp.study({**study, "models": ["tube"], "robots": [WIDE], "placement": {"gap": "1 mm"}}, calibration=path)
     placed = sp.predict(WIDE, model="tube", placement={"gap": "1 mm"}, band=False)
     assert float(own["forward_velocity"].squeeze()) == pytest.approx(placed.forward_velocity, rel=1e-12)
-    with pytest.raises(InputError, match="says where the robots lie; allowed: the study without a band"):
+    with pytest.raises(InputError, match="gives the robots' pose; allowed: the study without a band"):
         sp.study({**study, "models": ["tube"], "robots": [WIDE], "band": True}, calibration=path)
 
 
 def test_dry_friction_that_a_study_does_not_know_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "calibration.toml"
     path.write_text('[contact]\nroughness = "20 um"\nfriction_coefficient = 0.2\n')
-    with pytest.raises(InputError, match="has a friction_coefficient, and a study knows no dry friction"):
+    with pytest.raises(InputError, match="has a friction_coefficient, and a study models no dry friction"):
         sp.study({"models": ["tube"], "robots": [WIDE]}, calibration=path)
 
 

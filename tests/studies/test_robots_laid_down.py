@@ -1,4 +1,4 @@
-"""Robots laid down and let go: the readings are those of the runs, and verdicts follow from them alone."""
+"""Robots released from rest: the readings are those of the runs, and verdicts follow from them alone."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ SHORT = {
 
 @pytest.fixture(scope="module")
 def short():
-    """Both presets, laid down and let go for 2.4 s."""
+    """Both presets, released from rest for 2.4 s."""
     return sp.study(SHORT)
 
 

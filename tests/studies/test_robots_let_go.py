@@ -1,4 +1,4 @@
-"""Robots of a study that are let go answer as each does alone, and order the ranking."""
+"""Robots of a study that are released answer as each does alone, and order the ranking."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
 from spirillum.studies.ranking import LET_GO, StudyRanking, best_in_words, ranking_of
-from spirillum.studies.released_robots import STATES, SettledTask, not_settled
+from spirillum.studies.released_robots import SETTLED_STATES, SettledTask, not_settled
 from spirillum.studies.spec import Contact
 from spirillum.view.figures.comparison import ranking_picture
 
@@ -32,7 +32,7 @@ def let_go():
 
 def test_its_steady_motion_is_slower_than_held_and_beside_the_floor(let_go) -> None:
     here = let_go.squeeze()
-    assert STATES[int(here["settled"])] == "steady"
+    assert SETTLED_STATES[int(here["settled"])] == "steady"
     assert 0.0 < float(here["forward_velocity_settled"]) < float(here["forward_velocity"])
     assert 0.0 < float(here["gap_settled"]) < 2e-5  # on its asperities
     assert 0.0 < float(here["approach_time_settled"]) < 1e3
@@ -47,7 +47,7 @@ def test_each_robot_answers_as_alone(let_go) -> None:
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"):
         assert float(here[f"{name}_settled"]) == pytest.approx(getattr(alone, name), rel=1e-9)
     assert float(here["gap_settled"]) == pytest.approx(alone.lying.gap, rel=1e-9)
-    assert STATES[int(here["settled"])] == alone.lying.state
+    assert SETTLED_STATES[int(here["settled"])] == alone.lying.state
 
 
 def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
@@ -61,7 +61,7 @@ def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
 
 
 def ranked(*speeds: float) -> StudyRanking:
-    """Three held tails, with these speeds of steady motions as if they had been let go."""
+    """Three held tails, with these speeds of steady motions as if they had been released."""
     grid = {**LET["grid"], "wavelengths": ["15 mm", "20 mm", "25 mm"]}
     held = sp.study({**LET, "grid": grid, "settled": False})
     values = np.reshape(speeds, (1, 3, 1))
@@ -106,11 +106,11 @@ def test_nothing_fitted_goes_with_it(given: str, tmp_path) -> None:
 
 
 def test_robots_that_are_not_let_go_are_told_by_what_they_lack() -> None:
-    """A table, or room where they would be laid down; then nothing is said of what settled speeds are."""
+    """A table, or room at the initial pose; then no basis of settled speeds is given."""
     grid = {**LET["grid"], "amplitudes": ["2.4 mm", "9.3 mm"]}
     said = sp.study({**LET, "models": ["rft"], "grid": grid}).attrs["warnings"]
     assert "1 of 2 robots have no table with yawed poses and were not released, the first: " in said
-    assert "1 of 2 robots cannot lie where they would be laid down and were not let go, the first: " in said
+    assert "1 of 2 robots do not fit at the initial pose and were not released, the first: " in said
     assert "settled speeds assume" not in said
 
 

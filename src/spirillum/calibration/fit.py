@@ -1,6 +1,6 @@
 """From observations to parameters, with what they are worth.
 
-Which hydrodynamic model is fitted where nobody names one: that with which `spirillum.predict` answers.
+Which hydrodynamic model is fitted where none is named: that with which `spirillum.predict` answers.
 A model without walls fitted to robots in a tube gives factors and friction that hold what the walls do: a friction
 planted in a tube comes back a fifth off. Where every observed robot has the table of its tube, `tube` is fitted.
 """
@@ -33,7 +33,6 @@ from spirillum.calibration.fit_warnings import (
 )
 from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement, torque_error
 from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
-from spirillum.calibration.in_trial import DEFAULT_FREE
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.paper_method import paper_fit
@@ -130,9 +129,7 @@ def fit_model(
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
     experiment = read_experiment(observations, given_robots(robots))
     choice = choose_fitted_model(model, experiment, free, method)
-    names = free_names(
-        DEFAULT_FREE if free is None and answer == RELEASED else free, choice.model, released=answer == RELEASED
-    )
+    names = free_names(free, choice.model, released=answer == RELEASED)
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name not in ("friction", "shared_friction"))
     if method == "posterior":  # before tables and trials are computed

@@ -82,8 +82,8 @@ def check_identifiable(problem: Problem, z: Samples) -> None:
     fields = [place for item in named for place, name in ASSUMABLE.items() if name == item.parameter.name]
     stated = f", or the uncertainty of one stated (--assume-uncertainty {fields[0]}=5%)" if fields else ""
     raise InputError(
-        f"free = '{', '.join(problem.free)}': {_listed([item.label for item in named])} cannot be told apart by "
-        f"anything observed in {problem.experiment.source}, for changed together they leave every prediction as it "
+        f"free = '{', '.join(problem.free)}': {_listed([item.label for item in named])} cannot be distinguished "
+        f"by the observations in {problem.experiment.source}, for changed together they leave every prediction as it "
         f"is; allowed: without one of them{stated}"
     )
 

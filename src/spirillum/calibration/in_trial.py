@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 FREE = ("shared_friction", "friction_coefficient", "roughness")
 """Parameters that a fit of trials may free: where a robot lies follows from the run."""
-DEFAULT_FREE = ("friction_coefficient", "shared_friction")
-"""Free parameters by default; without motor rates the first alone."""
 _RUNS = {1: 16, 2: 32, 3: 64}
 """Trials of each robot, by the number of free parameters."""
 _FEWEST = 0.75

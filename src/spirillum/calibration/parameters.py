@@ -226,7 +226,7 @@ _LISTED = (
     ),
     FitParameter(
         "roughness",
-        "height of the asperities on which the robot lies, which decides its gap, one for all channels",
+        "height of the asperities on which the robot rests, which decides its gap, one for all channels",
         "m",
         "all",
         ("tube",),
@@ -253,6 +253,8 @@ DEFAULT_FREE = {
     "tube": ("gap", "friction"),
 }
 """Free parameters by default: those that the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
+_FREE_IN_TRIALS = ("friction_coefficient", "shared_friction")
+"""Free parameters of a fit of trials by default; without motor rates the first alone."""
 
 
 ASSUMABLE = {
@@ -290,17 +292,17 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
     """Names of the free parameters.
 
     Args:
-        free: names, or one text with commas; None: those that the paper fitted.
+        free: names, or one text with commas; None: the default ones.
         model: name of the model.
         released: trials are fitted, in which the run decides where the robot lies.
     """
     if free is None:
-        return DEFAULT_FREE[model]
+        return _FREE_IN_TRIALS if released else DEFAULT_FREE[model]
     names = listed_names(free)
     for name in names:
         check_choice("free", name, PARAMETERS)
         if names.count(name) > 1:
-            raise InputError(f"free = '{name}' stands twice; allowed: once")
+            raise InputError(f"free = '{name}' is a duplicate; allowed: once")
         if model not in PARAMETERS[name].models:
             raise InputError(
                 f"free = '{name}' with model '{model}'; allowed: "
@@ -323,8 +325,8 @@ def free_names(free: str | Sequence[str] | None, model: str, *, released: bool =
         fields = {name: field for field, name in ASSUMABLE.items()}
         raise InputError(
             f"free = 'friction' together with {' and '.join(repr(name) for name in bound)}: B_eff of each tail takes "
-            "up its motor rate, which leaves nothing observed to tell them apart; allowed: shared_friction in place of "
-            f"friction, or the uncertainty of {fields[bound[0]]} stated (--assume-uncertainty "
+            "up its motor rate, which leaves no observation that distinguishes them; allowed: shared_friction in place "
+            f"of friction, or the uncertainty of {fields[bound[0]]} stated (--assume-uncertainty "
             f"{fields[bound[0]]}=5%) in place of freeing it"
         )
     return names
@@ -341,8 +343,10 @@ _IN_PLACE_OF = {
 """Parameter to the field whose value a fit does not look at; priors of the others are around the robot's own values."""
 
 
-def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model: str) -> None:
-    """Refuse set fields of a robot that the observations replace, or a fit without having looked at them."""
+def check_not_set(
+    fields: Iterable[str], free: str | Sequence[str] | None, model: str, *, released: bool = False
+) -> None:
+    """Refuse set fields of a robot that the observations replace, or a fit, of trials if `released`, ignores."""
     asked = set(fields)
     observed = [field for field in OBSERVED if field in asked]
     if observed:
@@ -351,11 +355,11 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
             "allowed: other fields"
         )
     for known in _possible_models(model, free):
-        for name in free_names(free, known, released=True):
+        for name in free_names(free, known, released=released and known == WALLED):
             field = _IN_PLACE_OF.get(name, "").format(model=known)
             if field in asked:
                 raise InputError(
-                    f"{field} is set, and the fit of '{name}' does not look at it; allowed: one of them (--free names "
+                    f"{field} is set, and the fit of '{name}' ignores it; allowed: one of them (--free names "
                     "what is fitted)"
                 )
 

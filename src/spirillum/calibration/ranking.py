@@ -122,16 +122,16 @@ class Ranking(DisplayMixin):
         if not self.enough:
             count = self.best.pointwise.size
             few = "1 tail is" if count == 1 else f"{count} tails are"
-            return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {_FEWEST_ROBOTS} are needed"
+            return f"{few} too few to distinguish {names[0]} from {names[1]}; at least {_FEWEST_ROBOTS} are needed"
         if not self.trusted:
             return (
                 f"{names[0]} and {names[1]} are not ranked: leaving out most of the {self.best.pointwise.size} robots "
-                f"cannot be trusted (Pareto k above {_PARETO:g}); more robots, or fewer free parameters, would tell"
+                f"cannot be trusted (Pareto k above {_PARETO:g}); more robots, or fewer free parameters, would decide"
             )
         how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
         if self.clear:
             return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
-        return f"{names[0]} and {names[1]} cannot be told apart: {how} in favour of {names[0]}"
+        return f"{names[0]} and {names[1]} cannot be distinguished: {how} in favour of {names[0]}"
 
     def failures(self, item: ModelRank) -> list[dict[str, Any]]:
         """Where a model fails: robots with the largest misfit, relative to what the fit expects of a robot."""

@@ -190,7 +190,7 @@ def _outside(known: PosteriorFile, robot: Robot) -> str:
     if model.placed:
         model = tabled(batch) or model
         if not isinstance(model, TabledTube):
-            return "it has no table of its tube that holds where robots lie; `spirillum prepare` makes one"
+            return "it has no table of its tube that covers the robots' poses; `spirillum prepare` makes one"
     outside = broken(requirements(batch, model))
     return outside[0].sentence() if outside else ""
 
@@ -327,6 +327,6 @@ def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
             raise InputError(f"{row.place}, column channel_diameter_mm: {row.text(_COLUMNS[0])}; allowed: {allowed}")
         if (channel, wavelength, amplitude) in found:
             tail = ", ".join(f"{name} = {row.text(name)}" for name in _COLUMNS)
-            raise InputError(f"{row.place}: {tail} stands twice; allowed: each candidate once")
+            raise InputError(f"{row.place}: {tail} is a duplicate; allowed: each candidate once")
         found[channel, wavelength, amplitude] = with_tail(robot, wavelength, amplitude)
     return list(found.values())

@@ -73,10 +73,12 @@ def calibrate(
     from spirillum.cli import renderer
     from spirillum.fitted.replaced import set_fields
     from spirillum.swimming.model_choice import AUTO
+    from spirillum.swimming.released_motion import RELEASED
 
     typed = request.typed
     robots = [loaded_robot(name, settings) for name in robot]
-    check_not_set(set_fields(overrides_from(settings)), typed.get("free"), typed.get("model", AUTO))
+    released = typed.get("answer") == RELEASED
+    check_not_set(set_fields(overrides_from(settings)), typed.get("free"), typed.get("model", AUTO), released=released)
     if (method := typed.get("method", "posterior")) in METHODS and method != "posterior":
         refuse_conflicts(context, "no posterior", method=method)
     with renderer.progress_bar(quiet=json) as progress:
@@ -142,12 +144,11 @@ def rank_models(
     from spirillum.cli import renderer
     from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
+    from spirillum.swimming.released_motion import HELD, RELEASED
 
-    fields = set_fields(overrides_from(settings))
-    for name, fitted in free_by_model(
-        request.typed.get("models"), request.typed.get("free"), request.typed.get("answer", "held")
-    ).items():
-        check_not_set(fields, fitted, name)
+    fields, answer = set_fields(overrides_from(settings)), request.typed.get("answer", HELD)
+    for name, fitted in free_by_model(request.typed.get("models"), request.typed.get("free"), answer).items():
+        check_not_set(fields, fitted, name, released=answer == RELEASED)
     names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
         robots = [loaded_robot(name, settings) for name in names] or None

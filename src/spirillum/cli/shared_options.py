@@ -180,7 +180,7 @@ TEXTS = {
     "degradation.glare_moves": "The glare stands still instead of moving with the body.",
     "seed": "Seed of all random numbers.",
     "task.at": "stop-at: x of the body's mid-length at which to stop, such as 5mm.",
-    "task.law": "keep-axis: `position` (feedback of the place) or `aim` (at a point of the axis ahead).",
+    "task.law": "keep-axis: `position` (feedback of the position) or `aim` (at a point of the axis ahead).",
     "task.rate": "keep-axis: rate of the field, such as 1Hz; else the robot's.",
     "task.speed": "Tasks of speed: along the robot's path, such as 0.1mm/s.",
     "task.tolerance": "Allowed distance from goal or course, such as 1mm.",

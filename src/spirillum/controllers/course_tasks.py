@@ -113,7 +113,7 @@ class KeepCourse(_Watching):
             duty: of the drive while it is on.
             set_speed: speed of the course, m/s, without sign.
             leash: l / (T v): so near to the robot the course is held; infinite: it is not.
-            knowing: whether it is told the truth.
+            knowing: whether it gets the true values.
             flow: for one that knows: the pulse.
             carried: way of the robot over the way of the mean flow.
         """
@@ -147,7 +147,7 @@ class SaveBattery(_Watching):
             duty: of the drive while it is on.
             set_speed: mean speed of the course, m/s, without sign.
             band: half width of the relay, m.
-            knowing: whether it is told the truth.
+            knowing: whether it gets the true values.
         """
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._band = set_speed, band
@@ -269,7 +269,7 @@ class HoldSpeedTask(_CourseTask):
     """Hold a speed by PWM: good within 5 %. Speeds are over 2 s, so that turns of the tail and a pulse do not count."""
 
     kind: ClassVar[str] = "hold-speed"
-    error_name: ClassVar[str] = "median speed of the second half less that asked for"
+    error_name: ClassVar[str] = "median speed of the second half less that requested"
     error_unit: ClassVar[str] = "m/s"
     leash: ClassVar[float] = LEASH
 

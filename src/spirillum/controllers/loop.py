@@ -150,7 +150,7 @@ class _Loop:
         command = asked if isinstance(asked, Command) else Command(float(asked))
         self._sights, self._readings = [], []
         if not 0.0 <= command.duty <= 1.0:
-            self.run.ended = f"the controller asked for a duty of {command.duty:g}; allowed: 0 to 1"
+            self.run.ended = f"the controller requested a duty of {command.duty:g}; allowed: 0 to 1"
             return False
         if silent:
             command = Command(0.0)

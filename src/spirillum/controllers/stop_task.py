@@ -156,7 +156,7 @@ class StopAtTask(Task):
     def goal(self) -> float:
         """`at`, m."""
         if self.at is None:
-            raise InputError("task.at is missing; allowed: the place at which to stop, such as 80 mm")
+            raise InputError("task.at is missing; allowed: the position at which to stop, such as 80 mm")
         return self.at
 
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:

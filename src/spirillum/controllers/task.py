@@ -23,7 +23,7 @@ CONTROLLERS = {
     FEEDBACK: "the task's controller",
     "nothing": "does nothing: the drive stays as the task finds it",
     "open-loop": "commands computed beforehand for the robot as its file says, without a look",
-    "knowing": "knows place, speed and coming flow without error",
+    "knowing": "knows position, speed and coming flow without error",
 }
 """Controllers of every task: its own, and the baselines."""
 _LONGEST = 24.0 * 3600.0

@@ -76,9 +76,9 @@ def _error(answer: Design, other: Alternative) -> tuple[float, str]:
         errors[f"that model '{answer.model}' states of a speed"] = stated
     if answer.learned is not None:
         known = answer.learned
-        errors["with which the learned model knows the best design"] = known.last
+        errors["of the learned model at the best design"] = known.last
         if other.name != "today":  # today's is solved for
-            errors["with which the learned model knows a design that it was not solved for"] = known.left_out
+            errors["of the learned model at a design that it was not solved for"] = known.left_out
     finite = {of: error for of, error in errors.items() if math.isfinite(error)}
     of = max(finite, key=lambda name: finite[name], default="")
     return finite.get(of, 0.0), of

@@ -219,7 +219,7 @@ class Fit:
         return [Note("friction-not-fitted", words, ("friction.effective",))]
 
     def tails_warnings(self, robots: Sequence[Robot]) -> list[Note]:
-        """How many robots have a B_eff that was not fitted, or came out negative."""
+        """How many robots have a B_eff that was not fitted, or is negative."""
         found = [friction_of_tails(robot, self.friction) for robot in robots]
         unknown = sum(1 for own, others in found if own is None and others)
         zero = sum(1 for own, _ in found if own is not None and own <= 0)

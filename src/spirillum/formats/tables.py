@@ -237,7 +237,7 @@ def check_known(table: Table, allowed: Sequence[str]) -> None:
     for name in table.header:
         if name in allowed:
             if table.header.count(name) > 1:
-                raise InputError(f"{table.path}: column '{name}' stands twice; allowed: once")
+                raise InputError(f"{table.path}: column '{name}' is a duplicate; allowed: once")
         elif not name.lower().startswith(_NOTES) and _resembles(name, words):
             raise InputError(
                 f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, allowed)}; allowed: "

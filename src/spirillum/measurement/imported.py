@@ -72,7 +72,7 @@ def read_track(
     frame = points[0][order]
     nose, rear, centre = (ruled.shown(item[order]) for item in points[1:])
     if np.any(np.diff(frame) <= 0):
-        raise InputError(f"{path}: frame {frame[1:][np.diff(frame) <= 0][0]:g} stands twice; allowed: once a frame")
+        raise InputError(f"{path}: frame {frame[1:][np.diff(frame) <= 0][0]:g} is a duplicate; allowed: once a frame")
     front, back = ruled.points(nose), ruled.points(rear)
     both = np.isfinite(front[:, 0]) & np.isfinite(back[:, 0])
     position = np.where(both[:, None], 0.5 * (front + back), ruled.points(centre))
@@ -117,7 +117,7 @@ def _trackpy(path: Path, size: tuple[int, int], frame_of: Callable[[Samples], Sa
     timed = next((name for name in _TIMES if name in table.header), None) if "frame" not in table.header else None
     for name in ("x", "y", timed or "frame"):
         if table.header.count(name) != 1:
-            wrong = "is missing" if name not in table.header else "stands twice"
+            wrong = "is missing" if name not in table.header else "is a duplicate"
             raise InputError(f"{path}: column '{name}' {wrong}; needed: {_NEEDED}")
 
     def column(name: str) -> Samples:

@@ -17,13 +17,13 @@ def check_targets(plane: Path | None, volume: Path | None) -> None:
     """Check the files before any work is done."""
     netcdf = {".nc": "a NetCDF file"}
     if plane is None and volume is None:
-        raise InputError("no file is asked for; allowed: -o flow.png for a plane, --volume flow.vti for a box, or both")
+        raise InputError("no file is requested; allowed: -o flow.png for a plane, --volume flow.vti for a box, or both")
     if plane is not None:
         output_target(plane, {**PICTURES, **netcdf}, "flow.png")
     if volume is not None:
         output_target(volume, {".vti": "a VTK image file", **netcdf}, "flow.vti")
     if plane is not None and volume is not None and plane.resolve() == volume.resolve():
-        raise InputError(f"{plane} is asked for as plane and as box; allowed: two files")
+        raise InputError(f"{plane} is requested as plane and as box; allowed: two files")
 
 
 def write_flow(flow: Flow, dataset: xr.Dataset, path: Path) -> None:

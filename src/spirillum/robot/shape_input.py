@@ -31,7 +31,6 @@ DISPLACED = {
 """Fields of the layer below that a field of a layer replaces."""
 _TURNED = 0.5
 """Cosine of the largest angle between neighbouring chords of a centre line."""
-_CURVE_DERIVES = {"wavelength": "turns", "amplitude": "amplitude", "length": "reach"}
 
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:

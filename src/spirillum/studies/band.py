@@ -136,7 +136,7 @@ def reference_place(settings: Mapping[str, Any]) -> str:
     yaw = placement.get("yaw") or 0.0
     tilts = [f"{name} {show(angle, 'deg')}" for name, angle in (("pitch", pitch), ("yaw", yaw)) if angle]
     tilt = ", ".join(tilts) or "level"
-    return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference place'}, {tilt}"
+    return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference pose'}, {tilt}"
 
 
 def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:

@@ -62,7 +62,7 @@ def laid_down_coordinates(ranges: LaidDown) -> dict[str, Any]:
     for column, name in zip(levels().T, FACTORS, strict=True):
         if name != "pitch":
             low, high = getattr(ranges, name)
-            meaning = "gap where it is laid down" if name == "gap" else None
+            meaning = "gap at release" if name == "gap" else None
             values = np.where(column > 0, high, low)
             found[f"{name}_of_run"] = ("run", values, attributes(name, meaning=meaning, source="design of the runs"))
     return found
@@ -96,7 +96,7 @@ def laid_down_variables(
         found[f"{name}_predicted_high"] = ((*robots, *more), high, about("largest of all runs and windows"))
         words = "what the high level of a factor adds to the mean at its low one"
         found[f"{name}_effect"] = ((*robots, *more, "factor"), effects, about(words))
-    pitch = attributes("pitch", meaning="pitch at which it is laid down, nose up", source="design of the runs")
+    pitch = attributes("pitch", meaning="pitch at release, nose up", source="design of the runs")
     found["pitch_of_run"] = ((*robots, "run"), gathered(answers, "laid_pitch", shape), pitch)
     return found
 
@@ -113,11 +113,11 @@ _PLACED = {
     "pitch_at_place": attributes("pitch", source="places of the band: level, half and all that gap and tail allow"),
 }
 _BAND = {
-    "_at_place": ("at a place of the band", "places of the band"),
+    "_at_place": ("at a pose of the band", "places of the band"),
     "_interval_low": ("lower limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_interval_high": ("upper limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
-    "_low": ("least of the band over gap and pitch", "least of all places, the reference place among them"),
-    "_high": ("largest of the band over gap and pitch", "largest of all places, the reference place among them"),
+    "_low": ("least of the band over gap and pitch", "least of all poses, the reference pose among them"),
+    "_high": ("largest of the band over gap and pitch", "largest of all poses, the reference pose among them"),
 }
 
 

@@ -30,7 +30,7 @@ POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
 """Pose and contact of a robot, means over a trial."""
 ENDS = ("median", "low", "high")
 """Of an interval over the unknowns."""
-STATES = ("no-trial", "swimming", "standing")
+TRIAL_STATES = ("no-trial", "swimming", "standing")
 """State of a robot in its trial; the index in this list is the value in the dataset."""
 _MOST_HELD = 1000
 """Robots of a study that are computed by `tube` without a request."""
@@ -98,7 +98,7 @@ class TrialTask(OneRobot):
         trial = held.trial
         if trial is None or trial.reason:
             return part
-        part["state"] = np.array([float(STATES.index(trial.basis["state"]))])
+        part["state"] = np.array([float(TRIAL_STATES.index(trial.basis["state"]))])
         part |= {name: np.array([trial.values.get(name, np.nan)]) for name in (*MOVING, *POSE)}
         for name, over in trial.intervals.items():
             if name in MOVING:
@@ -171,8 +171,8 @@ def column_variables(
             "units": "1",
             "long_name": "what became of a robot in its trial",
             "source": "trial in the tube",
-            "flag_values": np.arange(len(STATES), dtype="int8"),
-            "flag_meanings": " ".join(STATES),
+            "flag_values": np.arange(len(TRIAL_STATES), dtype="int8"),
+            "flag_meanings": " ".join(TRIAL_STATES),
         }
         state = np.nan_to_num(gathered(trials, "state", shape)).astype("int8")
         found["trial"] = (tuple(robots), state, about)
@@ -182,4 +182,4 @@ def column_variables(
 def _meaning(name: str) -> str:
     """Meaning of a value of a trial."""
     end = name.rpartition("_")[2]
-    return "mean over a trial" if end not in ENDS else f"over what nobody states of a trial: {end} (90 % interval)"
+    return "mean over a trial" if end not in ENDS else f"over what is not stated of a trial: {end} (90 % interval)"

@@ -1,4 +1,4 @@
-"""Observed rates and speeds, laid onto the robots of a study."""
+"""Observed rates and speeds, assigned to the robots of a study."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
     if len(found) != len(listed):
         raise InputError(
             "two robots of the study share channel diameter, wavelength and amplitude, so that observations cannot "
-            "tell them apart; allowed: robots that differ in one of them"
+            "distinguish them; allowed: robots that differ in one of them"
         )
     return found
 

@@ -2,7 +2,7 @@
 
 One model and one reading of the friction rank all robots: the model that computes the channel's walls where the study
 has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
-study has it. Robots that were let go too (`settled`) are ordered by their speed in steady motion. Bands and intervals
+study has it. Robots that are released too (`settled`) are ordered by their speed in steady motion. Bands and intervals
 are those of the study. A band goes over places that robots may share, such as a gap: at how many of them the fastest
 robot is the fastest says more than how far the bands overlap.
 """
@@ -57,7 +57,7 @@ _BESIDE = (HELD, TRIAL, LET_GO)
 """Speeds beside that of a model, where the study has them."""
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
-    HELD: QuantityRanking("tube", "fastest held by tube", 1.0),
+    HELD: QuantityRanking("tube", "fastest at a fixed pose by tube", 1.0),
     TRIAL: QuantityRanking("trial", "fastest in a trial", 1.0),
     LET_GO: QuantityRanking("steady", "fastest once settled", 1.0),
     "hydrodynamic_efficiency": QuantityRanking("efficiency", "most efficient", 1.0),
@@ -65,9 +65,11 @@ RANKED = {
     "shaft_power": QuantityRanking("power", "least power", -1.0),
 }
 """Quantities that rank robots, in the order in which they are shown."""
-SETTLED_BASIS = "steady: by model tube, let go, in steady motion; all else: by the model above, not let go"
+SETTLED_BASIS = (
+    "steady: by model tube, after release, in the steady state; all else: by the model above, at a fixed pose"
+)
 """Assumptions of the speed after release that the other quantities do not share."""
-ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
+ENDS = {"band": "over the gaps and pitches that are not given", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
 

@@ -1,7 +1,7 @@
 """Robots of a study released in their tubes: the runs of an experiment with nothing fitted, and steady states.
 
 Publications do not report the initial placement. For the experiment, each robot makes the runs of a design of
-experiments over what decides: gap and pitch at which it is laid down, time until its motor is switched on, height of
+experiments over what decides: gap and pitch at release, time until its motor is switched on, height of
 the asperities, and coefficient of dry friction. Every run is one of `spirillum.simulate` with the model `tube`, read as
 a camera above the channel reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag
 by (15).
@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from spirillum.studies.study_loader import LoadedStudy
 from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.steady import swim
+from spirillum.swimming.steady_state import State
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ class LaidDownTask(OneRobot):
     @property
     def words(self) -> str:
         """Progress message."""
-        return f"laid down: {self.robot.with_tail}"
+        return f"runs after release: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -220,8 +221,7 @@ def without_answer(parts: Iterable[Part]) -> list[Note]:
         return []
     words = (
         f"{np.count_nonzero(~known)} of {known.size} runs of released robots have no answer: they leave their "
-        "table; use "
-        "other ranges in [laid_down]"
+        "table; use other ranges in [laid_down]"
     )
     return [Note("without-answer", words, ("laid_down",))]
 
@@ -238,8 +238,8 @@ SETTLED = (
 """Quantities of a steady motion."""
 PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
 """Pose of a robot in it, and its time constant."""
-STATES = ("not followed", "steady", "orbits", "goes around", "changing")
-"""What became of a robot; the index in this list is the value in the dataset."""
+SETTLED_STATES = ("not followed", *get_args(State))
+"""Outcome for a robot; the index in this list is the value in the dataset."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,7 @@ class SettledTask(OneRobot):
     @property
     def words(self) -> str:
         """Progress message."""
-        return f"let go: {self.robot.with_tail}"
+        return f"steady state: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -276,7 +276,7 @@ class SettledTask(OneRobot):
         found = motion.prediction
         lying = found.lying
         assert lying is not None  # noqa: S101 - a free motion has one
-        state = np.array([float(STATES.index(lying.state))])
+        state = np.array([float(SETTLED_STATES.index(lying.state))])
         if lying.state == "changing":  # its means depend on when they are taken
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
@@ -347,13 +347,13 @@ def settled_variables(
             name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
         )
         found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
-    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(STATES) - 1).astype("int8")
+    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(SETTLED_STATES) - 1).astype("int8")
     about = {
         "units": "1",
-        "long_name": "what became of a robot that was let go",
+        "long_name": "outcome for a robot after release",
         "source": "free motion in the tube",
-        "flag_values": np.arange(len(STATES), dtype="int8"),
-        "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
+        "flag_values": np.arange(len(SETTLED_STATES), dtype="int8"),
+        "flag_meanings": " ".join(word.replace(" ", "-") for word in SETTLED_STATES),
     }
     about_error = attributes(
         "error_estimate",

@@ -116,10 +116,10 @@ def computed_study(
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
     with_table = _with_table(loaded) if followed else {}
     runs = list(laid_down_tasks(loaded, with_table, len(todo)))
-    let_go = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
-    holding = list(held_tasks(loaded, len(todo) + len(runs) + len(let_go)))
-    trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(let_go) + len(holding)))
-    asked: list[StudyTask] = [*todo, *runs, *let_go, *holding, *trials]
+    settled = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
+    holding = list(held_tasks(loaded, len(todo) + len(runs) + len(settled)))
+    trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(settled) + len(holding)))
+    asked: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
     found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in asked}
     missing = [task for task in asked if found[task.number] is None]
     done = len(asked) - len(missing)
@@ -139,12 +139,12 @@ def computed_study(
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
     beside = BesideModels(
         laid_down=[(task, parts_of[task.number]) for task in runs],
-        settled=[(task, parts_of[task.number]) for task in let_go],
+        settled=[(task, parts_of[task.number]) for task in settled],
         held=[(task, parts_of[task.number]) for task in holding],
         trials=[(task, parts_of[task.number]) for task in trials],
     )
     warnings = warnings_of(loaded)
-    warnings += [settled_basis(loaded.study.contact)] if let_go else []
+    warnings += [settled_basis(loaded.study.contact)] if settled else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
     if followed:
@@ -266,9 +266,9 @@ def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list
 def _why_without_table(robot: Robot, placement: Placement) -> str:
     """What robots that are not released lack; a placeholder for the name of the first."""
     if robot.channel is None:
-        return "have no channel in which they could be let go, the first: {}"
+        return "have no channel for a release, the first: {}"
     if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):
-        return "cannot lie where they would be laid down and were not let go, the first: {}"
+        return "do not fit at the initial pose and were not released, the first: {}"
     return "have no table with yawed poses and were not released, the first: {}; `spirillum prepare` makes one"
 
 

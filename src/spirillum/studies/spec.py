@@ -180,7 +180,7 @@ class Study(Section):
         if self.vary and varied > _MOST_ROBOTS:
             problems.append(f"vary makes {varied} robots; allowed: at most {_MOST_ROBOTS}, or a [grid]")
         elif self.size > LARGEST_STORED:
-            problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STORED}")
+            problems.append(f"the study requests {self.size} results; allowed: at most {LARGEST_STORED}")
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self

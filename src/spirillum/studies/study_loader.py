@@ -136,7 +136,7 @@ def load_study(
     study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
     if study.size > largest:
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
-        raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
+        raise InputError(f"{name}: the study requests {study.size} results; allowed: at most {largest}{store}")
     entries = list(_entries_of(study))
     robots = tuple(_robot(entry, folder, overrides or {}, varied, name) for entry, varied in entries)
     if study.grid is None:
@@ -195,7 +195,7 @@ def _entries_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[str, Any]]], name: str) -> None:
-    """Refuse a robot that stands twice in a list, or one value of a varied field in two spellings."""
+    """Refuse a duplicate robot in a list, or one value of a varied field in two spellings."""
     seen: dict[str, int] = {}
     for number, robot in enumerate(robots):
         first = seen.setdefault(robot.model_dump_json(), number)
@@ -254,7 +254,7 @@ def _fit(study: Study, calibration: str | Path | None, posterior: str | Path | N
     fit = read_fit(calibration, posterior, *(() if AUTO in study.models else study.models))
     if fit.posterior is not None and fit.posterior.places_robots:
         raise InputError(
-            f"{fit.name} has a place of its own for the robots of each channel, and a study one for all; allowed: "
+            f"{fit.name} has its own pose for the robots of each channel, and a study one for all; allowed: "
             "`predict` of each robot with it, or the study without"
         )
     return fit
@@ -283,7 +283,7 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
         return ()
     if fit.friction_coefficient:
         raise InputError(
-            f"{fit.name} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each "
+            f"{fit.name} has a friction_coefficient, and a study models no dry friction; allowed: `predict` of each "
             "robot with it"
         )
     if study.placement.is_given:
@@ -294,7 +294,7 @@ def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Pla
     placements = tuple(place or Placement() for place in found)
     walled = next(SWIMMER_MODELS[model] for model in study.models if SWIMMER_MODELS[model].placed)
     if study.band and not all(left_open(place, walled) for place in placements):
-        raise InputError(f"band = true, but {fit.name} says where the robots lie; allowed: the study without a band")
+        raise InputError(f"band = true, but {fit.name} gives the robots' pose; allowed: the study without a band")
     return placements
 
 

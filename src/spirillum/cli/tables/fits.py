@@ -113,7 +113,7 @@ def _apart(difference: Answer) -> str:
 
 def suggestion(answer: Answer, rows: int = 10) -> Blocks:
     """Candidates of `suggest`, the most informative first."""
-    what = f"what {answer['trials']} trials of one more tail would tell"
+    what = f"what {answer['trials']} trials of one more tail would decide"
     yield f"{answer['posterior']}, model {answer['model']}: {what}"
     found = grid("", "channel (mm)", "tail (mm)", "information (bit)", "behind the first (bit)", "narrows most")
     first = answer["candidates"][0]
@@ -130,7 +130,7 @@ def suggestion(answer: Answer, rows: int = 10) -> Blocks:
     tied = sum(item["tied_with_the_best"] for item in answer["candidates"]) - 1
     if tied > 0:
         others = "1 other is" if tied == 1 else f"{tied} others are"
-        yield f"a tie: {others} within two standard errors of the first, which the draws do not tell apart"
+        yield f"a tie: {others} within two standard errors of the first, which the draws do not distinguish"
 
 
 def observations(answer: Answer) -> Blocks:

@@ -70,8 +70,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     if "band" in answer:
         poses = len(answer["band"]["gap"]["value"]) + 1
         yield Detail(
-            f"band: low and high are the least and the largest of {poses} poses at which the robot is held, none "
-            "of them "
+            f"band: low and high are the least and the largest of {poses} fixed poses, none "
             "likelier than another; value: the pose above; in free motion (--motion free) it may swim outside the band"
         )
     yield from error_of(answer["error_estimate"])
@@ -290,7 +289,7 @@ def magnetic_sweep(answer: Answer) -> Blocks:
         rows.add_row(*(in_unit(item["value"][index], item["unit"], unit) for item, unit in columns))
     yield rows
     step_out = in_unit(answer["step_out_rate"]["value"], "rad/s", "Hz")
-    yield f"step-out of the held robot at {step_out} Hz; no lag where the robot slips"
+    yield f"step-out in axial motion at {step_out} Hz; no lag where the robot slips"
     yield from files_of(answer, plot="plot", file="sweep")
 
 
@@ -306,7 +305,7 @@ def settling(answer: Answer) -> Blocks:
     drainage = answer["drainage_time"]
     if drainage["value"] is not None:
         gap = in_unit(drainage["until"]["value"], "m", "mm")
-        yield quantity_grid(f"on the way, as the gap first falls to {gap} mm", answer["passing"])
+        yield quantity_grid(f"in transit, as the gap first falls to {gap} mm", answer["passing"])
     if answer["film"]["gap"]["value"]:
         film = grid("film under it, level")
         for name in _FILM:

@@ -114,7 +114,7 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
         f"{_UNKNOWN.get(one['name'], one['name'].replace('_', ' '))} {percent(one['share']['value'])}" for one in parts
     ]
     stand = f", {trial['standing']} of {trial['runs']} stand" if trial["standing"] else ""
-    level = f"{100 * speed['level']:g} % interval of the speed over what nobody states"
+    level = f"{100 * speed['level']:g} % interval of the speed over what is not stated"
     yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
     yield f"of its variance: {', '.join(words)}; state the first of them first"
 
@@ -141,7 +141,7 @@ def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]
     yield Detail(f"{head}: {', '.join(said)}")
 
 
-RELEASED = "laid down"
+RELEASED = "released at"
 """Head of the line on the placement of a robot that is released there."""
 
 

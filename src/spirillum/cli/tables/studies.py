@@ -37,7 +37,7 @@ def study(answer: Answer, *, rows: int = 10) -> Blocks:
     yield f"observations: {answer['observations']}"
     if answer.get("predictions"):
         counts = ", ".join(f"{count} {verdict.replace('-', ': ')}" for verdict, count in answer["predictions"].items())
-        yield f"statements of the paper, laid down and let go, nothing fitted: {counts}"
+        yield f"statements of the paper, by robots released from rest, nothing fitted: {counts}"
     if any(answer["claims"].values()):
         counts = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
         yield f"statements of the paper: {counts}"
@@ -78,7 +78,7 @@ def _ranking(ranking: Answer, rows: int) -> Blocks:
     if "settled" in ranking:
         yield Detail(ranking["settled"])
     if ranking["low_and_high"] in ENDS:
-        where = ", of robots that are not let go: in ranking.csv" if "settled" in ranking else ""
+        where = ", of robots at a fixed pose: in ranking.csv" if "settled" in ranking else ""
         yield Detail(f"low, high: {ENDS[ranking['low_and_high']]}{where}")
 
 
@@ -176,7 +176,7 @@ def _basis_of_design(answer: Answer) -> Iterator[Detail]:
     yield from _compared(answer)
     if (deciding := answer.get("uncertainty", {}).get("deciding")) is not None and deciding:
         shares = [f"{name} {100 * share:.0f} %" for name, share in deciding.items()]
-        yield Detail(f"the spread goes with: {', '.join(shares)}")
+        yield Detail(f"shares of the spread: {', '.join(shares)}")
     wound = [f"{name.replace('_', ' ')} {in_words(item)}" for name, item in answer["winding"].items()]
     yield Detail(f"to wind: {', '.join(wound)}")
     if answer["bound_by"]:

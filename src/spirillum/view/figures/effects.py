@@ -39,7 +39,7 @@ def effects_figure(comparison: ModelComparison) -> Figure:
             columns=1,
             notes=[
                 "Each line keeps the effects above it; factor: speed over that of the line above.",
-                f"From the film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}.",
+                f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}.",
             ],
         )
         axes = sheet.panels[0, 0]

@@ -17,7 +17,7 @@ from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain
 if TYPE_CHECKING:
     import xarray as xr
 
-_HELD: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
+_HELD: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "axial motion, closed form"}
 _STEP_OUT: dict[str, Any] = {"color": "#999999", "linewidth": 0.8}
 _POINTS: dict[str, Any] = {"marker": "o", "markersize": 3.5, "linewidth": 1.2}
 
@@ -41,7 +41,7 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
                 Line2D([], [], color=COLOURS["blue"], **_POINTS, label="free"),
                 Line2D([], [], color=COLOURS["green"], alpha=0.25, **PATCH, label="wobble, least to largest"),
                 Line2D([], [], **_HELD),
-                Line2D([], [], **_STEP_OUT, label="step-out of the held robot"),
+                Line2D([], [], **_STEP_OUT, label="step-out in axial motion"),
             ],
         )
         panels = sheet.panels.ravel()
