@@ -406,16 +406,13 @@ def validation_sources() -> str:
         published = sum(one.count for one in result.summaries)
         covered = f"{sum(one.covered for one in result.summaries)} of {published}" if published else ""
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
-        cells = result.case.kind, result.case.read, ratios, covered, verdicts
-        rows.append((f"[`{name}`](#{name})", result.case.title, *cells))
-    header = ("Case", "What", "Kind", "Read", "Ours over published, mean", "Covered", "Statements")
-    return table(header, rows)
+        rows.append((f"[`{name}`](#{name})", result.case.kind, result.case.read, ratios, covered, verdicts))
+    return table(("Case", "Kind", "Read", "Ours over published, mean", "Covered", "Statements"), rows)
 
 
 def validation_case(name: str) -> str:
-    """A validation case: figure, what it shows, its rows, what the assumptions do, statements, source."""
+    """A validation case: figure, what it shows, its quantities, what the assumptions do, statements, source."""
     from spirillum.papers.validation_figure import case_picture
-    from spirillum.results.validation import HEADER, table_of
 
     result = _validated()[name]
     case, picture = result.case, case_picture(result)
@@ -424,22 +421,67 @@ def validation_case(name: str) -> str:
         f"{case.title} ({references}).",
         f"![{picture.alternative}](images/validation/{name}.png)",
         " ".join(case.explanation.split()),
-        table(HEADER, table_of(result)),
     ]
+    if compared := list(_compared(result)):
+        parts.append(table(_COMPARED, compared))
     if case.assumptions:
-        lines = [f"- {one.name}: {', '.join(one.values)}" for one in case.assumptions]
-        parts.append("Assumed beyond the publication, each value tried alone:\n\n" + "\n".join(lines))
+        assumed = (f"{one.name}: {', '.join(one.values)}" for one in case.assumptions)
+        parts.append(f"Assumed: {'; '.join(assumed)}.")
     if case.statements:
         told = zip(result.statements, result.read, strict=True)
         claims = [(one.claim, read, one.computed, one.verdict) for one, read in told]
         parts.append(table(("Statement", "Read", "Computed", "Verdict"), claims))
     elif result.statements:
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in result.counted().items())
-        parts.append(f"Statements: {verdicts}; each is on the page of [the paper's study](study.md).")
+        parts.append(f"Statements of the text: {verdicts}; reasons in [the paper's study](study.md).")
     robots = [robot for robot in dict.fromkeys((case.robot, *(point.robot for point in case.points))) if robot]
-    start = ", ".join(f"`spirillum robot new mine.toml --from {robot}`" for robot in robots)
-    parts.append(f"Read ({case.read}): {' '.join(case.source.split())}. Robot files: {start}.")
+    files = ", ".join(f"`{robot}`" for robot in robots)
+    parts.append(f"Read ({case.read}): {' '.join(case.source.split())}. Robot files: {files}.")
     return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+_COMPARED = (
+    *("Quantity", "Rows", "Published", "Ours", "Difference", "Stated error", "Assumptions"),
+    *("Covered by error", "by assumptions"),
+)
+
+
+def _compared(result: Any) -> Iterator[tuple[str, ...]]:
+    """A row for each quantity of a case that was published: ranges over the rows, and how many are covered."""
+    for name, quantity in result.case.quantities.items():
+        rows = [row for row in result.rows if row.name == name and row.published is not None]
+        if not rows:
+            continue
+        unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+        spread = f" ± {rows[0].uncertainty:.3g}" if len(rows) == 1 and rows[0].uncertainty else ""
+        ends = [end / row.ours - 1.0 for row in rows if row.effects for end in row.ends]
+        errors = [row.stated_error for row in rows if row.stated_error is not None]
+        by = Counter(row.covered_by for row in rows)
+        yield (
+            quantity.label,
+            str(len(rows)),
+            f"{_span(f'{row.published:.3g}' for row in _sorted(rows, 'published'))}{spread}{unit}",
+            f"{_span(f'{row.ours:.3g}' for row in _sorted(rows, 'ours'))}{unit}",
+            _span(_percent(row.difference) for row in _sorted(rows, "difference")) + " %",
+            f"up to {100.0 * max(errors):.2g} %" if errors else "",
+            _span(_percent(end) for end in sorted(ends)) + " %" if ends else "",
+            str(by["stated error"]),
+            str(by["assumptions"]),
+        )
+
+
+def _sorted(rows: Iterable[Any], name: str) -> list[Any]:
+    return sorted(rows, key=lambda row: float(getattr(row, name)))
+
+
+def _span(texts: Iterable[str]) -> str:
+    """First and last of ordered texts, one where they are the same."""
+    every = [text.replace("-", "−") for text in texts]
+    return " to ".join(dict.fromkeys((every[0], every[-1])))
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:+.{0 if abs(share) >= 0.0995 else 1}f}"
 
 
 def reference_list() -> str:

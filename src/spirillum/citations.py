@@ -106,12 +106,13 @@ REFERENCES: dict[str, str] = {
         "flagellum. Proceedings of the National Academy of Sciences 110:E338-E347, 2013."
     ),
     "lisevich2024": (
-        "I. Lisevich and others. Physics of swimming and its fitness cost determine "
-        "strategies of bacterial investment in flagellar motility. bioRxiv, doi:10.1101/2024.03.30.587422, 2024."
+        "I. Lisevich, R. Colin, H. Y. Yang, B. Ni and V. Sourjik. Physics and physiology determine strategies of "
+        "bacterial investment in flagellar motility. bioRxiv, doi:10.1101/2024.03.30.587422, 2024; Nature "
+        "Communications, doi:10.1038/s41467-025-56980-x, 2025."
     ),
     "djutanta2023": (
-        "F. Djutanta and others. Decoding the hydrodynamic properties of microscale helical propellers from Brownian "
-        "fluctuations. Proceedings of the National Academy of Sciences 120:e2220033120, 2023 (arXiv:2208.13854)."
+        "F. Djutanta, P. T. Brown and others. Microscopic motility of isolated E. coli flagella. arXiv:2208.13854, "
+        "2022; Proceedings of the National Academy of Sciences 120:e2220033120, 2023 (under another title)."
     ),
     "purcell1997": (
         "E. M. Purcell. The efficiency of propulsion by a rotating flagellum. "
@@ -125,8 +126,9 @@ REFERENCES: dict[str, str] = {
         "Biophysical Journal 69:2154-2162, 1995."
     ),
     "martinez2014": (
-        "V. A. Martinez and others. Flagellated bacterial motility in polymer solutions. "
-        "Proceedings of the National Academy of Sciences 111:17771-17776, 2014."
+        "V. A. Martinez, J. Schwarz-Linek, M. Reufer, L. G. Wilson, A. N. Morozov and W. C. K. Poon. Flagellated "
+        "bacterial motility in polymer solutions. Proceedings of the National Academy of Sciences 111:17771-17776, "
+        "2014."
     ),
     "caldag2019": (
         "H. O. Caldag and S. Yesilyurt. Trajectories of magnetically-actuated helical swimmers in cylindrical channels "
@@ -134,11 +136,11 @@ REFERENCES: dict[str, str] = {
     ),
     "liu2014": (
         "B. Liu, K. S. Breuer and T. R. Powers. Propulsion by a helical flagellum in a capillary tube. "
-        "Physics of Fluids 26:011701, 2014."
+        "Physics of Fluids 26:011701, 2014 (cited from memory)."
     ),
     "temel2013": (
         "F. Z. Temel and S. Yesilyurt. Simulation-based analysis of micro-robots swimming at the center and near the "
-        "wall of circular mini-channels. Microfluidics and Nanofluidics 14:287-298, 2013."
+        "wall of circular mini-channels. Microfluidics and Nanofluidics 14:287-298, 2013 (cited from memory)."
     ),
     "tirado1979": (
         "M. M. Tirado and J. Garcia de la Torre. Translational friction coefficients of rigid, symmetric top "

@@ -31,8 +31,8 @@ def case_picture(result: CaseResult) -> Picture:
         "Filled: ours. Grey, or open: published, with its uncertainty where one is stated. Bars: what the assumptions "
         "do to ours, added in quadrature; thin lines: the error that the program states. Nothing is fitted."
     )
-    summary = "; ".join(f"{one.quantity}: ours over published {one.mean:.2f}" for one in result.summaries)
-    return Picture.of(case.title, caption, f"{case.title}. {summary or 'Computed trends.'}", lambda: _drawn(result))
+    shown = "values over the abscissa" if case.curve else "ours over published, row by row"
+    return Picture.of(case.title, caption, f"{result.name}: {shown}", lambda: _drawn(result))
 
 
 def _drawn(result: CaseResult) -> Figure:
