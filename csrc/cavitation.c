@@ -101,12 +101,30 @@ static bool cavitates(double a, double b) {
     return wide * wide < a * xi / 3.0 + 0.25 * b;
 }
 
-Lift cavitation_lift(const LineContact *c, double viscosity, double bound) {
+/* The film in units of the bound: a and b of the pressure, their units per velocity, and s. */
+typedef struct {
+    double s, per_u, per_v, a, b;
+} Scaled;
+
+static Scaled scaled(const LineContact *c, double viscosity, double bound) {
     const double s = sqrt(2.0 * c->bend * c->gap), unit = 12.0 * viscosity / (bound * c->gap * c->gap);
     const double per_u = s * unit, per_v = 2.0 * c->bend * unit;
-    const double a = per_u * c->entrainment, b = per_v * c->opening;
-    /* most slices are far from it: xi/(1 + xi^2)^2 is at most 3 sqrt(3)/16 */
-    if (fabs(a) < 9.2 - 2.3 * larger(b, 0.0) || !cavitates(a, b)) return (Lift){0};
+    return (Scaled){s, per_u, per_v, per_u * c->entrainment, per_v * c->opening};
+}
+
+/* Most films are far from it: xi/(1 + xi^2)^2 is at most 3 sqrt(3)/16. */
+static bool is_near(double a, double b) { return !(fabs(a) < 9.2 - 2.3 * larger(b, 0.0)); }
+
+/* Whether a film may cavitate; one with larger gaps and smaller velocities then does not, if this one does not. */
+bool is_near_cavitation(const LineContact *c, double viscosity, double bound) {
+    const Scaled film = scaled(c, viscosity, bound);
+    return is_near(film.a, film.b);
+}
+
+Lift cavitation_lift(const LineContact *c, double viscosity, double bound) {
+    const Scaled film = scaled(c, viscosity, bound);
+    const double s = film.s, per_u = film.per_u, per_v = film.per_v, a = film.a, b = film.b;
+    if (!is_near(a, b) || !cavitates(a, b)) return (Lift){0};
     /* less the linear film, whose integrals are -pi b/8 and -pi a/6 */
     const Side before = side_of(a, b), behind = side_of(-a, b);
     const double normal = bound * s, along = 2.0 * bound * c->gap; /* s^2/R' = 2 h0 */

@@ -19,6 +19,7 @@ typedef struct {
     double of_entrainment[2]; /* derivatives of both in u */
 } Lift;
 
+bool is_near_cavitation(const LineContact *contact, double viscosity, double bound);
 Lift cavitation_lift(const LineContact *contact, double viscosity, double bound);
 
 #endif

@@ -150,21 +150,23 @@ static void copy(const double *from, double *to) {
 /* Derivatives of the rates at the beginning of a step. */
 static void set_jacobian(const Robot *robot, const Sizes *sizes, double near, Step *s) {
     double trial[STATES], other[STATES], back[STATES];
-    const bool thin = !robot->in_tube && near < 1.0; /* rates cost little and are smooth: central differences */
+    /* central differences where the rates cost little and are smooth, and where asperities under the wire bend them */
+    const bool touches = robot->in_tube && robot->seen->tail_gap < robot->tube.tube->roughness;
+    const bool central = touches || (!robot->in_tube && near < 1.0);
     copy(s->y, trial);
     for (int column = 0; column < ACTING; column++) {
         const int at = ACTS[column];
         double step = sizes->state[at] * (at == COLUMN(current) ? 1e-6 : 3e-7 * near);
         double first = s->y[at];
-        if (thin) {
-            step *= WIDER;
+        if (central) {
+            step *= touches ? 1.0 : WIDER;
             first = trial[at] = s->y[at] - step;
             find_rates(robot, s->time, trial, back);
         }
         trial[at] = s->y[at] + step;
         step = trial[at] - first;
         find_rates(robot, s->time, trial, other);
-        for (int i = 0; i < STATES; i++) s->jacobian[i][column] = (other[i] - (thin ? back : s->f)[i]) / step;
+        for (int i = 0; i < STATES; i++) s->jacobian[i][column] = (other[i] - (central ? back : s->f)[i]) / step;
         trial[at] = s->y[at];
     }
     if (sizes->later > 0.0) find_rates(robot, s->time + sizes->later, s->y, other);

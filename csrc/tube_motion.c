@@ -175,6 +175,7 @@ static void touch(Touch *t) {
 
 static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
 static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
+static const double STRAIGHT = 1.1;    /* velocities between the ends of the side are less than those there times this */
 
 /* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
  * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. */
@@ -229,20 +230,42 @@ static Slice slice_at(const TubeRobot *robot, const State *y, const double rotat
     return s;
 }
 
-/* Slices of the film under the body's straight side, closer towards its ends; none where the film cannot be thin. */
-static void set_slices(const TubeRobot *robot, const State *y, const double rotation[3][3], const Seen *seen,
-                       Balance *b) {
-    const Film *film = &robot->table.film;
+/* Slices of the film under the body's straight side, closer towards its ends. */
+static void set_slices(const Touch *t) {
+    const Film *film = &t->robot->table.film;
     const double half = 0.5 * (film->front - film->rear);
-    b->slice_count = 0;
-    b->bound = robot->tube->cavitation;
-    b->viscosity = robot->tube->viscosity;
-    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * film->body)) return;
+    Balance *b = t->balance;
+    b->slice_count = MOST_SLICES;
     for (int n = 0; n < MOST_SLICES; n++) {
         const double angle = PI * (n + 0.5) / MOST_SLICES;
         const double x = film->rear + half * (1.0 - cos(angle)), length = half * sin(angle) * PI / MOST_SLICES;
-        b->slices[b->slice_count++] = slice_at(robot, y, rotation, x, length);
+        b->slices[n] = slice_at(t->robot, t->y, t->rotation, x, length);
     }
+}
+
+/* Slices at both ends of the straight side; whether the film between them can be thin. */
+static bool set_ends(const Touch *t, Slice ends[2]) {
+    const Film *film = &t->robot->table.film;
+    const bool thin = isfinite(t->balance->bound) && film->front > film->rear && film->half == 0.0
+                   && t->seen->film < THIN * film->body;
+    for (int n = 0; n < 2 && thin; n++)
+        ends[n] = slice_at(t->robot, t->y, t->rotation, n ? film->front : film->rear, 0.0);
+    return thin;
+}
+
+/* Whether any slice may cavitate at the rates: velocities are nearly straight between the ends, one of which is nearest. */
+static bool may_cavitate(const Balance *b, const Slice ends[2], const double q[RATES]) {
+    LineContact worst = {.gap = smaller(ends[0].gap, ends[1].gap), .bend = ends[0].bend};
+    for (int n = 0; n < 2; n++) {
+        double opening = 0.0, entrainment = 0.0;
+        for (int i = 0; i < RATES; i++) {
+            opening += ends[n].opening[i] * q[i];
+            entrainment += ends[n].entrainment[i] * q[i];
+        }
+        worst.opening = larger(worst.opening, STRAIGHT * opening);
+        worst.entrainment = larger(worst.entrainment, STRAIGHT * fabs(entrainment));
+    }
+    return is_near_cavitation(&worst, b->viscosity, b->bound);
 }
 
 /* Scale the slices' pressure.
@@ -270,25 +293,38 @@ static bool cavitates_at(const Balance *b, const double q[RATES]) {
 }
 
 /* Rates in balance; what is left of it. Where no slice cavitates at those without slices, they are the rates. */
-static double balance_film(Balance *b, const double film[6][6], double q[RATES], double left[RATES]) {
-    const int64_t slices = b->slice_count;
-    if (slices > 0 && cavitates_at(b, q)) {
-        scale_slices(film, b);
-        return balance_rates(b, q, left);
-    }
+static double balance_film(const Touch *t, const double film[6][6], double q[RATES], double left[RATES]) {
+    Balance *b = t->balance;
+    Slice ends[2];
     b->slice_count = 0;
-    const double size = balance_rates(b, q, left);
-    b->slice_count = slices;
-    if (slices == 0 || !cavitates_at(b, q)) {
+    b->viscosity = t->robot->tube->viscosity;
+    if (!set_ends(t, ends)) return balance_rates(b, q, left);
+    bool before = may_cavitate(b, ends, q);
+    if (before) {
+        set_slices(t);
+        before = cavitates_at(b, q);
+    }
+    if (!before) {
+        const int64_t slices = b->slice_count;
         b->slice_count = 0;
-        return size;
+        const double size = balance_rates(b, q, left);
+        if (!may_cavitate(b, ends, q)) return size;
+        if (slices == 0) set_slices(t);
+        b->slice_count = MOST_SLICES;
+        if (!cavitates_at(b, q)) {
+            b->slice_count = 0;
+            return size;
+        }
     }
     scale_slices(film, b);
     return balance_rates(b, q, left);
 }
 
 /* The same under a curve: a straight piece of it is a friction of the joint, and the next one is tried where it ends. */
-static double solve_on_curve(Balance *b, const Drive *drive, Seen *seen) {
+static double solve_on_curve(const Touch *t, const double film[6][6]) {
+    const Drive *drive = &t->robot->links->drive;
+    Balance *b = t->balance;
+    Seen *seen = t->seen;
     const double sense = drive->motor.polarity, own = b->a[JOINT][JOINT], force = b->force[JOINT];
     double *q = seen->rates, left[RATES];
     int64_t number = -1;
@@ -298,7 +334,7 @@ static double solve_on_curve(Balance *b, const Drive *drive, Seen *seen) {
         piece = piece_of(&drive->curve, before = number, drive->duty);
         b->a[JOINT][JOINT] = own - piece.slope;
         b->force[JOINT] = force + sense * piece.torque;
-        seen->balance = balance_rates(b, q, left);
+        seen->balance = balance_film(t, film, q, left);
         number = next_piece(&drive->curve, before, sense * q[JOINT]);
     }
     return sense * piece.torque + piece.slope * q[JOINT];
@@ -306,22 +342,25 @@ static double solve_on_curve(Balance *b, const Drive *drive, Seen *seen) {
 
 /* Rates at which forces and drive are in balance; the drive's torque, N m. Those of the last state are the first guess:
  * a trial inside the wall has none, and the next one must not begin with them. */
-static double solve_rates(Balance *b, const Drive *drive, const double film[6][6], double current, Seen *seen) {
+static double solve_rates(const Touch *t, const double film[6][6]) {
+    const Drive *drive = &t->robot->links->drive;
+    Balance *b = t->balance;
+    Seen *seen = t->seen;
     double *q = seen->rates, left[RATES];
     bool finite = true;
     for (int i = 0; i < RATES; i++) finite = finite && isfinite(q[i]);
     for (int i = 0; i < RATES && !finite; i++) q[i] = 0.0;
     b->along = driven_rate(drive);
     b->prescribed = drive->kind == RATE && drive->duty > 0.0;
-    if (drive->kind == CURVE) return solve_on_curve(b, drive, seen);
-    const double torque = b->prescribed ? 0.0 : drive_torque(drive, current, q, q);
+    if (drive->kind == CURVE) return solve_on_curve(t, film);
+    const double torque = b->prescribed ? 0.0 : drive_torque(drive, t->y->current, q, q);
     b->force[b->along] += torque;
     if (drive->fixed != 0.0) {
         b->force[JOINT] = q[JOINT] = 0.0;
         for (int64_t n = 0; n < b->count; n++) b->contacts[n].rows[0][JOINT] = b->contacts[n].rows[1][JOINT] = 0.0;
     }
     if (b->prescribed) q[b->along] += drive->given - q[SPIN] - q[JOINT];
-    seen->balance = balance_film(b, film, q, left);
+    seen->balance = balance_film(t, film, q, left);
     return b->prescribed ? left[b->along] : torque;
 }
 
@@ -379,7 +418,7 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
 /* Write what is observed in a state, and its time derivative. */
 void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
     const Links *links = robot->links;
-    Balance balance = {.count = 0, .slow = robot->tube->sliding};
+    Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation};
     Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
     Fluid fluid;
     double field[RATES], weight[RATES], asperities[RATES];
@@ -390,11 +429,10 @@ void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen 
     for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);
     for (int i = 0; i < RATES; i++) asperities[i] = balance.force[i];
-    set_slices(robot, y, t.rotation, seen, &balance);
     field_loads(&links->drive, time, t.rotation, field);
     assemble(fluid.matrix, links, balance.a);
     for (int i = 0; i < RATES; i++) balance.force[i] += weight[i] + field[i] + fluid.stream[i];
-    seen->drive_torque = solve_rates(&balance, &links->drive, fluid.film, y->current, seen);
+    seen->drive_torque = solve_rates(&t, fluid.film);
     note_powers(fluid.matrix, links, field, seen);
     seen->flow_power = 0.0;
     for (int i = 0; i < RATES; i++) {

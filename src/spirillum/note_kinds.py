@@ -85,8 +85,10 @@ CAUTIONS = {
         "rest."
     ),
     "table-not-checked": (
-        "The motion reaches poses beyond those at which the robot's table was compared with full solutions: the "
-        "error estimate does not cover them."
+        "The motion reaches poses beyond those at which the robot's table was compared with full solutions, or the "
+        "table misses them by more than it should: the error estimate does not cover them. In films of micrometres "
+        "resistances are within 1.1 % of exact ones of long cylinders, within 4 % of Reynolds' equation under short "
+        "ones."
     ),
     "held-by-friction": (
         "Dry friction is larger than the thrust: the speed that is left comes from the smoothing of the friction "

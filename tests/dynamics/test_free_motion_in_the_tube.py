@@ -227,7 +227,7 @@ def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() ->
         sp.simulate("biorob2012-wide", timing={"duration": "0.1 s"}, placement={"gap": gap}, in_tube={"wait": 0.0})
         for gap in ("0.2 mm", "0.5 mm")
     )
-    assert "mm, and its table was checked from 0.29 mm on" in thin.attrs["warnings"]
+    assert "mm: below 0.29 mm its table is a film with an extrapolated rest" in thin.attrs["warnings"]
     assert "its gap falls" not in wide.attrs["warnings"]
     assert np.isfinite(thin.attrs["error_estimate"])
 

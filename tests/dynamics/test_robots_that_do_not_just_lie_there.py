@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
+from spirillum.dynamics import return_map
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY
 
@@ -33,6 +34,16 @@ def test_the_tail_of_a_rising_robot_touches_the_wall() -> None:
     spent = found["friction_energy"] + found["dissipated_energy"] + found["contact_energy"]
     left = found["drive_energy"] - spent - (found["potential_energy"] - found["potential_energy"][0])
     assert float(np.abs(left).max()) < 1e-6 * float(found["drive_energy"][-1])
+
+
+@pytest.mark.parametrize("most", [20, 400])
+def test_a_motion_that_cannot_be_followed_ends_with_a_state(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In its first turn or later."""
+    monkeypatch.setattr(return_map, "_MOST_STEPS", most)
+    found = sp.settle(sp.load("biorob2012-wide", **{"body.mass": "7.9 g"}), placement={"gap": "0.2 mm"})
+    assert found.to_dict()["state"] == "changing"
+    assert "steps are too short to follow it on" in found.lying.ended
+    assert np.isfinite(found.prediction.forward_velocity)
 
 
 def test_the_center_of_mass_is_where_it_is_given() -> None:

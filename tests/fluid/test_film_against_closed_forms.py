@@ -6,6 +6,7 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.robot.outline import body_outline
+from spirillum.robot.tube_pose import Seat
 
 CAPSULE = body_outline("capsule", 18e-3, 35e-3, 0.0, "hemisphere", "flat")
 BODIES = {
@@ -91,6 +92,21 @@ def test_rest_of_a_sphere_near_a_plane_is_regular(gap):
     sphere = body_outline("sphere", 2.0, 2.0, 0.0, None, None)
     film = film_resistance(sphere, 1e4, 1e4 - 1.0 - gap, 0.0, 0.0)[2, 2]
     assert 1.5 < 1 / gap - 0.2 * np.log(gap) + 0.971264 - film / (6 * np.pi) < 3.5
+
+
+@pytest.mark.parametrize(("edge", "most"), [(3e-3, 0.03), (9e-3, 0.01)])
+def test_a_rounded_edge_has_the_film_of_an_ellipsoid(edge: float, most: float) -> None:
+    """Reynolds' pressure over the gap h + s^2/(2 R1) + t^2/(2 R2): 12 pi (R1 R2)^1.5/((R1 + R2) h)."""
+    tube, pitch = 20e-3, 0.1
+    body = body_outline("capsule", 18e-3, 35e-3, edge, "fillet", "fillet")
+    across = 1.0 / (np.cos(pitch) / (9e-3 - edge + edge * np.cos(pitch)) - 1.0 / tube)
+    normal = np.array([np.sin(pitch), 0.0, np.cos(pitch), 0.0, 0.0, 0.0])
+    films = []
+    for gap in (0.5e-6, 2e-6):
+        film = film_resistance(body, tube, Seat.at_gap(body, tube, gap, pitch).offset, pitch, 0.0)
+        films.append(normal @ film @ normal)
+    reduced = (edge * across) ** 1.5 / (edge + across)
+    assert films[0] - films[1] == pytest.approx(12 * np.pi * reduced * (1 / 0.5e-6 - 1 / 2e-6), rel=most)
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -2,28 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.support.long_cylinders import rotation_in_a_tube
 
 from spirillum.fluid.tube.confined import held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
 from spirillum.robot.tube_pose import Seat
-
-
-def rotation_in_a_tube(a: float, R: float, e: float) -> tuple[float, float]:
-    """Force across the line of centres and torque per length over mu Omega (Jeffery 1922; Wannier 1950).
-
-    The constants of Jeffery's stream function (1/h)[(A + B xi) cosh xi + (C + D xi) sinh xi + ...] in bipolar
-    coordinates, xi = alpha on the cylinder and beta on the tube.
-    """
-    alpha = np.arccosh((R * R - a * a - e * e) / (2 * a * e))
-    beta = np.arccosh((R * R - a * a + e * e) / (2 * R * e))
-    d, c = alpha - beta, a * np.sinh(alpha)
-    s, size = np.sinh(d), np.sinh(d) ** 2 - d * d
-    gap = d - np.tanh(d)
-    flow = -a * (d * np.sinh(alpha) - s * np.sinh(beta)) / (d + s * np.cosh(alpha + beta) + size / gap)
-    B = -flow / gap
-    D = (a * (s * np.cosh(beta) - d * np.cosh(alpha)) - flow * s * np.sinh(alpha + beta)) / size
-    return -4 * np.pi * D, 4 * np.pi * c * (B + D / np.tanh(alpha))
 
 
 @pytest.mark.slow  # the cheap form, to 2 %, is that of eccentric annuli

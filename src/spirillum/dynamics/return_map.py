@@ -8,7 +8,7 @@ run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import NamedTuple
 
@@ -30,6 +30,8 @@ close to 1 is the rate of approach.
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
+_MOST_STEPS = 40_000
+"""Steps in time of a run and of all searches for its fixed point, where they end: a minute or two."""
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, rigid_links.STATES)]
 """What counts from the start of a turn."""
@@ -69,6 +71,15 @@ class Turn(NamedTuple):
     """Derivative of what acts (`stiff_steps.ACTING`) after `time` by that at its start, (8, 8)."""
 
 
+class EndedTurnError(InputError):
+    """A turn that cannot be followed to its end."""
+
+    def __init__(self, words: str, turn: Turn | None) -> None:
+        """Keep the part of the turn that was followed; None where not even a step was."""
+        super().__init__(words)
+        self.turn = turn
+
+
 @dataclass
 class ReturnMap:
     """Turns of the tail of one robot with its drive on."""
@@ -79,9 +90,15 @@ class ReturnMap:
     """Sense in which the tail turns in the lab."""
     tolerance: float = TubeRobot.tolerance
     """Error of a step over the sizes of the state's components."""
+    steps: list[int] = field(default_factory=lambda: [0])
+    """Number of steps that were taken, shared with maps of other tolerances."""
 
     def after(self, state: Samples) -> Turn:
-        """The next turn of the tail from a state, (19,)."""
+        """The next turn of the tail from a state, (19,).
+
+        Raises:
+            EndedTurnError: if the turn cannot be followed to its end.
+        """
         robot, data = self.robot, self.robot.data
         limits, sizes = watched_limits(robot, _NOWHERE), robot.step_sizes()
         y = state.copy()
@@ -101,12 +118,9 @@ class ReturnMap:
                 sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
             time = float(memory[stiff_steps.TIME])
-            if status == stiff_steps.STUCK:
-                raise InputError("no step is small enough to follow the motion; allowed: a larger roughness")
-            if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:
-                raise InputError(f"{robot.range_left(y, time)}; allowed: another start, or motion 'held'")
-            if time > _STALLED * robot.turn:
-                raise InputError("the tail hardly turns there; allowed: a stronger drive, or motion 'held'")
+            self.steps[0] += 1
+            if words := self._ended(status, y, time, gaps):
+                raise EndedTurnError(words, _part(before, noted, jacobians))
             noted.append(_noted(time, y, data))
             jacobians.append(jacobian.copy())
         end, share = self._at_the_angle(before, y, increments, begun)
@@ -115,6 +129,18 @@ class ReturnMap:
         steps = np.array(noted)
         tangent = _tangent(np.array([0.0, *steps[:-1, 0], time]), np.array(jacobians))
         return Turn(end, time, steps[steps[:, 0] <= time], tangent)
+
+    def _ended(self, status: int, y: Samples, time: float, gaps: Samples) -> str:
+        """Why a turn ends after a step, before the tail has turned; empty where it goes on."""
+        if status == stiff_steps.STUCK:
+            return "no step is small enough to follow the motion; allowed: a larger roughness"
+        if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:
+            return f"{self.robot.range_left(y, time)}; allowed: another start, or motion 'held'"
+        if time > _STALLED * self.robot.turn:
+            return "the tail hardly turns there; allowed: a stronger drive, or motion 'held'"
+        if self.steps[0] > _MOST_STEPS:
+            return "the motion still changes, and its steps are too short to follow it on; allowed: `simulate`"
+        return ""
 
     def _turned(self, y: Samples, turn: float, begun: tuple[float, float]) -> float:
         """Angle by which the tail has turned relative to the nearest wall, rad."""
@@ -137,6 +163,14 @@ class ReturnMap:
         share = float(brentq(left, 0.0, 1.0, xtol=1e-13))
         left(share)
         return inner.copy(), share
+
+
+def _part(state: Samples, noted: list[tuple[float, ...]], jacobians: list[Samples]) -> Turn | None:
+    """A turn as far as it was followed."""
+    if len(noted) < 2:
+        return None
+    steps = np.array(noted)
+    return Turn(state.copy(), noted[-1][0], steps, _tangent(np.array([0.0, *steps[:, 0]]), np.array(jacobians)))
 
 
 def _tangent(times: Samples, jacobians: Samples) -> Samples:

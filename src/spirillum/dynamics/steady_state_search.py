@@ -13,9 +13,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.return_map import STEPS, ReturnMap, Turn, fixed_place
+from spirillum.dynamics.return_map import STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.swimming.steady_state import State, SteadyState
 
@@ -116,9 +115,13 @@ def long_run(
         progress("free motion in the tube: turns of the tail", path.turns, _MOST_TURNS)
         try:
             turn = turns.after(state)
-        except InputError as error:
+        except EndedTurnError as error:
             if not path.turns:
-                raise
+                if error.turn is None:
+                    raise
+                turn = error.turn
+                path.add(turn)
+                states.append(turn.state)
             ended = f"after {path.of('time')[-1]:.4g} s {str(error).partition(';')[0]}"
             break
         path.add(turn)

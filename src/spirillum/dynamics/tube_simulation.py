@@ -20,7 +20,7 @@ from spirillum.dynamics.tube_run import ENDS, tube_run
 from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
-from spirillum.fluid.tube.table import TubeTable, least_checked_gap
+from spirillum.fluid.tube.table import BELOW, TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import MOTIONS, largest_yaw, range_of, resistance_at
@@ -315,7 +315,7 @@ class Checked(NamedTuple):
     known: bool
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
-    """Whether it comes nearer to the glass than where the table was checked."""
+    """Whether it comes nearer to the glass than where the flow around a whole robot was solved for."""
     said: list[Note]
     """Cautions about both, a sentence each."""
 
@@ -362,10 +362,8 @@ def held_against_check(
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
-        words = (
-            f"{_falls(time, int(near[0]))} {_length(float(gap[near].min()))}, and its table was checked from "
-            f"{_length(least)} on: the error estimate is that of larger gaps"
-        )
+        falls = f"{_falls(time, int(near[0]))} {_length(float(gap[near].min()))}"
+        words = f"{falls}: below {_length(least)} its table is {BELOW}"
         said.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
     return Checked(not beyond.size, bool(near.size), said)
 

@@ -15,7 +15,8 @@
 extern const double DATA[], TABLE[], FIRST[STATES], SIZES[STATES + 2], LIMITS[];
 
 enum { STAGES = 8, MEMORY = sizeof(Memory) / sizeof(double), WATCHING = GAPS + WATCHED };
-enum { STEPS = 64 };     /* of the integrator between two looks */
+enum { JACOBIAN = 64 };   /* of what acts, which a run does not need */
+enum { STEPS = 64 };      /* of the integrator between two looks */
 static const double ROUNDING = 1e-15; /* share of a step within which an end is found */
 
 /* The model's state. */
@@ -37,9 +38,9 @@ double watched(const double *y, double outside, double *data, const double *tabl
                double *gaps, int64_t size, int64_t table_size, int64_t count);
 void interpolate(double share, const double *y, const double *end, const double *increments, double *out);
 int64_t advance(double stop, int64_t clip, int64_t steps, double tolerance, double *memory, double *y, double *before,
-                double *increments, double *gaps, const double *samples, double *states, const double *sizes,
-                const double *limits, double rough, double *data, const double *table, int64_t count,
-                int64_t sample_count, int64_t size, int64_t table_size);
+                double *increments, double *jacobian, double *gaps, const double *samples, double *states,
+                const double *sizes, const double *limits, double rough, double *data, const double *table,
+                int64_t count, int64_t sample_count, int64_t size, int64_t table_size);
 
 static Free *free_of(Model *m) { return (Free *)m->state; }
 static const Free *seen_of(const Model *m) { return (const Free *)m->state; }
@@ -145,6 +146,7 @@ typedef enum { ARRIVED, EMPTY, AT_END, TOO_STIFF } Arrival;
 static Arrival follow(Free *f, double duty, double flow, double stop, bool clip, double *y) {
     const Limits limits = limits_of(f);
     double run[STATES], sizes[STATES + 2], samples[1] = {stop}, states[1][STATES], gaps[WATCHING];
+    double jacobian[JACOBIAN];
     bool answered = false;
     memcpy(sizes, SIZES, sizeof sizes);
     memcpy(run, y, sizeof run);
@@ -155,7 +157,7 @@ static Arrival follow(Free *f, double duty, double flow, double stop, bool clip,
     for (;;) {
         memcpy(gaps, f->gaps, sizeof gaps);
         const int64_t status
-            = advance(stop, clip, STEPS, TOLERANCE, (double *)&f->memory, run, f->before, f->increments[0], f->gaps,
+            = advance(stop, clip, STEPS, TOLERANCE, (double *)&f->memory, run, f->before, f->increments[0], jacobian, f->gaps,
                       samples, states[0], sizes, (const double *)&limits, ROUGHNESS, f->data, TABLE, WATCHING,
                       answered ? 0 : 1, DATA_SIZE, TABLE_SIZE);
         if (f->memory.answered > 0.0) {

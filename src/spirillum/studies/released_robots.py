@@ -25,6 +25,7 @@ from spirillum.dynamics.integration import INTERRUPTED
 from spirillum.dynamics.simulation import simulate
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.table import BELOW
 from spirillum.notes import Note
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.batch import RobotBatch
@@ -320,8 +321,8 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
         found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if near:
         words = (
-            f"{len(near)} of {len(answers)} robots come nearer to the wall than their tables were checked for: error "
-            f"estimates are of wider gaps; the first: {near[0].robot.with_tail}"
+            f"{len(near)} of {len(answers)} robots come nearer to the wall than their tables were checked for: there "
+            f"each is {BELOW}; the first: {near[0].robot.with_tail}"
         )
         found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if lost:

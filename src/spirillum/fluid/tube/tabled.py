@@ -16,7 +16,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.stages import STAGES
-from spirillum.fluid.tube.table import TubeTable, key_of, least_checked_gap
+from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
@@ -99,7 +99,7 @@ class TabledTube(Tube):
             table, seat = self.table_of(batch, index), seat_of(batch, index)
             gaps[index], least[index] = seat.clearance(table.geometry.body), least_checked_gap(table.packed)
             yaws[index], most[index] = abs(seat.yaw), largest_yaw(table.packed, seat.offset, seat.pitch)
-        near = "the table was checked at such gaps, and the error estimate is that of these"
+        near = f"the table is below it {BELOW}"
         aside = "the table was checked at such yaws, and there is no error estimate beyond"
         return [
             *super().cautions(batch),
