@@ -175,6 +175,7 @@ static void touch(Touch *t) {
 }
 
 static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
+static const double DEEP = 1e-3;       /* likewise: a trial deeper in the wall is refused without its film */
 static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
 
 /* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
@@ -238,7 +239,8 @@ static void set_slices(const TubeRobot *robot, const State *y, const double rota
     b->slice_count = 0;
     b->bound = robot->tube->cavitation;
     b->viscosity = robot->tube->viscosity;
-    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0 && seen->film < THIN * film->body)) return;
+    if (!(isfinite(b->bound) && half > 0.0 && film->half == 0.0)) return;
+    if (!(seen->film < THIN * film->body && seen->film > -DEEP * film->body)) return;
     for (int n = 0; n < MOST_SLICES; n++) {
         const double angle = PI * (n + 0.5) / MOST_SLICES;
         const double x = film->rear + half * (1.0 - cos(angle)), length = half * sin(angle) * PI / MOST_SLICES;

@@ -37,6 +37,7 @@ __all__ = [
     "in_one_thread",
     "native",
     "rows_in_one_thread",
+    "thread_count",
 ]
 
 _SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
@@ -103,9 +104,14 @@ def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F
     return decorate
 
 
+def thread_count() -> int:
+    """Number of threads that may work: 1 where the machine has no more, or other processes have them."""
+    return 1 if _alone.get() else _THREADS
+
+
 def in_one_thread() -> bool:
-    """Whether the work of this process stays in one thread: the machine has no more, or other processes have them."""
-    return _THREADS == 1 or _alone.get()
+    """Whether the work of this process stays in one thread."""
+    return thread_count() == 1
 
 
 @contextmanager

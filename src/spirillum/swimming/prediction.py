@@ -37,7 +37,7 @@ from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.released_motion import ReleasedMotion
+from spirillum.swimming.released_motion import ReleasedMotion, compute_together
 from spirillum.swimming.scenario import Scenario, resolve_scenario
 from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.steady_state import SteadyState
@@ -162,6 +162,8 @@ class Prediction(DisplayMixin):
         """
         band = self.band
         beside = self.other_models if others else None
+        wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}
+        vars(self).update(compute_together(wanted) if len(wanted) > 1 else {})
         over = band or self.intervals
         quantities = {
             name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
