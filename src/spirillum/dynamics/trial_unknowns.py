@@ -24,8 +24,8 @@ from spirillum.swimming.released_motion import ReleasedMotion, TrialInterval
 
 RUNS = 64
 """Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
-_SEED = 3
-"""Of the scrambling: of the first twelve the one at which the unknowns of 64 points correlate least."""
+_SEED = 36
+"""Of the scrambling: with it the unknowns of 64 points correlate by less than 0.04."""
 LEVEL = 0.9
 """Level of the interval over the unknowns."""
 _AXIAL, _RADIAL = "body.center_of_mass.x", "body.center_of_mass.radial"
