@@ -37,6 +37,7 @@ __all__ = [
     "in_one_thread",
     "native",
     "rows_in_one_thread",
+    "run_together",
     "thread_count",
 ]
 
@@ -47,6 +48,7 @@ _SHARES = 4
 
 _alone: ContextVar[bool] = ContextVar("alone", default=False)
 
+_T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])
 _Sizes: TypeAlias = dict[str, int]
 
@@ -112,6 +114,18 @@ def thread_count() -> int:
 def in_one_thread() -> bool:
     """Whether the work of this process stays in one thread."""
     return thread_count() == 1
+
+
+def run_together(*work: Callable[[], _T]) -> list[_T]:
+    """Return what functions return: the first runs in this thread, others beside it, as far as there are threads.
+
+    The compiled loops release the GIL.
+    """
+    if in_one_thread() or len(work) == 1:
+        return [one() for one in work]
+    with ThreadPoolExecutor(len(work) - 1) as pool:
+        others = [pool.submit(one) for one in work[1:]]
+        return [work[0](), *(future.result() for future in others)]
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import TILTED
+from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -37,7 +38,7 @@ from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.released_motion import ReleasedMotion, compute_together
+from spirillum.swimming.released_motion import ReleasedMotion
 from spirillum.swimming.scenario import Scenario, resolve_scenario
 from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.steady_state import SteadyState
@@ -163,7 +164,8 @@ class Prediction(DisplayMixin):
         band = self.band
         beside = self.other_models if others else None
         wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}
-        vars(self).update(compute_together(wanted) if len(wanted) > 1 else {})
+        if wanted:
+            vars(self).update(zip(wanted, run_together(*wanted.values()), strict=True))
         over = band or self.intervals
         quantities = {
             name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))

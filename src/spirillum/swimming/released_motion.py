@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from spirillum.envelope import quantity
-from spirillum.kernels.native import in_one_thread
 from spirillum.quantities import QUANTITIES
 
 HELD = "held"
@@ -53,13 +51,3 @@ class ReleasedMotion:
             name: quantity(value, QUANTITIES[name].unit, **over.get(name, {})) for name, value in self.values.items()
         }
         return {**self.basis, **values}
-
-
-def compute_together(requests: Mapping[str, Callable[[], ReleasedMotion]]) -> dict[str, ReleasedMotion]:
-    """Compute released motions: the first in this thread, others beside it, as far as there are cores."""
-    if in_one_thread():
-        return {name: compute() for name, compute in requests.items()}
-    first, *others = requests
-    with ThreadPoolExecutor(len(others)) as pool:  # the compiled loops release the GIL
-        beside = {name: pool.submit(requests[name]) for name in others}
-        return {first: requests[first](), **{name: future.result() for name, future in beside.items()}}
