@@ -174,6 +174,7 @@ static void touch(Touch *t) {
 }
 
 static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
+static const double DEEP = 1e-3;       /* likewise: a trial deeper in the wall is refused without its film */
 static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
 static const double STRAIGHT = 1.1;    /* velocities between the ends of the side are less than those there times this */
 
@@ -247,7 +248,7 @@ static void set_slices(const Touch *t) {
 static bool set_ends(const Touch *t, Slice ends[2]) {
     const Film *film = &t->robot->table.film;
     const bool thin = isfinite(t->balance->bound) && film->front > film->rear && film->half == 0.0
-                   && t->seen->film < THIN * film->body;
+                   && t->seen->film < THIN * film->body && t->seen->film > -DEEP * film->body;
     for (int n = 0; n < 2 && thin; n++)
         ends[n] = slice_at(t->robot, t->y, t->rotation, n ? film->front : film->rear, 0.0);
     return thin;

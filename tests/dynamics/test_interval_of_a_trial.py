@@ -11,6 +11,7 @@ import pytest
 import spirillum as sp
 from spirillum.cli.tables.parts import released_columns
 from spirillum.dynamics.trial_unknowns import RUNS, UNKNOWNS, open_unknowns, samples_of, variance_shares, with_interval
+from spirillum.robot.links import links_of
 from spirillum.swimming.released_motion import ReleasedMotion
 
 WIDE = sp.load("biorob2012-wide")
@@ -67,16 +68,24 @@ def test_robots_that_stand_or_are_lost_are_counted_and_told() -> None:
 def test_what_is_stated_is_not_varied() -> None:
     stated = {"wait": 5.0, "roughness": None, "friction_coefficient": 0.2}
     known = sp.load("biorob2012-wide", **{"friction.effective": "1e-5 N m s/rad"})
-    fluid = "fluid.cavitation_pressure"
-    assert [one.name for one in open_unknowns(known, WEIGHT, stated)] == ["roughness", "weight", fluid]
-    assert [one.name for one in open_unknowns(known, 0.0, stated)] == ["roughness", fluid]
+    fluid, center = "fluid.cavitation_pressure", ["body.center_of_mass.x", "body.center_of_mass.radial"]
+    assert [one.name for one in open_unknowns(known, WEIGHT, stated)] == ["roughness", "weight", fluid, *center]
+    assert [one.name for one in open_unknowns(known, 0.0, stated)] == ["roughness", fluid, *center]
     all_stated = sp.load("biorob2012-wide", **{"friction.effective": "1e-5 N m s/rad", fluid: "none"})
-    assert [one.name for one in open_unknowns(all_stated, 0.0, stated)] == ["roughness"]
+    assert [one.name for one in open_unknowns(all_stated, 0.0, stated)] == ["roughness", *center]
+    balanced = sp.load("biorob2012-wide", **{"body.center_of_mass": {"x": "0 mm"}})
+    assert not {*center} & {one.name for one in open_unknowns(balanced, WEIGHT, stated)}
     sample = samples_of(known, WEIGHT, open_unknowns(known, WEIGHT, stated))
     assert {one.wait for one in sample} == {None}
     assert {one.robot.friction.effective for one in sample} == {1e-5}
     masses = np.array([one.robot.body.mass for one in sample])
     assert np.ptp(masses) == pytest.approx(0.2 * WEIGHT / 9.81, rel=0.1)
+    centers = [one.robot.body.center_of_mass for one in sample]
+    along, aside = (np.array([getattr(one, name) for one in centers]) for name in ("x", "radial"))
+    length, radius = known.body.length, 0.5 * known.body.diameter
+    along = along - links_of(known).body.centre[0]  # of uniform density
+    assert (along.min(), along.max()) == pytest.approx((-0.05 * length, 0.05 * length), rel=0.1)
+    assert (aside.min(), aside.max()) == pytest.approx((0.0, 0.05 * radius), abs=0.005 * radius)
 
 
 def test_the_page_of_unknowns_lists_all_of_them() -> None:

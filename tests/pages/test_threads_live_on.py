@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from spirillum.dynamics.prediction import predict
 from spirillum.errors import InputError
 from spirillum.pages import simulation_thread as module
 from spirillum.pages.job import BackgroundJob, worker
@@ -160,3 +161,24 @@ def test_a_process_that_was_ended_says_so_and_what_it_prints_besides_is_no_progr
     job = BackgroundJob("ended_from_outside", {})
     until(lambda: not job.running)
     assert "ended from outside" in job.progress()["failed"]
+
+
+def test_trial_and_steady_motion_come_beside_the_held_numbers() -> None:
+    """One column after the other, with the values of `predict`; a robot that has no tube has none."""
+    page = SimulationThread("biorob2012-wide", lambda: None)
+    page.start()
+    try:
+        until(lambda: lane_of(page)["numbers"])
+        assert lane_of(page)["numbers"]["columns"] == {"trial": None, "steady": None}  # being computed
+        until(lambda: all(lane_of(page)["numbers"]["columns"].values()))
+        columns = lane_of(page)["numbers"]["columns"]
+        page.ask({"do": "preset", "value": "ecoli"}, lambda _text: None)
+        until(lambda: (lane_of(page)["numbers"] or {}).get("model") == "slender")
+        assert lane_of(page)["numbers"]["columns"] == {}
+    finally:
+        page.stop()
+    answer = predict("biorob2012-wide", band=False)
+    for name in ("trial", "steady"):
+        speed = getattr(answer, name).values["forward_velocity"]
+        assert columns[name]["rows"]["forward_velocity"] == pytest.approx(speed, rel=1e-9)
+        assert "contact assumed, not validated" in columns[name]["title"]

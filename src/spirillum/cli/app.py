@@ -102,12 +102,14 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
     from spirillum.cli import renderer
-    from spirillum.papers.biorob2012.published import published_beside
+    from spirillum.kernels.native import run_together
+    from spirillum.papers.biorob2012.published import other_tube, published_beside
 
     with renderer.progress_bar(quiet=json) as progress:
         result = request(progress=progress)
-        answer = result.to_dict()
-        published = published_beside(result)
+        beside = other_tube(result)
+        answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
+        published = published_beside(result, beside)
     more = {"published": published} if published else {}
     renderer.show({**answer, **more}, json=json, all_of_it=all_of_it)
 

@@ -159,6 +159,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     are lines of their own on standard error in any case.
     """
     from spirillum.fluid.tube.progress_messages import ANNOUNCED, OF_A_RUN, TILTED
+    from spirillum.swimming.released_motion import SPEED_OF
     from spirillum.worker_pool import ESTIMATE
 
     lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, TILTED)
@@ -197,7 +198,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     before: list[int | None] = [0, 0]
 
     def tell(what: str, done: int, total: int | None) -> None:
-        if what.startswith(lines):
+        if what.startswith((*lines, SPEED_OF)):
             bar.console.print(what, highlight=False)
             what, done, total = "at work", 0, None  # without an end, but with the time that goes by
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen

@@ -42,7 +42,7 @@ _Robot = TypeVar("_Robot", bound="FreeRobot")
 class FreeRobot(ABC):
     """What the compiled equations need of a free robot, SI, about the origin in body axes."""
 
-    tolerance: ClassVar[float]
+    tolerance: float = 1e-8
     """Error of a step over the sizes of the state's components."""
     observed: ClassVar[int]
     """Number of what is observed in a state."""
@@ -205,7 +205,6 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
 class TwoLinks(FreeRobot):
     """A robot in unbounded fluid, with films between it and a channel's wall: see `spirillum.kernels.two_links`."""
 
-    tolerance: ClassVar[float] = 1e-8
     observed: ClassVar[int] = rigid_links.OBSERVED
 
     drag: Samples

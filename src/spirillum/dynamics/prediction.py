@@ -78,7 +78,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         duration: of the trial: time with the motor on, over which its values are means, with its unit or a float in s;
             None: 20 s.
         interval: of the trial, the 90 % interval over its unknowns (waiting time, roughness, dry friction, weight,
-            effective friction): 64 runs, up to two minutes.
+            centre of mass, effective friction, cavitation pressure): 64 runs.
         beyond_stokes: answer at Reynolds numbers above 10 too, where inertia dominates and these models
             are wrong, as the robot's option `model.beyond_stokes`.
         progress: told what is being computed, how much is done, and of how much.

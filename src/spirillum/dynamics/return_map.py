@@ -23,10 +23,8 @@ from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
-_SEARCHING = 10.0 * TubeRobot.tolerance
-"""Error of a time step while a fixed point is searched; it is refined at that of a run, as are its multipliers: one
-close to 1 is the rate of approach.
-"""
+SEARCHING = 10.0 * TubeRobot.tolerance
+"""Error of a time step on the way to a fixed point, which is refined at that of a run, as is its multiplier."""
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
@@ -216,7 +214,7 @@ def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint 
         heavy: whether the azimuth counts, too.
     """
     free = np.arange(0 if heavy else 1, 4)
-    place = _Place(replace(turns, tolerance=_SEARCHING), state)
+    place = _Place(replace(turns, tolerance=SEARCHING), state)
     near = _continued(place, place.coordinates(state), free, _FIRST_TURNS)
     if near is None:
         return None
@@ -284,6 +282,8 @@ def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Ch
             new = place.change(new.x + new.change)
         if new is None:
             turns *= 0.1
+            if turns < 1.0:  # not even the next turns can be followed from a pose nearby
+                return None
             continue
         turns *= float(np.clip(size / _size(new.change[free]), *_GROWTH))
         here = new

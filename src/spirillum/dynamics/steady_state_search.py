@@ -6,14 +6,14 @@ The run is followed turn by turn. Now and then the fixed point of the return map
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.return_map import STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
+from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links
 from spirillum.swimming.steady_state import State, SteadyState
@@ -109,12 +109,13 @@ def long_run(
         turns_shown: of the path at least, where a steady motion is found.
     """
     turns, path = ReturnMap(robot, sign), Path()
+    coarse = replace(turns, tolerance=SEARCHING)
     states, ended = [state], ""
     found, followed = None, 0.0
     while path.turns < _MOST_TURNS and (found is None or path.turns < turns_shown):
         progress("free motion in the tube: turns of the tail", path.turns, _MOST_TURNS)
         try:
-            turn = turns.after(state)
+            turn = coarse.after(state)
         except EndedTurnError as error:
             if not path.turns:
                 if error.turn is None:

@@ -52,7 +52,7 @@ class Surroundings:
 class TubeRobot(FreeRobot):
     """A robot in its tube: see `spirillum.kernels.tube_motion`."""
 
-    tolerance: ClassVar[float] = 1e-7
+    tolerance: float = 1e-7
     """Trajectory and pose of a minute in contact are then accurate to some parts in 1e7, energies to 1e-6; a tenth of
     it takes two and a half times as long.
     """

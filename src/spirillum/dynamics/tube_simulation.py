@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -155,6 +156,7 @@ def run_in_tube(
     field: Field,
     weight: bool,  # noqa: FBT001 - one of the run's settings
     progress: Progress | None,
+    tolerance: float = TubeRobot.tolerance,
 ) -> xr.Dataset:
     """A run with six degrees of freedom in the robot's tube.
 
@@ -168,11 +170,12 @@ def run_in_tube(
         field: axis about which the field of a robot with a magnet turns.
         weight: let weight and buoyancy act, if the masses are known.
         progress: told what is being computed, how much is done, and of how much.
+        tolerance: error of a time step over the sizes of the state's components.
     """
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
-    links = in_tilted_field(links, field)
+    links = replace(in_tilted_field(links, field), tolerance=tolerance)
     turn = links.turn
     timetable = times.timetable(turn, own)
     begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links, timetable.switches)

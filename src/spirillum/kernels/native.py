@@ -37,6 +37,8 @@ __all__ = [
     "in_one_thread",
     "native",
     "rows_in_one_thread",
+    "run_together",
+    "thread_count",
 ]
 
 _SCALARS = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
@@ -46,6 +48,7 @@ _SHARES = 4
 
 _alone: ContextVar[bool] = ContextVar("alone", default=False)
 
+_T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])
 _Sizes: TypeAlias = dict[str, int]
 
@@ -103,9 +106,26 @@ def native(*written: str, rows: str = "", symbol: str = "") -> Callable[[_F], _F
     return decorate
 
 
+def thread_count() -> int:
+    """Number of threads that may work: 1 where the machine has no more, or other processes have them."""
+    return 1 if _alone.get() else _THREADS
+
+
 def in_one_thread() -> bool:
-    """Whether the work of this process stays in one thread: the machine has no more, or other processes have them."""
-    return _THREADS == 1 or _alone.get()
+    """Whether the work of this process stays in one thread."""
+    return thread_count() == 1
+
+
+def run_together(*work: Callable[[], _T]) -> list[_T]:
+    """Return what functions return: the first runs in this thread, others beside it, as far as there are threads.
+
+    The compiled loops release the GIL.
+    """
+    if in_one_thread() or len(work) == 1:
+        return [one() for one in work]
+    with ThreadPoolExecutor(len(work) - 1) as pool:
+        others = [pool.submit(one) for one in work[1:]]
+        return [work[0](), *(future.result() for future in others)]
 
 
 @contextmanager

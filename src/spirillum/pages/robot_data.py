@@ -15,12 +15,14 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
+from spirillum.swimming.model_choice import WALLED
 from spirillum.units import display_unit, shown_in
 
 if TYPE_CHECKING:
     from spirillum.dynamics.plant import Snapshot
 if TYPE_CHECKING:
     from spirillum.swimming.prediction import Prediction
+    from spirillum.swimming.released_motion import ReleasedMotion
 
 
 _CREASE = np.radians(40.0)
@@ -174,6 +176,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "friction": answer["friction"],
         "calibrated": answer["calibrated"],
         "rows": rows,
+        "columns": dict.fromkeys(("trial", "steady")) if answer["model"] == WALLED else {},
         "forces": forces_of(prediction),
         "band": "band" in answer,
         "error": _finite(error.get("value")),
@@ -182,6 +185,13 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "others": answer.get("other_models", {}).get("statement", ""),
         "warnings": list(answer.get("warnings", [])),
     }
+
+
+def released_answer(motion: ReleasedMotion) -> dict[str, Any]:
+    """A trial or steady motion as the page shows it: SI values of the rows, or the reason why there are none."""
+    state = motion.basis.get("state", "")
+    title = motion.reason or f"{state}; {motion.basis['assumption']}"
+    return {"title": title, "rows": {name: _finite(motion.values.get(name)) for name in TABLE}}
 
 
 def forces_of(prediction: Prediction) -> list[dict[str, Any]]:

@@ -7,18 +7,20 @@ import queue
 import threading
 import time
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from spirillum.errors import InputError, failure_sentence
 from spirillum.pages.job import BackgroundJob, worker
 from spirillum.pages.knobs import Settings, number_of, refusal_of, report_fault, robot_tables, text_of
 from spirillum.pages.page_robot import Built, PageRobot, build
-from spirillum.pages.robot_data import prediction_answer, quantity_list
+from spirillum.pages.robot_data import prediction_answer, quantity_list, released_answer
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import robot_text
+from spirillum.swimming.model_choice import WALLED
+from spirillum.swimming.released_motion import ReleasedMotion
 
 
 class Preparing(BackgroundJob):
@@ -52,8 +54,15 @@ _UNTOUCHED = 2.0
 _PAUSE = 0.2
 """Rest of the thread of the simulation after a fault, s."""
 
+_COLUMNS_AFTER = 1.0
+"""Time for which a robot is left as it is before its trial and steady motion are computed, s."""
+
 Command = tuple[Mapping[str, Any], Callable[[str], None]]
 """Command of a client, and the callback for its refusal."""
+
+
+class _OutdatedError(Exception):
+    """Something else was set meanwhile."""
 
 
 class SimulationThread:
@@ -71,6 +80,7 @@ class SimulationThread:
         self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
         self._wanted: dict[int, tuple[int, int, str, Settings, Robot, Robot]] = {}
         self._work = threading.Condition()
+        self._released: dict[int, tuple[int, int, dict[str, Any], Settings, Robot]] = {}
         self._built: queue.Queue[tuple[int, int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
         self._lanes = [PageRobot.of(self._own)]
         self._preparing: Preparing | None = None
@@ -85,6 +95,7 @@ class SimulationThread:
         self._threads = [
             threading.Thread(target=self._run, name="page: motion", daemon=True),
             threading.Thread(target=self._build, name="page: numbers", daemon=True),
+            threading.Thread(target=self._release, name="page: trial and steady", daemon=True),
         ]
 
     def start(self) -> None:
@@ -312,7 +323,7 @@ class SimulationThread:
             known = "" if lane.built is None else lane.built.model
             robots = lane.robot, lane.predicted()
             self._wanted[index] = (lane.generation, lane.revision, known, lane.settings, *robots)
-            self._work.notify()
+            self._work.notify_all()
 
     def _build(self) -> None:
         while not self._ending.is_set():
@@ -329,7 +340,12 @@ class SimulationThread:
                     model = built.model
                     self._built.put((index, generation, revision, built, None, ""))
                     self._wake_up()
-                self._built.put((index, generation, revision, None, self._numbers(predicted, settings, model), ""))
+                numbers = self._numbers(predicted, settings, model)
+                self._built.put((index, generation, revision, None, numbers, ""))
+                if numbers["columns"]:
+                    with self._work:
+                        self._released[index] = (generation, revision, numbers, settings, predicted)
+                        self._work.notify_all()
             except Exception as error:  # the thread lives on, whatever a robot's numbers meet
                 report_fault(error)
                 self._built.put((index, generation, revision, None, None, failure_sentence(error)))
@@ -340,6 +356,44 @@ class SimulationThread:
 
         placement = settings.placement() if model == "tube" else None
         return prediction_answer(predict(robot, model=model, placement=placement))
+
+    def _release(self) -> None:
+        """Compute trial and steady motion beside held numbers, one column after the other."""
+        while not self._ending.is_set():
+            with self._work:
+                while not self._released and not self._ending.is_set():
+                    self._work.wait()
+                if self._ending.is_set():
+                    return
+                index = next(iter(self._released))
+                generation, revision, numbers, settings, robot = self._released.pop(index)
+            try:
+                for name, motion in self._columns(index, revision, settings, robot):
+                    numbers = {**numbers, "columns": {**numbers["columns"], name: released_answer(motion)}}
+                    self._built.put((index, generation, revision, None, numbers, ""))
+                    self._wake_up()
+            except _OutdatedError:
+                pass
+            except Exception as error:  # the thread lives on, and the columns stay empty
+                report_fault(error)
+
+    def _columns(
+        self, index: int, revision: int, settings: Settings, robot: Robot
+    ) -> Iterator[tuple[str, ReleasedMotion]]:
+        """The released motions of a robot, as long as nothing else is set."""
+        from spirillum.dynamics.prediction import predict
+
+        def check(_what: str, _done: int, _total: int) -> None:
+            if self._ending.is_set() or self._asked[index : index + 1] != [revision]:
+                raise _OutdatedError
+
+        self._ending.wait(_COLUMNS_AFTER)
+        check("", 0, 0)
+        held = predict(robot, model=WALLED, placement=settings.placement(), band=False, progress=check)
+        for name, compute in held.released.items():
+            motion = compute()
+            check("", 0, 0)
+            yield name, motion
 
     def _receive(self) -> bool:
         """Take what was built, unless something else was set meanwhile."""

@@ -19,6 +19,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.progress_messages import TILTED
+from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -162,6 +163,9 @@ class Prediction(DisplayMixin):
         """
         band = self.band
         beside = self.other_models if others else None
+        wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}
+        if wanted:
+            vars(self).update(zip(wanted, run_together(*wanted.values()), strict=True))
         over = band or self.intervals
         quantities = {
             name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))

@@ -119,7 +119,13 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
     yield f"of its variance: {', '.join(words)}; state the first of them first"
 
 
-_UNKNOWN = {"friction.effective": "effective friction", "wait": "waiting time"}
+_UNKNOWN = {
+    "friction.effective": "effective friction",
+    "wait": "waiting time",
+    "fluid.cavitation_pressure": "cavitation pressure",
+    "body.center_of_mass.x": "centre of mass (axial)",
+    "body.center_of_mass.radial": "centre of mass (radial)",
+}
 """Unknowns of a trial in words."""
 
 

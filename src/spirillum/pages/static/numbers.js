@@ -1,7 +1,10 @@
-// The table of numbers: now, held at a place, and the range that is not known better; with the stated error in words.
+// The table of numbers: now, held at a place, in a trial and in the steady state of a tube, and the range that is not known
+// better; with the stated error in words.
 
 import { element, figure, inUnit, span, unitText } from "./format.js";
 import { capital } from "./plots.js";
+
+const RELEASED = { trial: "released, 60 s of waiting, mean over 20 s with the motor on", steady: "what the released robot approaches" };
 
 export class Numbers {
   constructor(holder) {
@@ -21,6 +24,7 @@ export class Numbers {
     }
     this.quantities = quantities;
     this.cells = {};
+    const columns = Object.entries(numbers?.columns ?? {});
     const body = element("tbody");
     for (const [name, row] of Object.entries(numbers?.rows ?? {})) {
       const quantity = quantities[name];
@@ -32,6 +36,7 @@ export class Numbers {
         element("th", { scope: "row" }, capital(quantity.label), element("small", { text: ` ${unitText(quantity.unit)}` })),
         now,
         element("td", { class: "steady", text: inUnit(row.value, quantity), "data-value": row.value }),
+        ...columns.map(([, column]) => element("td", { class: column ? "steady" : "steady soft", text: !column ? "\u2026" : column.rows[name] === null ? "\u2013" : inUnit(column.rows[name], quantity) })),
         element("td", { class: "range", text: ranged ? span(row.low * quantity.factor, row.high * quantity.factor) : "" }),
       ));
     }
@@ -40,6 +45,7 @@ export class Numbers {
         element("th", { scope: "col", text: "" }),
         element("th", { scope: "col", text: "now", title: "at this moment of the run" }),
         element("th", { scope: "col", text: "held", title: "steady swimming in axial motion at a fixed pose, as predicted by predict" }),
+        ...columns.map(([name, column]) => element("th", { scope: "col", text: name, title: `${RELEASED[name]}: ${column ? column.title : "computing \u2026"}` })),
         element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
       )), body);
     this.table = table;
@@ -56,7 +62,7 @@ export class Numbers {
     this.tag.textContent = "computing \u2026";
     this.tag.title = "";
     for (const cell of this.table.querySelectorAll("td")) {
-      cell.textContent = cell.className === "steady" ? "\u2013" : "";
+      cell.textContent = cell.classList.contains("steady") ? "\u2013" : "";
       delete cell.dataset.value;
     }
     this.holder.querySelector(".said")?.remove();

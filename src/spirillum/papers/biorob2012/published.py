@@ -26,11 +26,8 @@ _WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
 _SOURCE = "BioRob 2012, text on Figs 5 and 6"
 
 
-def published_beside(found: Prediction) -> list[dict[str, Any]]:
-    """Return what the paper states of this robot, with our held and trial values; empty for any other request.
-
-    The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
-    one, with two of its tails.
+def other_tube(found: Prediction) -> Prediction | None:
+    """Return the same robot in the paper's other tube; None for any other request than one of which it states numbers.
 
     Args:
         found: the prediction, with its released motions.
@@ -41,14 +38,30 @@ def published_beside(found: Prediction) -> list[dict[str, Any]]:
         or found.tail_rate is not None
         or found.batch.placement != RobotBatch.of(found.robot).placement
         or found.fitted_by
+        or not _drops(found.robot)
     ):
-        return []
-    for own, other, sign in ((_WIDE, _NARROW, 1.0), (_NARROW, _WIDE, -1.0)):
+        return None
+    for own, other in ((_WIDE, _NARROW), (_NARROW, _WIDE)):
         if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
             robot = _with_tail_of(found.robot, other)
-            beside = predict(robot, model=found.model.name, calibrated=found.calibrated)
-            return [_entry(drop, found, beside, sign) for drop in _drops(found.robot)]
-    return []
+            return predict(robot, model=found.model.name, calibrated=found.calibrated, band=False)
+    return None
+
+
+def published_beside(found: Prediction, beside: Prediction | None) -> list[dict[str, Any]]:
+    """Return what the paper states of this robot, with our held and trial values; empty for any other request.
+
+    The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
+    one, with two of its tails.
+
+    Args:
+        found: the prediction, with its released motions.
+        beside: what `other_tube` returns for it.
+    """
+    if beside is None:
+        return []
+    sign = 1.0 if found.robot == _with_tail_of(found.robot, _WIDE) else -1.0
+    return [_entry(drop, found, beside, sign) for drop in _drops(found.robot)]
 
 
 def _with_tail_of(robot: Robot, preset: str) -> Robot:
