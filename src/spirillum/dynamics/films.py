@@ -23,6 +23,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import two_links as kernel
+from spirillum.robot.mesh import centreline_of
 from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import Robot
 
@@ -107,13 +108,17 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
 
 
 def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
-    """The circle on which the wire turns, where it begins to have its full radius and at its tip.
+    """The circles on which the wire turns: where it has its full radius, of a helix behind its root, and at its tip.
 
     The wire touches with its own small radius: its film stops it, and resists little before.
     """
     tail = robot.tail
     wire, root = 0.5 * tail.wire_diameter, 0.5 * robot.body.length + robot.coupling.length
-    radius = tail.amplitude + wire
     coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
     settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
-    return [[x, radius, 0.0, coefficient, 1.0, radius] for x in (-root - settled, -root - tail.length)]
+    places = [(-root - settled, tail.amplitude), (-root - tail.length, tail.amplitude)]
+    if not tail.form.is_helix:
+        points = centreline_of(robot, np.linspace(0.0, tail.length, 2001)).position
+        reach = np.hypot(points[:, 1], points[:, 2])
+        places = [(float(points[n, 0]), float(reach[n])) for n in dict.fromkeys((int(np.argmax(reach)), 2000))]
+    return [[x, reach + wire, 0.0, coefficient, 1.0, reach + wire] for x, reach in places]

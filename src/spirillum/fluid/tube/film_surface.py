@@ -109,7 +109,7 @@ def _of_profile(outline: Outline) -> FilmBody:
     if ends[1] - ends[0] < _SIDE * a:
         return _as_spheroid(x, rho, a)
     if np.any(rho[wide[0] : wide[-1]] < a * (1.0 - _LEVEL)):
-        raise InputError(f"{_NO_FILM} its side has a waist")
+        raise InputError(f"{_NO_FILM} its side has a waist; allowed: a straight side, or a round one")
     rear, front = (_rounded(outward * x, rho, a) for outward in (-1.0, 1.0))
     return FilmBody(a, 0.0, (-rear[0], rear[1]), front)
 
