@@ -50,7 +50,7 @@ Nearest site_nearest(const Site *site, const State *y, const double rotation[3][
         n_z = sin(angle);
         n_1 = n_y * rotation[1][0] + n_z * rotation[2][0];
         const double turned = n_y * rotation[2][0] - n_z * rotation[1][0];
-        reach = sqrt(larger(squared(ring) + flat * n_1 * n_1, 1e-36 * squared(radius)));
+        reach = copysign(sqrt(larger(squared(ring) + flat * n_1 * n_1, 1e-36 * squared(radius))), ring);
         const double slope = flat * n_1 * turned / reach;
         const double first = n_y * up - n_z * side + slope;
         const double second = -n_y * side - n_z * up + (flat * (turned * turned - n_1 * n_1) - slope * slope) / reach;

@@ -36,14 +36,15 @@ Film film_opened(const double *packed) {
     };
 }
 
-/* A ring about the body's axis with a ball that runs around on it, or a spheroid (half > 0, ball 0); m. */
+/* A ring about the body's axis with a ball that runs around on it, or a spheroid (half > 0, ball 0); m. Of a ball larger
+ * than the body, as under a slender nose, the ring's radius is negative: its centre is beyond the axis. */
 typedef struct {
     double x, half, radius, ball;
 } Part;
 
 static Part rear_end(const Film *f) { return (Part){f->rear, 0.0, f->body - f->rear_round, f->rear_round}; }
 static Part front_end(const Film *f) { return (Part){f->front, 0.0, f->body - f->front_round, f->front_round}; }
-static Part spheroid(const Film *f) { return (Part){0.0, f->half, f->body, 0.0}; }
+static Part spheroid(const Film *f) { return (Part){f->rear, f->half, f->body, 0.0}; }
 
 /* Direction of the body's axis: its components towards the tube's axis and to the side. */
 typedef struct {
@@ -61,14 +62,14 @@ static double clearance_of(double tube, Part part, double e, Axis axis) {
     for (int k = 0; k < (part.half > 0.0 ? 4 : 2); k++) {
         const double n_z = sqrt(1.0 - n_y * n_y);
         const double along = n_y * axis.side - n_z * axis.lift; /* n.d; the depth counts downwards */
-        const double reach = sqrt(ring * ring + stretch * along * along), bend = stretch * along;
-        if (reach > 0.0) {
+        const double reach = copysign(sqrt(ring * ring + stretch * along * along), ring), bend = stretch * along;
+        if (reach != 0.0) {
             q_y = across + (ring * ring * n_y + bend * axis.side) / reach;
             q_z = depth + (ring * ring * n_z - bend * axis.lift) / reach;
         }
         n_y = clamped(n_y + (q_y - room * n_y) / (room - ring), -limit, limit);
     }
-    return sqrt(larger(room * room - q_y * q_y, 0.0)) - q_z;
+    return copysign(sqrt(larger(room * room - q_y * q_y, 0.0)), room) - q_z;
 }
 
 /* Distance between the wall and a part, m: the normal is turned until it points at the nearest point. */
@@ -82,8 +83,8 @@ static double gap_of(double tube, Part part, double e, Axis axis) {
     }
     for (int k = 0; k < 4; k++) {
         const double along = n_y * axis.side - n_z * axis.lift, across = -n_y * axis.lift - n_z * axis.side;
-        const double reach = sqrt(larger(ring * ring + stretch * along * along, 0.0));
-        if (reach > 0.0) {
+        const double reach = copysign(sqrt(larger(ring * ring + stretch * along * along, 0.0)), ring);
+        if (reach != 0.0) {
             q_y = c_y + (ring * ring * n_y + stretch * along * axis.side) / reach;
             q_z = c_z + (ring * ring * n_z - stretch * along * axis.lift) / reach;
         }
@@ -96,7 +97,7 @@ static double gap_of(double tube, Part part, double e, Axis axis) {
         n_y = y / length;
         n_z = z / length;
     }
-    return tube - part.ball - hypot(q_y, q_z);
+    return tube - part.ball - copysign(hypot(q_y, q_z), tube - part.ball);
 }
 
 double film_smallest_gap(const Film *f, double e, double pitch, double yaw) {

@@ -8,7 +8,7 @@
 typedef struct {
     double tube, body;         /* R, a */
     double half;               /* half-length of a spheroid, 0: a straight side */
-    double rear, rear_round;   /* rear end of the straight side, radius of its rounding */
+    double rear, rear_round;   /* rear end of the straight side (of a spheroid its middle), radius of its rounding */
     double front, front_round; /* front end */
     double first, last;        /* knots of the first coordinate */
     int64_t intervals;

@@ -25,6 +25,7 @@ WIDE = "biorob2012-wide"
         (["predict", ""], "robot = ''; allowed: a preset"),
         (["predict", WIDE, "--phases", "2.5"], "--phases = '2.5' is not allowed; allowed: a whole number"),
         (["prepare", WIDE, "--workers", "0"], "--workers = '0' is not allowed; allowed: greater than or equal to 1"),
+        (["predict", WIDE, "--set", "tail.starts=40"], "--set over preset biorob2012-wide: tail.starts = 40 is not"),
         (["render", WIDE, "-o", "film.mp4", "--trouble", ""], "trouble ''; allowed: lost-frames"),
         (
             ["simulate", WIDE, "--model", "tube", "-o", "x.nc", "--roughness", "1nm", "--wait", "100s"],

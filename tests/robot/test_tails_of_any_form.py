@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from tests.support.commands import run_command
 
+import spirillum as sp
 from spirillum import load
 from spirillum.errors import InputError
+from spirillum.pages.knobs import Settings
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import robot_solids
 from spirillum.robot.mesh import robot_mesh
@@ -181,3 +183,22 @@ def test_a_missing_file_of_points_ends_with_exit_code_2(tmp_path: Path) -> None:
     outcome = run_command("predict", str(tmp_path / "robot.toml"))
     assert outcome.code == 2
     assert "nowhere.csv" in outcome.err
+
+
+def test_what_follows_from_points_is_no_number_of_its_own() -> None:
+    robot = load("biorob2012-wide", tail={"curve": helix()})
+    assert robot.source_of("tail.wavelength") == "tail.curve"
+    assert robot.source_of("tail.wire_diameter") is None
+    fields = [knob["field"] for knob in Settings("biorob2012-wide").shown(robot)]
+    assert "tail.amplitude" not in fields
+    assert "tail.wire_diameter" in fields
+    with pytest.raises(InputError, match=r"vary tail\.wavelength follows from tail\.curve"):
+        sp.design(robot, vary={"tail.wavelength": ("15 mm", "30 mm")}, maximise="forward_velocity", model="rft")
+
+
+def test_a_knob_of_the_page_scales_a_cone(tmp_path: Path) -> None:
+    text = 'extends = "biorob2012-wide"\n[tail]\namplitude = { from = "1 mm", to = "3 mm" }\n'
+    (tmp_path / "cone.toml").write_text(text)
+    robot = Settings(tmp_path / "cone.toml").changed("tail.amplitude", "2.4 mm").robot()
+    assert robot.tail.amplitude == pytest.approx(2.4e-3)
+    assert robot.tail.amplitude_along == ((0.0, pytest.approx(1 / 3)), (1.0, 1.0))

@@ -124,6 +124,8 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
     if path not in known:
         hint = did_you_mean(path, [*known, TURNS])
         raise InputError(f"{option} {path[:60]} is no number of this robot{hint}; allowed: {', '.join(known)}, {TURNS}")
+    if (source := robot.source_of(path)) is not None:
+        raise InputError(f"{option} {path} follows from {source}; allowed: fields that it leaves open")
     unit = units[path] or "1"
     low, high = range_of(f"{option} {path}", given, unit)
     if not low < high:

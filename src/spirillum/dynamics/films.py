@@ -21,8 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import two_links as kernel
+from spirillum.robot.mesh import centreline_of
+from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import Robot
 
 ROUGHNESS_SHARE = 1e-4
@@ -82,35 +84,41 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
     body, viscosity = robot.body, robot.fluid.viscosity
     radius, half = 0.5 * body.diameter, 0.5 * body.length
     across = _across(radius, channel)
-    if body.shape in ("sphere", "spheroid"):
-        return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius]]
     if body.shape == "profile":
-        known = "capsule, cylinder, sphere or spheroid"
-        raise InputError(
-            f"lubrication films of a body.profile beside a wall are not known; allowed: body.shape = {known}"
-        )
-    front, rear = half - body.rounding(body.front_end), -half + body.rounding(body.rear_end)
+        shape = FilmBody.of(profile_outline(body.points))
+        middle, half, front, rear = shape.rear[0], shape.half, shape.front[0], shape.rear[0]
+        rounds = {-1.0: shape.rear[1], 1.0: shape.front[1]}
+        ends = {place: radius if ball > 0.5 * radius else 0.0 for place, ball in rounds.items()}
+    else:
+        ends = {-1.0: body.rounding(body.rear_end), 1.0: body.rounding(body.front_end)}
+        middle, half = 0.0, half if body.shape in ("sphere", "spheroid") else 0.0
+        front, rear = 0.5 * body.length - ends[1.0], -0.5 * body.length + ends[-1.0]
+    if half:
+        return [[middle, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius]]
     length = front - rear
     if length < 1e-6 * radius:
         return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius]]
     line = 3.0 * np.sqrt(2.0) * np.pi * viscosity * across**1.5 * length
     rings = []
     for place, share in _SIDE:
-        end = body.front_end if place == 1.0 else body.rear_end if place == -1.0 else None
-        reach = radius if end == "hemisphere" else 0.0
+        reach = radius if ends.get(place, 0.0) >= radius else 0.0
         x = 0.5 * (front + rear) + 0.5 * length * place
         rings.append([x, radius, reach, line * share, 1.5, radius])
     return rings
 
 
 def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
-    """The circle on which the wire turns, where it begins to have its full radius and at its tip.
+    """The circles on which the wire turns: where it has its full radius, of a helix behind its root, and at its tip.
 
     The wire touches with its own small radius: its film stops it, and resists little before.
     """
     tail = robot.tail
     wire, root = 0.5 * tail.wire_diameter, 0.5 * robot.body.length + robot.coupling.length
-    radius = tail.amplitude + wire
     coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
     settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
-    return [[x, radius, 0.0, coefficient, 1.0, radius] for x in (-root - settled, -root - tail.length)]
+    places = [(-root - settled, tail.amplitude), (-root - tail.length, tail.amplitude)]
+    if not tail.form.is_helix:
+        points = centreline_of(robot, np.linspace(0.0, tail.length, 2001)).position
+        reach = np.hypot(points[:, 1], points[:, 2])
+        places = [(float(points[n, 0]), float(reach[n])) for n in dict.fromkeys((int(np.argmax(reach)), 2000))]
+    return [[x, reach + wire, 0.0, coefficient, 1.0, reach + wire] for x, reach in places]

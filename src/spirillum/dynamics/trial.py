@@ -20,6 +20,7 @@ from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.preparation import why_no_table
 from spirillum.swimming.released_motion import ReleasedMotion
 from spirillum.swimming.steady_quantities import STEADY
 
@@ -49,8 +50,10 @@ def why_not_released(held: Prediction, *, fitted: bool) -> str:
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
     if fitted:
         return "the draws of a posterior are followed by `simulate --posterior` and by motion 'free'"
-    if not has_table(RobotBatch.of(held.robot, held.batch.placement), "yaw"):
-        return "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
+    batch = RobotBatch.of(held.robot, held.batch.placement)
+    if not has_table(batch, "yaw"):
+        made = "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
+        return why_no_table(batch) or made
     return ""
 
 

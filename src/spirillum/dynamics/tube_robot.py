@@ -16,9 +16,11 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.films import ROUGHNESS_SHARE
 from spirillum.dynamics.free_robot import FreeRobot, drive_of, friction_of, torque_scale, weight_of
 from spirillum.errors import InputError
+from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import contacts, rigid_links, tube_table
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.mesh import centreline_of
+from spirillum.robot.outline import profile_outline
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction
 
@@ -167,7 +169,10 @@ def _sites(robot: Robot) -> tuple[list[str], Samples]:
     a, half = 0.5 * body.diameter, 0.5 * body.length
     rows: list[Sequence[float]] = []
     names = []
-    if body.shape in ("sphere", "spheroid"):
+    if body.shape == "profile":
+        rows = [(*ring, 0.0) for ring in FilmBody.of(profile_outline(body.points)).rings]
+        names = ["body"] if len(rows) == 1 else ["body front", "body rear"]
+    elif body.shape in ("sphere", "spheroid"):
         names, rows = ["body"], [(0.0, a, half, 0.0, 0.0)]
     else:
         for name, end, sign in (("body front", body.front_end, 1.0), ("body rear", body.rear_end, -1.0)):

@@ -11,7 +11,12 @@ from spirillum.kernels.native import Array, Float64, native
 
 # Columns of the head of a packed table.
 TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
-REAR, REAR_ROUND, FRONT, FRONT_ROUND = 3, 4, 5, 6  # ends of the straight side, x, and the radii of the ends, m
+REAR, REAR_ROUND, FRONT, FRONT_ROUND = (
+    3,
+    4,
+    5,
+    6,
+)  # ends of the straight side, x (a spheroid's middle), and the radii of the ends, m
 FIRST, LAST, INTERVALS = 7, 8, 9  # of the first coordinate's knots
 SECOND_FIRST, SECOND_LAST, SECOND_INTERVALS = 10, 11, 12  # of the second's
 YAW, YAWS = 13, 14  # largest yaw, rad; polynomials in yaw

@@ -158,8 +158,13 @@ class Settings:
     """Requested model."""
 
     def robot(self) -> Robot:
-        """The robot, checked."""
-        return load(self.source, **self.overrides)
+        """The robot, checked; a size that varies along the tail is scaled as a whole."""
+        changed: dict[str, Any] = dict(self.overrides)
+        scaled = [name for name in ("amplitude", "wavelength") if f"tail.{name}" in changed]
+        if scaled:
+            own = load(self.source).tail
+            changed |= {f"tail.{name}_along": getattr(own, f"{name}_along") or "none" for name in scaled}
+        return load(self.source, **changed)
 
     def placement(self) -> Placement:
         """Initial placement."""
@@ -189,7 +194,11 @@ class Settings:
 
     def shown(self, robot: Robot) -> list[dict[str, Any]]:
         """The knobs of this robot with their values, in their units."""
-        return [_shown(knob, self, robot) for knob in KNOBS if not knob.needs or getattr(robot, knob.needs) is not None]
+        return [
+            _shown(knob, self, robot)
+            for knob in KNOBS
+            if not (knob.needs and getattr(robot, knob.needs) is None) and robot.source_of(knob.field) is None
+        ]
 
 
 def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:

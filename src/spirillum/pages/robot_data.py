@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.links import outlines_of
 from spirillum.robot.mesh import COLOURS, RobotMesh, robot_mesh
+from spirillum.robot.outline import Arc, Segment
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import corner_normals
 from spirillum.swimming.model_choice import WALLED
@@ -30,6 +31,8 @@ _CREASE = np.radians(40.0)
 _FINENESS = 0.75
 _ALONG = np.linspace(0.0, 1.0, 7)
 """Positions along each piece of the body's outline."""
+_ALONG_POINTS = np.linspace(0.0, 1.0, 33)
+"""Along a piece through points."""
 _METALS = ("shaft", "coupling", "stub", "arm", "tail")
 
 
@@ -60,7 +63,7 @@ def _profile(robot: Robot) -> list[list[float]]:
     """Points (x, rho) along the body's outline, m: circles about its axis that together are its silhouette."""
     found = []
     for piece in outlines_of(robot)["body"].pieces:
-        x, rho = piece.points(_ALONG)
+        x, rho = piece.points(_ALONG if isinstance(piece, (Arc, Segment)) else _ALONG_POINTS)
         found += [[float(a), float(b)] for a, b in zip(x, rho, strict=True)]
     return found
 

@@ -182,6 +182,14 @@ class Outline:
         x, rho = zip(*(piece.points(t) for piece in self.pieces), strict=True)
         return np.concatenate(x), np.concatenate(rho)
 
+    @property
+    def fine(self) -> tuple[Samples, Samples]:
+        """Points (x, rho) dense against its bends, from front to rear, m."""
+        every = np.linspace(0.0, 1.0, 257)
+        parts = [piece.fine[1:] if isinstance(piece, Smooth) else piece.points(every) for piece in self.pieces]
+        x, rho = zip(*parts, strict=True)
+        return np.concatenate(x), np.concatenate(rho)
+
     def sections(self) -> tuple[Samples, Samples, Samples]:
         """x, rho^2 and the weighted -dx (it runs from front to rear) of Gauss quadrature along it, to rounding."""
         found = [(piece, low, high) for piece in self.pieces for low, high in pairwise(piece.edges)]

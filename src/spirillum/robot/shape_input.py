@@ -17,7 +17,7 @@ from spirillum.files.reading import csv_rows, number_in
 from spirillum.robot.problems import refuse
 from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, centre_line, mean_of_inverse
 from spirillum.scalars import is_number
-from spirillum.units import KINDS, parse_quantity
+from spirillum.units import KINDS, parse_quantity, show
 
 FILES = {("tail", "curve"): ("x", "y", "z"), ("body", "profile"): ("x", "r")}
 """Fields that name a file of points, mm, and its columns."""
@@ -193,7 +193,7 @@ def _read_curve(table: dict[str, Any]) -> dict[str, Any]:
         same = own == value if name == "handedness" else _same_length(f"tail.{name}", own, value)
         if not same:
             raise refuse(
-                f"tail.{name} = {str(own)[:40]} with tail.curve, which makes it {value}; allowed: leave it out"
+                f"tail.{name} = {str(own)[:40]} with tail.curve, which makes it {_shown(value)}; allowed: leave it out"
             )
     for name in ("amplitude_along", "wavelength_along"):
         if table.get(name):
@@ -221,7 +221,7 @@ def read_profile(table: dict[str, Any]) -> dict[str, Any]:
     for name, value in follows.items():
         if table.get(name) is not None and not _same_length(f"body.{name}", table[name], value):
             raise refuse(
-                f"body.{name} = {table[name]} with body.profile, which makes it {value}; allowed: leave it out"
+                f"body.{name} = {table[name]} with body.profile, which makes it {_shown(value)}; allowed: leave it out"
             )
     if table.get("shape", "profile") != "profile":
         raise refuse(f"body.shape = {str(table['shape'])[:40]!r} with body.profile; allowed: leave it out")
@@ -241,6 +241,11 @@ def _check_profile(points: tuple[tuple[float, ...], ...]) -> None:
     steps = np.diff(x) * np.sign(x[-1] - x[0])
     if x[0] == x[-1] or np.any(steps < 0.0):
         raise refuse(f"body.profile folds back at point {int(np.argmin(steps)) + 2}; allowed: {allowed}")
+
+
+def _shown(value: str) -> str:
+    """A derived size in words; a hand is one."""
+    return show(parse_quantity(value, KINDS["length"]), "mm") if value.endswith(" m") else value
 
 
 def _same_length(field: str, own: Any, value: str) -> bool:

@@ -202,15 +202,21 @@ def missing_tables(batch: RobotBatch, stage: StageName) -> list[tuple[RobotGeome
     """Return what decides the tables that robots of a batch lack in their tubes, each once."""
     fits = all_hold(requirements(batch, TabledTube({})))
     every = [(RobotGeometry.of(batch, index), tube_radius(batch, index)) for index in np.flatnonzero(fits).tolist()]
-    return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and _has_nodes(*one)]
+    return [one for one in dict.fromkeys(every) if find_table(*one, stage) is None and not _why_no_table(*one)]
 
 
-def _has_nodes(geometry: RobotGeometry, radius: float) -> bool:
-    """Whether there can be a table: not of a tail wider than its body."""
+def _why_no_table(geometry: RobotGeometry, radius: float) -> str:
+    """Why there can be no table, as of a tail wider than its body; empty where there can be one."""
     try:
-        return len(Places(geometry, radius).gaps) > 0
-    except InputError:
-        return False
+        _ = Places(geometry, radius).gaps
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def why_no_table(batch: RobotBatch) -> str:
+    """Why the first robot of a batch can have no table in its tube; empty where it can."""
+    return _why_no_table(RobotGeometry.of(batch), tube_radius(batch))
 
 
 def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:

@@ -332,7 +332,7 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
         psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[table.YAW])))))
         e, wanted = 0.0, _clearance_of(first, a)
         for _ in range(4):
-            e += table.clearance(head, 0.0, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
+            e += table.clearance(head, rear, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
         return e, float(second), psi
     length = front - rear
     v = np.array([_clearance_of(first, a), _clearance_of(second, a)])

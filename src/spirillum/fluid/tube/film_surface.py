@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.robot.outline import Arc, Outline, Segment
+from spirillum.robot.outline import Arc, Outline, Piece, Segment, Smooth
 
 ROUNDED = 0.7
 """Angle of a rounded end that belongs to the lubrication film, rad."""
@@ -28,6 +28,23 @@ _TURNED = (0.62, 0.14)
 """Angle up to which coordinates follow the side that is nearest, and how much further they turn at most, rad: beyond
 pi/4 they would fold."""
 TOUCHES = "the body touches the wall of the tube"
+_NO_FILM = "the lubrication film of body.profile is not known:"
+_TILTED = float(np.radians(12.0))
+"""Angle of its normal up to which an outline can near the wall: the largest pitch of a table, rad."""
+_LEVEL = 2e-5
+"""How far a straight side may be off the largest radius, over it."""
+_SIDE = 0.3
+"""Shortest straight side, over the radius."""
+_EDGE = 1e-2
+"""Radius of an end, over that of the body, below which it is an edge."""
+_LEAST_HALF = 0.3
+"""Least half-length over the radius of a spheroid that stands for a body."""
+_INSIDE = 0.9
+"""Share of such a body, from its widest place to its nearer end, that belongs to the lubrication film."""
+_OFF = 5e-4
+"""How far an outline may be off the circles or the spheroid that stand for it, over its radius."""
+_SLENDER = 0.3
+"""Least angle of the film on a rounded end whose radius is larger than the body's, rad."""
 _HALF = 0.5 * np.pi
 _AXIS = np.array([1.0, 0.0, 0.0])
 
@@ -41,13 +58,29 @@ class FilmBody:
     half: float
     """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
     rear: tuple[float, float]
-    """Where the straight side ends behind, x, and the radius f of the rounded end there: 0 flat, a hemisphere."""
+    """Where the straight side ends behind, x, and the radius f of the rounded end there: 0 flat, a hemisphere, and more
+    a slender end. Of a spheroid the x of its middle, and 0."""
     front: tuple[float, float]
-    """Where the straight side ends in front, x, and the radius f of the rounded end there."""
+    """Where the straight side ends in front, x, and the radius f of the rounded end there; of a spheroid as `rear`."""
+    patch: float = PATCH
+    """Half-width of a spheroid's film along it, rad of the unit sphere that it is stretched from."""
+
+    @property
+    def rings(self) -> list[tuple[float, float, float, float]]:
+        """What of it can touch a wall: ring of radius rho at x, half-length along the axis, and ball on it, m."""
+        if self.half:
+            return [(self.rear[0], self.radius, self.half, 0.0)]
+        return [(x, self.radius - ball, 0.0, ball) for x, ball in (self.front, self.rear)]
 
     @classmethod
     def of(cls, outline: Outline) -> FilmBody:
-        """Read an outline."""
+        """Read an outline; of a profile what can near the wall, with circles for its ends or a spheroid for all of it.
+
+        Raises:
+            InputError: for a profile that these are not near enough to.
+        """
+        if any(isinstance(piece, Smooth) or _is_slanted(piece) for piece in outline.pieces):
+            return _of_profile(outline)
         sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Segment) and p.start[1] == p.end[1] > 0]
         arcs = [piece for piece in outline.pieces if isinstance(piece, Arc)]
         if len(sides) == 1:
@@ -61,7 +94,77 @@ class FilmBody:
             return cls(radius, 0.0, (float(ends[0]), rounded[0]), (float(ends[1]), rounded[1]))
         if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
             return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
-        raise InputError("the film of a body without a straight side is implemented for spheres and spheroids only")
+        return _of_profile(outline)
+
+
+def _is_slanted(piece: Piece) -> bool:
+    return isinstance(piece, Segment) and piece.start[0] != piece.end[0] and piece.start[1] != piece.end[1]
+
+
+def _of_profile(outline: Outline) -> FilmBody:
+    x, rho = outline.fine
+    a = float(rho.max())
+    wide = np.flatnonzero(rho >= a * (1.0 - _LEVEL))
+    ends = float(x[wide[-1]]), float(x[wide[0]])
+    if ends[1] - ends[0] < _SIDE * a:
+        return _as_spheroid(x, rho, a)
+    if np.any(rho[wide[0] : wide[-1]] < a * (1.0 - _LEVEL)):
+        raise InputError(f"{_NO_FILM} its side has a waist; allowed: a straight side, or a round one")
+    rear, front = (_rounded(outward * x, rho, a) for outward in (-1.0, 1.0))
+    return FilmBody(a, 0.0, (-rear[0], rear[1]), front)
+
+
+def _support(x: Samples, rho: Samples, angle: Samples) -> Samples:
+    """How far an outline reaches at angles of its normal forwards, m."""
+    return np.asarray(np.max(np.sin(angle)[:, None] * x + np.cos(angle)[:, None] * rho, axis=1))
+
+
+def _rounded(x: Samples, rho: Samples, a: float) -> tuple[float, float]:
+    """Where a straight side ends in front, and the radius of the circle that its end is near the side."""
+    angle = np.linspace(0.0, _TILTED, 43)[1:]
+    terms = np.stack([np.sin(angle), 1.0 - np.cos(angle)], axis=1)
+    reach = _support(x, rho, angle) - a * np.cos(angle)
+    joint, radius = np.linalg.lstsq(terms, reach, rcond=None)[0].tolist()
+    if radius < _EDGE * a:
+        joint, radius = float(np.mean(reach / terms[:, 0])), 0.0
+    _check_near(terms @ [joint, radius] - reach, a)
+    return joint, radius
+
+
+def _as_spheroid(x: Samples, rho: Samples, a: float) -> FilmBody:
+    """The spheroid that a body without a straight side is where it can near the wall."""
+    from scipy.optimize import least_squares
+
+    angle = np.linspace(-_TILTED, _TILTED, 85)
+    reach = _support(x, rho, angle)
+
+    def left(numbers: Samples) -> Samples:
+        middle, half = numbers
+        return np.asarray(middle * np.sin(angle) + np.hypot(half * np.sin(angle), a * np.cos(angle)) - reach)
+
+    bent = (0.5 * float(reach[0] + reach[-1])) ** 2 - (a * np.cos(_TILTED)) ** 2
+    start = float(x[np.argmax(rho)]), float(np.sqrt(max(bent, 0.0)) / np.sin(_TILTED))
+    if start[1] < _LEAST_HALF * a:
+        raise InputError(f"{_NO_FILM} it is an edge where it is widest; allowed: a straight side, or a round one")
+    found = least_squares(left, start, bounds=([-np.inf, 1e-2 * a], [np.inf, 1e2 * a]), x_scale=a)
+    middle, half = found.x.tolist()
+    _check_near(found.fun, a)
+    tangent = np.sin(_TILTED) * half**2 / np.hypot(half * np.sin(_TILTED), a * np.cos(_TILTED))
+    near = np.abs(x - middle) < tangent
+    _check_near(rho[near] - a * np.sqrt(1.0 - ((x[near] - middle) / half) ** 2), a)
+    shorter = min(float(x.max()) - middle, middle - float(x.min())) / half
+    patch = min(PATCH, _INSIDE * float(np.arcsin(min(shorter, 1.0))))
+    return FilmBody(a, half, (middle, 0.0), (middle, 0.0), patch)
+
+
+def _check_near(distance: Samples, a: float) -> None:
+    """Refuse a film surface that is off the outline."""
+    off = float(np.abs(distance).max(initial=0.0)) / a
+    if off > _OFF:
+        raise InputError(
+            f"{_NO_FILM} where it can near the wall it is {100.0 * off:.2g} % of its radius off circles beside a "
+            f"straight side, or off a spheroid without one; allowed: at most {100.0 * _OFF:g} %"
+        )
 
 
 def frame(pitch: float, yaw: float) -> Samples:
@@ -200,7 +303,8 @@ class Place:
             ring = self.body.radius - rounded
             angle = float(self.bottom(np.array([x]), ring)[0][0])
             point = np.array([x, ring * np.sin(angle), -ring * np.cos(angle)])
-            found.append(min(float(self.clearance(point)) - rounded, self.gap(x)[0]))
+            away = float(np.hypot(point @ self.axes[1], point @ self.axes[2] - self.offset))
+            found.append(min(self.tube - rounded - float(np.copysign(away, ring)), self.gap(x)[0]))
         return np.array(found)
 
     def gap(self, x: float) -> tuple[float, float]:
@@ -244,7 +348,8 @@ def _with_side(place: Place, cuts: Cuts) -> FilmSurface:
     for (joint, f), gap, slope, outward in zip(shoulders, nearest, slopes, (-1.0, 1.0), strict=True):
         if f == 0:
             continue
-        low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
+        most = min(ROUNDED, max(ROUNDED * a / f, _SLENDER))
+        low, high = (0.0, most) if outward > 0 else (-most, 0.0)
         angle = _gathered(cuts.rounded, low, high, -float(np.arcsin(slope)), float(np.sqrt(2.0 * gap / f)))
         sin, cos = np.sin(angle.at), np.cos(angle.at)
         outline = (joint + f * sin, a - f + f * cos)
@@ -311,7 +416,7 @@ def _spheroid(place: Place, cuts: Cuts) -> FilmSurface:
         along, across = (stretch * slope for slope in slopes)
         turning = [slope / (stretch * size) for slope in slopes]
         first, second = (by - normals * np.sum(normals * by, axis=-1, keepdims=True) for by in turning)
-        return FilmSurface(stretch * sphere, normals, along, across, first, second)
+        return FilmSurface(stretch * sphere + body.rear[0] * _AXIS, normals, along, across, first, second)
 
     step = 0.05
     probe = np.array([-step, 0.0, step])
@@ -320,8 +425,8 @@ def _spheroid(place: Place, cuts: Cuts) -> FilmSurface:
         raise InputError(TOUCHES)
     bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
     beta, theta = (
-        _gathered(unit, -PATCH, PATCH, 0.0, float(np.sqrt(2.0 * h[1, 1] / (max(bend, 0.0) + h[1, 1]))))
-        for unit, bend in zip((cuts.patch, cuts.around), bends, strict=True)
+        _gathered(unit, -width, width, 0.0, float(np.sqrt(2.0 * h[1, 1] / (max(bend, 0.0) + h[1, 1]))))
+        for unit, width, bend in zip((cuts.patch, cuts.around), (body.patch, PATCH), bends, strict=True)
     )
     surface = patch(beta.at, theta.at)
     by_u, by_v = beta.slope[:, None, None] / cuts.patches, theta.slope[:, None]

@@ -15,6 +15,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
@@ -47,13 +48,17 @@ _SEARCH = (31, 1e-6)
 
 
 def rings_of(outline: Outline) -> Samples:
-    """Rings whose hull a body of revolution is, for `contact_offset`: (x, rho, semi-axis along, across), m."""
+    """Rings whose hull a body of revolution is, for `contact_offset`: (x, rho, semi-axis along, across), m.
+
+    Of a profile those that can near the wall, as of its film.
+    """
     rows: list[tuple[float, float, float, float]] = []
+    if any(isinstance(piece, Smooth) for piece in outline.pieces):
+        found = FilmBody.of(outline).rings
+        return np.array([(x, 0.0, half, ring) if half else (x, ring, ball, ball) for x, ring, half, ball in found])
     for piece in outline.pieces:
         if isinstance(piece, Arc):
             rows.append((*piece.centre, abs(piece.semi_axes[0]), abs(piece.semi_axes[1])))
-        elif isinstance(piece, Smooth):
-            rows += [(x, rho, 0.0, 0.0) for x, rho in zip(*piece.fine[1:], strict=True)]
         else:
             rows += [(*piece.start, 0.0, 0.0), (*piece.end, 0.0, 0.0)]
     kept = [row for row in dict.fromkeys(rows) if row[1] > 0 or row[2] > 0]
@@ -77,9 +82,11 @@ class Places:
         Raises:
             InputError: for a robot without a table.
         """
-        if (shape := self.geometry.shape) in ("none", "profile"):
-            said = "a bare tail (body = 'none')" if shape == "none" else "a body of any profile"
-            raise InputError(f"{said} has no table in its tube; allowed: single poses, model.tube.form = 'direct'")
+        if self.geometry.shape == "none":
+            said = "a bare tail (body = 'none') has no table in its tube"
+            raise InputError(f"{said}; allowed: single poses, model.tube.form = 'direct'")
+        if self.geometry.shape == "profile":
+            FilmBody.of(self.geometry.body)  # refuses one whose film is not known
         return rings_of(self.geometry.body)
 
     @cached_property
