@@ -261,12 +261,12 @@ _FAMILIES = {
         "Size or outline of the robot in the picture differ from those of the robot file at this scale. Lengths and "
         "speeds are less certain or not given. Check the robot file, the heights in the setup, and the ruler."
     ),
-    "outline-alone": (
-        "The coloured seal was not found, and over a grid or through glass the outline of the body may follow what is"
-        " not the body's. Speed and tail rate are less certain or not given. Look at the named frame; a bright seal"
-        " or plain paper under the tube helps."
+    "outline-alone cues-disagree": (
+        "Over a grid or through glass the outline of the body may follow what is not the body's: no coloured seal was"
+        " found, or it moves otherwise. Speed and tail rate are less certain or not given. Look at the named frame; a"
+        " bright seal or plain paper under the tube helps."
     ),
-    "two-robots not-the-robot something-else-followed robot-stands-still nothing-moves does-not-advance one-picture": (
+    "two-robots not-the-robot something-else-followed robot-stands-still does-not-advance one-picture": (
         "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Look at the annotated"
         " video; crop it to one robot."
     ),
@@ -277,7 +277,7 @@ _FAMILIES = {
         "The robot is out of view, hidden or not detected on part of the frames. What was measured on the other frames"
         " is kept."
     ),
-    "nose-on-the-other-side moves-backwards cues-disagree": (
+    "nose-on-the-other-side moves-backwards": (
         "The robot's direction in the picture does not agree with its motion or its shape, which would change all "
         "signs. Check `robot.direction`."
     ),
@@ -287,7 +287,7 @@ _FAMILIES = {
     ),
     (
         "dropped-frames lost-frames repeated-frames uneven-steps unordered-times times-do-not-fit clock-in-doubt rate-"
-        "replaced video-is-cut unreadable-frames frames-not-read video-ends-early"
+        "replaced video-is-cut unreadable-frames video-ends-early"
     ): (
         "Frames are missing, doubled or unevenly spaced, or the times of the video do not agree with its motion. Rates"
         " depend on these times. Record with the camera's own time stamps, and do not edit the video."

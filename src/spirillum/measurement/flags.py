@@ -102,7 +102,7 @@ _IMPLIED = {
     },
     "stripes-do-not-pass": {"stripes-unreadable", "short-turn"},
     "tail-does-not-fit": {"tail-unreadable"},
-    "not-the-robot": {*_FOLLOWING, "nothing-moves"},
+    "not-the-robot": {*_FOLLOWING, "robot-stands-still"},
     "nose-on-the-other-side": {
         "not-the-robot",
         "stripes-do-not-fit",
