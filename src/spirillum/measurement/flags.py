@@ -102,7 +102,14 @@ _IMPLIED = {
     },
     "stripes-do-not-pass": {"stripes-unreadable", "short-turn"},
     "tail-does-not-fit": {"tail-unreadable"},
-    "not-the-robot": {*_FOLLOWING, "robot-stands-still"},
+    "not-the-robot": {
+        *_FOLLOWING,
+        "robot-stands-still",
+        "something-else-followed",
+        "stripes-do-not-fit",
+        "stripes-do-not-pass",
+        "tail-does-not-fit",
+    },
     "nose-on-the-other-side": {
         "not-the-robot",
         "stripes-do-not-fit",
