@@ -112,6 +112,9 @@ _IMPLIED = {
     },
     "nose-on-the-other-side": {
         "not-the-robot",
+        "size-does-not-fit",
+        "outline-does-not-fit",
+        "scale-does-not-fit",
         "stripes-do-not-fit",
         "tail-does-not-fit",
         "moves-backwards",
