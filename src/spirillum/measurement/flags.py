@@ -102,6 +102,7 @@ _IMPLIED = {
     },
     "stripes-do-not-pass": {"stripes-unreadable", "short-turn"},
     "tail-does-not-fit": {"tail-unreadable"},
+    "outline-alone": {*_FOLLOWING, "does-not-advance", "uneven-stripes"},
     "not-the-robot": {
         *_FOLLOWING,
         "robot-stands-still",
