@@ -229,11 +229,11 @@ _FAMILIES = {
         "Size or outline in the picture differ from the robot file at this scale. Lengths and speeds are less "
         "certain or not given. Check the robot file, the heights and the ruler."
     ),
-    "outline-alone": (
-        "The coloured seal was not found, and the outline may follow a grid or glass. Speed and tail rate are less "
-        "certain or not given. Use a bright seal or plain paper."
+    "outline-alone cues-disagree": (
+        "Over a grid or through glass the outline may follow what is not the body's: no coloured seal was found, or it "
+        "moves otherwise. Speed and tail rate are less certain or not given. Use a bright seal or plain paper."
     ),
-    "two-robots not-the-robot something-else-followed robot-stands-still nothing-moves does-not-advance one-picture": (
+    "two-robots not-the-robot something-else-followed robot-stands-still does-not-advance one-picture": (
         "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Crop the video to "
         "one robot."
     ),
@@ -241,7 +241,7 @@ _FAMILIES = {
         "robot-not-seen robot-came-late robot-left-the-view robot-lost robot-partly-out-of-view edges-hidden standing-"
         "glare too-few-frames"
     ): ("The robot is out of view, hidden or not detected on part of the frames; the others count."),
-    "nose-on-the-other-side moves-backwards cues-disagree": (
+    "nose-on-the-other-side moves-backwards": (
         "The robot's direction in the picture does not agree with its motion or shape. Check `robot.direction`."
     ),
     "camera-moved camera-rolled camera-swayed": (
@@ -250,7 +250,7 @@ _FAMILIES = {
     ),
     (
         "dropped-frames lost-frames repeated-frames uneven-steps unordered-times times-do-not-fit clock-in-doubt rate-"
-        "replaced video-is-cut unreadable-frames frames-not-read video-ends-early"
+        "replaced video-is-cut unreadable-frames video-ends-early"
     ): (
         "Frames are missing, doubled or unevenly spaced, or times do not agree with the motion. Record with the "
         "camera's own time stamps, and do not edit the video."

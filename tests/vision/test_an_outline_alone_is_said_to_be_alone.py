@@ -66,7 +66,7 @@ def test_an_outline_that_moves_along_is_less_sure(film, troubles):
 def test_an_outline_that_stands_in_a_grid_gives_no_speed(film):
     found = checked(film("glass-cover,grid-paper"), stuck=True)
     assert [flag.name for flag in found.flags] == ["outline-alone"]
-    assert {"forward_velocity", "tail_rotation_rate"} <= set(found.flags[0].spoils)
+    assert {"forward_velocity", "body_rotation_rate", "tail_rotation_rate"} <= set(found.flags[0].spoils)
 
 
 def test_the_speed_over_a_grid_without_a_coloured_seal(film):

@@ -242,7 +242,7 @@ def track_of(
         roll_flags = (*roll_flags, _DOUBTFUL_OUTLINE if roll_error else _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
     motion, pixel = RobotMotion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
-    odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
+    odd = contradictions(motion, body.robot, hand)
     odd += no_stripe_passes(motion, body.robot, readable=stripes.readable)
     seen_flags = (*seen_flags, *something_else_flag(other))
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
@@ -259,7 +259,7 @@ def track_of(
         *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
-        *(() if known.stands else stands_flag(motion, pixel)),
+        *(() if known.stands else nothing_moves(motion, body.robot) or stands_flag(motion, pixel)),
     )
     return Track(
         time=time,

@@ -67,7 +67,7 @@ class Identified(NamedTuple):
             sentence = (
                 "stripes and tail do not look like the robot's, and nothing is given: look at the annotated film; "
                 "where the outline is not on the robot, draw a [region] around it; where it is, glare or poor light "
-                "hide them, or the robot file, robot.direction or the heights are wrong"
+                "hide them, or the robot file, robot.direction, the ruler's spacing or the heights are wrong"
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals

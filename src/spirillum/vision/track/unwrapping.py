@@ -258,10 +258,10 @@ def nothing_moves(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
     if np.isfinite(tail_phase).any() or moved > UNWRAPPING.rest * robot.body.length or turned > UNWRAPPING.rest_angle:
         return ()
     sentence = (
-        "what was followed neither moves nor turns, and its tail is not seen: it may be something that stands in "
-        "the picture; nothing is given"
+        "what was followed neither moves nor turns, and its tail is not seen: a robot that stands still, or something "
+        "else in the picture; nothing is given: film it while it moves"
     )
-    return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
+    return (Flag("robot-stands-still", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
 
 
 def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:

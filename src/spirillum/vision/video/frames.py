@@ -244,7 +244,7 @@ class Video:
                 f"the file states {stated} frames, {frames} can be read: the others are empty, hidden by its edit "
                 "list, or damaged"
             )
-            self._note("frames-not-read", sentence)
+            self._note("unreadable-frames", sentence)
 
     def _decoded(self) -> Iterator[tuple[Any, float | None]]:
         """The video's frames, each with its time, until its end, or until it cannot be decoded any further."""
