@@ -19,12 +19,17 @@ class CoreBuildHook(BuildHookInterface[Any]):
         return ["ziglang>=0.13"] if self._build()["needs_zig"]() else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile, and name the wheel after its platform: it holds for any Python."""
-        del version
+        """Compile, and name the wheel after its platform: it holds for any Python.
+
+        In a clone whose libraries are those of its csrc/, an editable install uses them.
+        """
         build = self._build()
         command, tag = build["compiler"]()
-        libraries = build["compile_all"]()
-        self.app.display_info(f"compiled csrc/ for {tag} by {' '.join(command)}")
+        if version == "editable" and build["is_current"]():
+            libraries = sorted(build["PACKAGE"].glob("_core*"))
+        else:
+            libraries = build["compile_all"]()
+            self.app.display_info(f"compiled csrc/ for {tag} by {' '.join(command)}")
         build_data["artifacts"] += [path.relative_to(self.root).as_posix() for path in libraries]
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{tag}"

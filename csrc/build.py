@@ -82,21 +82,23 @@ def is_current() -> bool:
     return library.exists() and digest().encode() in library.read_bytes()
 
 
-def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = ()) -> list[Path]:
-    """Compile csrc/ into a folder; return the libraries, each replaced as a whole."""
+def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = (), *, wide: bool = True) -> list[Path]:
+    """Compile csrc/ into a folder, the wide variant too; return the libraries, each replaced as a whole."""
     command, tag = compiler()
     files = [str(path) for path in sorted(SOURCES.glob("*.c"))]
     machine = tag if tag in TARGETS else platform.machine().lower()
-    variants = {"": (), "_v3": WIDE} if machine.endswith(("x86_64", "amd64")) else {"": ()}
-    libraries = []
+    variants = {"": (), "_v3": WIDE} if wide and machine.endswith(("x86_64", "amd64")) else {"": ()}
+    begun = []
     for name, more in variants.items():
         library = folder / f"_core{name}{compiler().suffix}"
         partial = library.with_name(f"{library.stem}.{os.getpid()}{library.suffix}")
         names = [*FLAGS, *flags, *more, f'-DCSRC_DIGEST="{digest()}"', "-o", str(partial), *files, "-lm"]
-        subprocess.run([*command, *names], check=True)  # noqa: S603
+        begun.append((library, partial, subprocess.Popen([*command, *names])))  # noqa: S603
+    for library, partial, compiling in begun:
+        if compiling.wait():
+            raise subprocess.CalledProcessError(compiling.returncode, compiling.args)
         partial.replace(library)
-        libraries.append(library)
-    return libraries
+    return [library for library, *_ in begun]
 
 
 if __name__ == "__main__":

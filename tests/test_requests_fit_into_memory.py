@@ -47,7 +47,10 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "mesh": (lambda: robot_mesh(robot(COIL), fineness=5.0), "turns .fineness = 5. makes .* triangles"),
     "long run": (
         lambda: sp.control(
-            WIDE, {"kind": "stop-at", "at": "10 mm", "duration": "86400 s"}, lab={"camera": {"fps": 1000}}
+            WIDE,
+            {"kind": "stop-at", "at": "10 mm", "duration": "86400 s"},
+            plant={"model": "rft"},
+            lab={"camera": {"fps": 1000}},
         ),
         "makes .* events; allowed: at most",
     ),

@@ -10,6 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.app import command_line
+from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_resolution
@@ -180,10 +181,7 @@ def content(path: Path) -> bytes:
     """What a file holds, without the times at which datasets are written."""
     if path.suffix != ".nc":
         return path.read_bytes()
-    import xarray as xr
-
-    dataset = xr.load_dataset(path)
-    return repr(dataset.to_dict()).encode()
+    return repr(loaded_netcdf(path, "an answer").to_dict()).encode()
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in BASES])

@@ -77,7 +77,7 @@ def _library() -> Path:
             shutil.copytree(sources, made / "csrc")
             shutil.copy(stand_in, made / "csrc")
             (made / "csrc/tube_motion.c").rename(made / "csrc/tube_motion.inc")  # which the stand-in includes
-            runpy.run_path(str(made / "csrc/build.py"))["compile_all"](made)
+            runpy.run_path(str(made / "csrc/build.py"))["compile_all"](made, ("-O1",), wide=False)
             with contextlib.suppress(OSError):  # another process was faster
                 made.rename(folder)
     return next(folder.glob("_core.*"))

@@ -27,8 +27,10 @@ def test_the_library_states_the_digest_of_its_sources(build: dict[str, Any]) -> 
     assert native.sources_digest() == build["digest"]()
 
 
-def test_the_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: Path) -> None:
-    assert all(path.stat().st_size > 10_000 for path in build["compile_all"](tmp_path, build["STRICT"]))
+@pytest.mark.parametrize("level", ["-O1", pytest.param("-O3", marks=pytest.mark.slow)])
+def test_the_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: Path, level: str) -> None:
+    made = build["compile_all"](tmp_path, (*build["STRICT"], level), wide=level == "-O3")
+    assert all(path.stat().st_size > 10_000 for path in made)
 
 
 def test_a_result_of_another_type_or_order_is_refused() -> None:

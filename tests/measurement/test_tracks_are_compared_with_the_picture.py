@@ -33,9 +33,9 @@ class Scene(NamedTuple):
 
 @pytest.fixture(scope="module")
 def scene(flat_pictures: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """A robot at 2 mm/s for 3 s; where it is, our own tracker says of the whole film."""
+    """A robot at 2 mm/s for 2 s; where it is, our own tracker says of the whole film."""
     film = tmp_path_factory.mktemp("tracks") / "a.mp4"
-    setup = flat_pictures.Flat(frames=30, fps=10.0, velocity=2e-3, tail_rate=5.0, body_rate=-1.0).write(film)
+    setup = flat_pictures.Flat(frames=20, fps=10.0, velocity=2e-3, tail_rate=5.0, body_rate=-1.0).write(film)
     (trial,) = measure(film, setup).trials
     return Scene(film, setup, trial.track.picture[:, :2])
 

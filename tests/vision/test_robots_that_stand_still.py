@@ -41,7 +41,7 @@ def test_a_robot_that_hardly_moves_is_measured(measured):
     """1.6 pixels in 20 s: less than the width of its edges."""
     truth = {"forward_velocity": 5e-5, "body_rotation_rate": -2 * np.pi * 0.004, "tail_rotation_rate": 2 * np.pi * 0.02}
     trial = measured(
-        velocity=5e-5, body_rate=truth["body_rotation_rate"], tail_rate=truth["tail_rotation_rate"], fps=3.0
+        velocity=5e-5, body_rate=truth["body_rotation_rate"], tail_rate=truth["tail_rotation_rate"], fps=1.5, frames=30
     )
     for name, value in truth.items():
         item = trial.quantities[name]
