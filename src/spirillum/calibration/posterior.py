@@ -18,7 +18,7 @@ from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Density
 from spirillum.calibration.problem import Problem, Progress
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_range
 
 LARGEST_RHAT = 1.01
 """Largest R-hat (rank-normalised, split) of a posterior that may be used."""
@@ -52,8 +52,7 @@ class Sampling:
             check_kind(name, value, "int")
         if self.seed < 0:
             raise InputError(f"seed = {self.seed}; allowed: a whole number from 0")
-        if not 0 <= self.doublings <= _MOST_DOUBLINGS:
-            raise InputError(f"doublings = {self.doublings}; allowed: a whole number from 0 to {_MOST_DOUBLINGS}")
+        check_range("doublings", self.doublings, 0, _MOST_DOUBLINGS)
 
 
 @dataclass(frozen=True)
