@@ -238,7 +238,7 @@ def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design
     one_per_cent = tuple(replace(item, **close) for item in unsure.alternatives)
     learned = replace(unsure, model="tube", learned=Learned(20, 1e-3, 2e-2), alternatives=one_per_cent)
     (sentence,) = lead_warnings(learned)
-    assert "the runner-up by 1 %, within the error of 2 % with which the learned" in sentence
+    assert "the runner-up by 1 %, within the error of 2 % of the learned" in sentence
     breaking = tuple(replace(item, keeps=False) for item in one_per_cent)
     assert lead_warnings(replace(learned, alternatives=breaking)) == ()
 
