@@ -221,6 +221,6 @@ def _station_places(robot: Robot) -> Samples:
         return np.linspace(0.0, tail.length, 1 + int(np.ceil(count)))
     if tail.form.curve:
         return tail.length * tail.form.centre.shares(_LINE_STATIONS_PER_TURN * tail.form.centre.turns)
-    _, shortest = tail.form.widths(tail.amplitude, tail.wavelength)
+    _, shortest = tail.form.widths(np.array(tail.amplitude), np.array(tail.wavelength))
     count = _LINE_STATIONS_PER_TURN * tail.length / float(np.min(shortest))
     return np.linspace(0.0, tail.length, 1 + int(np.ceil(count)))

@@ -21,7 +21,7 @@ from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
-from spirillum.robot.outline import Arc, Outline, Smooth
+from spirillum.robot.outline import Arc, Outline, Segment, Smooth
 from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
 
@@ -59,7 +59,7 @@ def rings_of(outline: Outline) -> Samples:
     for piece in outline.pieces:
         if isinstance(piece, Arc):
             rows.append((*piece.centre, abs(piece.semi_axes[0]), abs(piece.semi_axes[1])))
-        else:
+        elif isinstance(piece, Segment):
             rows += [(*piece.start, 0.0, 0.0), (*piece.end, 0.0, 0.0)]
     kept = [row for row in dict.fromkeys(rows) if row[1] > 0 or row[2] > 0]
     return np.array(kept, dtype=float)
