@@ -24,17 +24,17 @@ static Place place_at(const float *picture, int64_t width, int64_t channels, dou
     return place;
 }
 
-/* Values of one or three channels; `below` is the step to the pixel below. */
+/* Values of all channels, `apart` from each other; `below` is the step to the pixel below. */
 static inline void values_at(const Place *p, int64_t channels, int64_t below, double *values, int64_t apart) {
-    double column[12];
-    for (int64_t n = 0; n < 4 * channels; n++) {
-        const float *line = p->first + n;
-        const double upper = p->down[0] * (double)line[0] + p->down[1] * (double)line[below];
-        column[n] = upper + p->down[2] * (double)line[2 * below] + p->down[3] * (double)line[3 * below];
-    }
     for (int64_t c = 0; c < channels; c++) {
-        const double left = p->along[0] * column[c] + p->along[1] * column[channels + c];
-        values[c * apart] = left + p->along[2] * column[2 * channels + c] + p->along[3] * column[3 * channels + c];
+        double column[4];
+        for (int k = 0; k < 4; k++) {
+            const float *line = p->first + k * channels + c;
+            const double upper = p->down[0] * (double)line[0] + p->down[1] * (double)line[below];
+            column[k] = upper + p->down[2] * (double)line[2 * below] + p->down[3] * (double)line[3 * below];
+        }
+        const double left = p->along[0] * column[0] + p->along[1] * column[1];
+        values[c * apart] = left + p->along[2] * column[2] + p->along[3] * column[3];
     }
 }
 
@@ -52,10 +52,10 @@ EXPORT void profiles_across(const float *picture, const double origin[2], const 
                 continue;
             }
             const Place place = place_at(picture, width, channels, u, v);
-            if (channels == 1) /* loops of known length become vector instructions */
+            if (channels == 1) /* brightness: pixels side by side become vector instructions */
                 values_at(&place, 1, width, profile, 0);
             else
-                values_at(&place, 3, 3 * width, profile, count * length);
+                values_at(&place, channels, channels * width, profile, count * length);
         }
     }
 }

@@ -352,7 +352,7 @@ class BodyFinder:
             found.append(
                 _Edges(seen.shifts, seen.known, variance, slopes[here], inside, np.isfinite(self._seal_scatter))
             )
-        return found[0] if len(found) == 1 else _Edges(*map(np.concatenate, zip(*found, strict=True)))
+        return found[0] if len(found) == 1 else _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
 
     def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0

@@ -203,8 +203,10 @@ class SealEdges:
         """Displacement, contrast and root mean square residual of each profile, by least squares with the template."""
         shifts, strengths, misses = np.full((3, len(share)), np.nan)
         ends, flanks = (np.concatenate([self._sides[first], self._sides[last]]) for first, last in ((0, 3), (1, 2)))
-        both = self._palette is not None  # then all sides use the same samples
-        for flank, side in ((False, slice(None)),) if both else ((False, ends), (True, flanks)):
+        sides: list[tuple[bool, slice | np.ndarray]] = [(False, ends), (True, flanks)]
+        if self._palette is not None:  # then all sides use the same samples
+            sides = [(False, slice(None))]
+        for flank, side in sides:
             values = share[side][:, self._rows(flank)]
             design, inverse = self._designs[values.shape[1]]
             numbers = values @ inverse.T
