@@ -55,6 +55,17 @@ def test_planted_numbers_are_found_and_predicted_again(truth, observed: Path, tm
     assert np.all((predicted[1] < (speeds / rates)[order]) & ((speeds / rates)[order] < predicted[2]))
     text = (tmp_path / "fit" / "calibration.toml").read_text()
     assert 'answer = "trial"' in text
+    tails = tmp_path / "tails.csv"
+    tails.write_text("channel_diameter_mm,wavelength_mm,amplitude_mm\n40,25,2.5\n40,15,2.5\n")
+    asked = {"candidates": tails, "answer": "trial"}
+    suggested = sp.suggest(tmp_path / "fit" / "posterior.nc", "biorob2012-wide", **asked)
+    assert suggested.to_dict()["answer"] == "trial"
+    for one in suggested.candidates:
+        assert one.gain > 0.0
+        assert set(one.narrowing) == {"friction_coefficient", "shared_friction"}
+        assert all(0.0 < share < 1.0 for share in one.narrowing.values())
+    with pytest.raises(InputError, match="suggest --as trial"):
+        sp.suggest(tmp_path / "fit" / "posterior.nc", "biorob2012-wide")
     again = sp.predict("biorob2012-wide", calibration=tmp_path / "fit" / "calibration.toml").trial
     assert again is not None
     assert again.values["forward_velocity"] == pytest.approx(truth[25.0].values["forward_velocity"], rel=0.15)

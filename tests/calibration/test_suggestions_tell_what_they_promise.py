@@ -41,6 +41,11 @@ def test_more_trials_tell_more_up_to_the_discrepancy(fitted: Path) -> None:
     assert 0 < gains[0] < gains[1] < gains[2] < 2 * gains[1]
 
 
+def test_a_posterior_of_held_motion_is_not_one_of_trials(fitted: Path) -> None:
+    with pytest.raises(InputError, match="is of held motion; allowed: as held"):
+        sp.suggest(fitted / "posterior.nc", WIDE, answer="trial")
+
+
 def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from spirillum.fitted import posterior_file
 

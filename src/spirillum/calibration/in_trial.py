@@ -9,7 +9,9 @@ others is their error: no prediction is taken to be better.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from spirillum.calibration.in_tube import without_tables
 from spirillum.dynamics.simulation import simulate
 from spirillum.dynamics.trial import trial_means
 from spirillum.errors import InputError
+from spirillum.kernels.native import thread_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.robot.toml_writer import with_numbers
@@ -89,14 +92,27 @@ def trial_surfaces(
         prepare: make tables with yawed poses that are not there.
     """
     _tables(experiment, tell, prepare=prepare)
+    return surfaces_of(experiment.robots, ends, tell)
+
+
+def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, int], None]) -> TrialSurfaces:
+    """Make the trials of robots with tables, and lay surfaces through them.
+
+    Args:
+        robots: the robots.
+        ends: free parameter to the least and largest value at which trials are made.
+        tell: progress.
+    """
     names, count = tuple(ends), _RUNS[len(ends)]
     logs = _points(ends, count)
     surfaces, scales, errors = [], [], []
-    for place, robot in enumerate(experiment.robots):
+    for place, robot in enumerate(robots):
         seen = np.full((count, 3), np.nan)
-        for number in range(count):
-            tell("trials of the robots", place * count + number, len(experiment.robots) * count)
-            seen[number] = _measured(robot, dict(zip(names, np.exp(logs[number]).tolist(), strict=True)))
+        values = [dict(zip(names, row.tolist(), strict=True)) for row in np.exp(logs)]
+        with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
+            for number, measured in enumerate(pool.map(partial(_measured, robot), values)):
+                tell("trials of the robots", place * count + number, len(robots) * count)
+                seen[number] = measured
         known = np.isfinite(seen).all(axis=1)
         if known.mean() < _FEWEST:
             raise InputError(

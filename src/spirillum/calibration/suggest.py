@@ -17,7 +17,7 @@ consecutive draws after another (a jackknife, whose blocks are longer than the d
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -31,7 +31,7 @@ from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, check_range
+from spirillum.errors import InputError, check_choice, check_range
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.tabled import TabledTube, tabled
@@ -44,6 +44,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
+from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
 
@@ -56,6 +58,7 @@ _BLOCKS = 20
 """Blocks of draws, each of which is left out once."""
 _TIED = 2.0
 """Standard errors within which a candidate is tied with the best one."""
+_NO_YAWED_TABLE = "it has no table with yawed poses; `spirillum prepare` makes one"
 _SAID = 5
 """Candidates that are left out by name."""
 
@@ -88,6 +91,8 @@ class Suggestion(DisplayMixin):
 
     posterior: PosteriorFile
     trials: int
+    answer: str
+    """What they are measured as: `held` or `trial`."""
     candidates: tuple[CandidateRobot, ...]
     warnings: tuple[Note, ...]
 
@@ -110,6 +115,7 @@ class Suggestion(DisplayMixin):
             "synthetic": self.posterior.synthetic,
             "model": self.posterior.model,
             "trials": self.trials,
+            **({} if self.answer == HELD else {"answer": self.answer}),
             "candidates": rows,
         }
         return envelope("suggestion", content, self.warnings)
@@ -121,6 +127,8 @@ def suggest(
     *,
     candidates: str | Path | None = None,
     trials: int = 5,
+    answer: str = HELD,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> Suggestion:
     """Rank candidate robots by the expected information of measuring them.
 
@@ -131,12 +139,16 @@ def suggest(
         candidates: channels and tails to choose from (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm
             amplitude in every robot's channel.
         trials: trials of each candidate.
+        answer: motion of which the posterior is: `held`, or `trial`, with some dozens of runs of each candidate.
+        progress: told what is being computed, how much is done, and of how much.
 
     Raises:
         InputError: for wrong input.
     """
     check_range("trials", trials, 1, 10**6)
-    known = read_posterior(posterior)
+    check_choice("answer", answer, (HELD, RELEASED))
+    known = read_posterior(posterior) if answer == HELD else read_posterior(posterior, answer=answer)
+    tell = progress or (lambda _what, _done, _total: None)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
@@ -144,12 +156,17 @@ def suggest(
     found: list[tuple[CandidateRobot, Samples]] = []
     left_out = []
     numbers, names = _numbers(known)
-    for robot in listed:
-        outside = _outside(known, robot)
+    for place, robot in enumerate(listed):
+        tell("candidates", place, len(listed))
+        outside = _outside(known, robot, answer)
         if outside:
             left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))
             continue
-        found.append(_candidate(known, robot, trials, numbers, names))
+        seen = _kinematics(known, robot) if answer == HELD else _trial_kinematics(known, robot)
+        if isinstance(seen, str):
+            left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {seen}"))
+            continue
+        found.append(_candidate(known, robot, trials, seen, numbers, names))
     if not found:
         raise InputError(f"no candidate can be built and answered: {left_out[0]}")
     if len(left_out) > _SAID:
@@ -157,6 +174,7 @@ def suggest(
     return Suggestion(
         known,
         trials,
+        answer,
         _ranked(found),
         (
             *((PAPER_ROBOTS_TAKEN,) if robots is None else ()),
@@ -183,8 +201,28 @@ def _papers_robots(known: PosteriorFile) -> list[Robot]:
     return robots
 
 
-def _outside(known: PosteriorFile, robot: Robot) -> str:
+def _kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples]:
+    """Advance and turning of a held robot at every draw."""
+    return drawn_kinematics(robot, find_swimmer_model(known.model), known)
+
+
+def _trial_kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples] | str:
+    """Advance and turning of a robot's trial at every draw; a sentence where too few trials have an answer."""
+    from spirillum.calibration.in_trial import FREE, surfaces_of  # its equations are compiled
+
+    ends = {name: (float(draws.min()), float(draws.max())) for name, draws in known.draws.items() if name in FREE}
+    try:
+        surfaces = surfaces_of([robot], ends, lambda _what, _done, _total: None)
+    except InputError as error:
+        return str(error)
+    advance, turning, _ = surfaces.at(known.draws)
+    return {"advance": advance[:, 0], "turning": turning[:, 0]}
+
+
+def _outside(known: PosteriorFile, robot: Robot, answer: str) -> str:
     """Why the posterior's model has no answer for a robot; empty where it has."""
+    if answer == RELEASED:
+        return "" if has_table(RobotBatch.of(robot), "yaw") else _NO_YAWED_TABLE
     model = find_swimmer_model(known.model)
     batch = RobotBatch.of(robot, known.placed(robot, Placement()) if model.placed else None)
     if model.placed:
@@ -270,10 +308,14 @@ def _information(seen: Samples, noise: Samples) -> tuple[float, Samples, Samples
 
 
 def _candidate(
-    known: PosteriorFile, robot: Robot, trials: int, numbers: Samples, names: list[str]
+    known: PosteriorFile,
+    robot: Robot,
+    trials: int,
+    predicted: Mapping[str, Samples],
+    numbers: Samples,
+    names: list[str],
 ) -> tuple[CandidateRobot, Samples]:
     """A candidate, and its information where one block of draws after another is left out."""
-    predicted = drawn_kinematics(robot, find_swimmer_model(known.model), known)
     rows, noise = [], []
     for quantity_name, values in predicted.items():
         tau = known.discrepancy.get(quantity_name)

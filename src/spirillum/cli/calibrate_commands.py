@@ -186,5 +186,6 @@ def suggest(
         raise InputError(f"{own[0]} is set, and every candidate has its own; allowed: other fields, or --candidates")
     names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
-    found = _saying_whose(request(posterior, robots), robot, settings)
+    with renderer.progress_bar(quiet=json) as progress:
+        found = _saying_whose(request(posterior, robots, progress=progress), robot, settings)
     renderer.show(found.to_dict(), json=json, rows=rows)

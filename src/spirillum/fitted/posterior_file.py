@@ -289,8 +289,8 @@ def _possible(name: str, values: Samples) -> bool:
     return bool(values.size and np.all((values >= least) & (values < _GREATEST)))
 
 
-def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
-    """Read a posterior that a calibration has written."""
+def read_posterior(path: str | Path, *models: str, answer: str = "held") -> PosteriorFile:
+    """Read a posterior that a calibration has written, of `held` motion or of a `trial`."""
     path = Path(path)
     with open_netcdf(path, _WHAT) as file:
         attributes = {str(name): item for name, item in file.attrs.items()}
@@ -312,10 +312,12 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0; "
             "`spirillum calibrate` with more --doublings samples for longer"
         )
-    if attributes.get("answer") == "trial":
+    if (own := attributes.get("answer", "held")) != answer:
         raise InputError(
             f"{path} is of trials, whose draws no held motion follows; allowed: the calibration.toml beside it, as "
-            "--calibration"
+            "--calibration, or `suggest --as trial`"
+            if own == "trial"
+            else f"{path} is of held motion; allowed: as held, or a posterior by `calibrate --as trial`"
         )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)

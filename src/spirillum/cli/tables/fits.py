@@ -114,7 +114,8 @@ def _apart(difference: Answer) -> str:
 def suggestion(answer: Answer, rows: int = 10) -> Blocks:
     """Candidates of `suggest`, the most informative first."""
     what = f"what {answer['trials']} trials of one more tail would decide"
-    yield f"{answer['posterior']}, model {answer['model']}: {what}"
+    motion = "" if answer.get("answer", "held") == "held" else f", as {answer['answer']}"
+    yield f"{answer['posterior']}, model {answer['model']}{motion}: {what}"
     found = grid("", "channel (mm)", "tail (mm)", "information (bit)", "behind the first (bit)", "narrows most")
     first = answer["candidates"][0]
     for item in answer["candidates"][:rows]:
