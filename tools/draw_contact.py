@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from yawed_cylinder import pulls
 
 import spirillum as sp
 from spirillum.view.figures.style import COLOURS, new_figure, styled
@@ -122,8 +123,8 @@ def draw_forces() -> None:
     """Forces towards the wall of a robot that has waited ten minutes, and the yaw that moves them."""
     run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "20 s"}, in_tube={"wait": "600 s"})
     with styled():
-        figure = new_figure(7.6, 2.9)
-        left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+        figure = new_figure(10.6, 2.9)
+        left, right, simple = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
         for (name, words), colour in zip(FORCES.items(), ("black", "blue", "green", "vermillion"), strict=True):
             left.plot(run["time"], 1e3 * run[name], color=COLOURS.get(colour, colour), label=words)
         left.set_ylabel("force towards the wall (mN)")
@@ -135,8 +136,22 @@ def draw_forces() -> None:
         right.set_title("b  as the tail yaws the body", loc="left")
         for axes in (left, right):
             axes.set_xlabel("time with the motor on (s)")
+        draw_cylinder(simple)
         figure.tight_layout()
         figure.savefig(TARGET.with_name("contact-forces.png"), dpi=130)
+
+
+def draw_cylinder(axes: Axes) -> None:
+    """The pull on a cylinder with a yawing moment, against finite differences of Reynolds' equation."""
+    for bound, words, colour in ((np.inf, "no bound", "blue"), (1e4, "10 kPa", "vermillion")):
+        found = pulls(bound)
+        axes.plot(found["time"], 1e3 * found["pull"], color=COLOURS[colour], label=words)
+        axes.plot(found["at"], 1e3 * found["reynolds"], linestyle="", marker="o", markersize=4, color=COLOURS[colour])
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("pull of the film (mN)")
+    axes.set_ylim(0.0, 120.0)
+    axes.legend(loc="upper left")
+    axes.set_title("c  as a cylinder (dots: Reynolds)", loc="left")
 
 
 def draw() -> None:

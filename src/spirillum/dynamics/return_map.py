@@ -28,8 +28,8 @@ SEARCHING = 10.0 * TubeRobot.tolerance
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
-_MOST_STEPS = 40_000
-"""Steps in time of a run and of all searches for its fixed point, where they end: a minute or two."""
+_MOST_STEPS = 75_000
+"""Steps in time of a run and of all searches for its fixed point: some 1,300 turns, fewer where the tail touches."""
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _COUNTED = [rigid_links.POSITION, rigid_links.ROLL, *range(rigid_links.CURRENT + 1, rigid_links.STATES)]
 """What counts from the start of a turn."""
