@@ -11,7 +11,7 @@ import pytest
 import spirillum as sp
 from spirillum.citations import REFERENCES
 from spirillum.papers.case import case_names, load_case, recorded_values
-from spirillum.papers.case_values import robot_of, trials_of
+from spirillum.papers.case_values import has_table, robot_of, trials_of
 from spirillum.robot.load import preset_names, preset_text, shipped_robots
 from spirillum.schemas import schema_of
 
@@ -51,16 +51,25 @@ def test_a_case_names_robots_references_and_quantities_that_are_there(name: str)
         assert set(point.uncertainty) <= set(point.published)
         assert {point.over, point.minus} - {""} <= set(labels)
     for assumption in case.assumptions:
-        changes = (assumption.set, assumption.scale, assumption.placement)
+        changes = (assumption.set, assumption.scale, assumption.placement, assumption.run)
         assert any(changes)
         for values in (values for change in changes for values in change.values()):
             assert len(values) == len(assumption.values)
     for point in case.points:
         nominal = robot_of(case, point)
-        assert all(trial.placement or robot_of(case, point, trial) != nominal for trial in trials_of(case, point))
+        for trial in trials_of(case, point):
+            assert trial.placement or trial.run or robot_of(case, point, trial) != nominal
     assert {(point.label, quantity) for point, quantity in case.rows()} == {
         (label, quantity) for label, values in recorded_values(name).items() for quantity in values
     }
+
+
+def test_robots_that_are_released_have_tables_in_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPIRILLUM_CACHE", "off")
+    cases = [load_case(name) for name in case_names()]
+    released = [(case, point) for case in cases for point in case.points if point.run]
+    assert released
+    assert all(has_table(case, point) for case, point in released)
 
 
 @pytest.mark.parametrize("name", CHEAP)
@@ -72,6 +81,7 @@ def test_cheap_cases_are_as_recorded(name: str) -> None:
 def test_all_cases_are_as_recorded(tmp_path: Path) -> None:
     found = sp.validate(output=tmp_path / "report")
     assert not found.outside
+    assert all(row.computed for row in found.rows)
     assert {case.name for case in found.cases} == set(case_names())
     written = json.loads((tmp_path / "report" / "validation.json").read_text("utf-8"))
     assert len(written["rows"]) == len(found.rows)

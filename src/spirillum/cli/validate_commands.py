@@ -22,7 +22,7 @@ def validate(
         typer.Argument(metavar="[NAME]...", autocompletion=complete_cases, help="Cases that ship; else all."),
     ] = None,
     runs: Annotated[
-        bool, typer.Option("--runs", help="Run robots released in their tubes too; makes their tables first (an hour).")
+        bool, typer.Option("--runs", help="Make the tables that runs in tubes lack (an hour; it can be resumed).")
     ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for a report with figures.")

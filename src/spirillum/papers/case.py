@@ -60,7 +60,7 @@ class CasePoint(Section):
     """Fields of the robot; `unset` takes one out."""
     placement: dict[str, Any] = Field(default_factory=dict)
     run: dict[str, Any] = Field(default_factory=dict)
-    """Start and length of a run of the released robot, which needs its table; else none is made."""
+    """Settings of a run of the released robot, which needs its table; else none is made."""
     assumed: bool = True
     """Whether the case's assumptions are tried on it."""
     over: str = ""
@@ -85,6 +85,8 @@ class CaseAssumption(Section):
     """Fields of the robot and the factor on their nominal value in each trial."""
     placement: dict[str, list[Any]] = Field(default_factory=dict)
     """Fields of the placement and their value in each trial."""
+    run: dict[str, list[Any]] = Field(default_factory=dict)
+    """Settings of the run and their value in each trial."""
     points: list[str] = Field(default_factory=list)
     """Labels of the points that it concerns; empty: all."""
 

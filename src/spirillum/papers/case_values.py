@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from operator import sub, truediv
 from typing import Any, NamedTuple
 
+from spirillum.dynamics.integration import Progress
 from spirillum.errors import InputError
 from spirillum.fluid.reference_errors import CHECKED, tail_error
 from spirillum.fluid.resistance import resistance
@@ -18,6 +19,7 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import predict
+from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import swim
 from spirillum.swimming.steady_quantities import STEADY
 
@@ -41,6 +43,7 @@ class CaseTrial(NamedTuple):
     set: Mapping[str, Any]
     scale: Mapping[str, float]
     placement: Mapping[str, Any]
+    run: Mapping[str, Any]
 
 
 def trials_of(case: Case, point: CasePoint) -> Iterator[CaseTrial]:
@@ -55,29 +58,45 @@ def _trials(assumption: CaseAssumption) -> Iterator[CaseTrial]:
         fields = {path: values[number] for path, values in assumption.set.items()}
         factors = {path: values[number] for path, values in assumption.scale.items()}
         place = {name: values[number] for name, values in assumption.placement.items()}
-        yield CaseTrial(assumption.name, value, fields, factors, place)
+        run = {name: values[number] for name, values in assumption.run.items()}
+        yield CaseTrial(assumption.name, value, fields, factors, place, run)
+
+
+def has_table(case: Case, point: CasePoint) -> bool:
+    """Whether the robot of a point has a table for motion in its tube, or none is made of it."""
+    return not missing_tables(RobotBatch.of(robot_of(case, point)), "yaw")
 
 
 def values_at(
-    case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None = None
+    case: Case,
+    point: CasePoint,
+    names: Iterable[str],
+    trial: CaseTrial | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, CaseValue]:
     """Return quantities of a point by name; with a trial without stated errors."""
-    found = _own_values(case, point, names, trial)
+    found = _own_values(case, point, names, trial, progress)
     other, combine = (point.over, truediv) if point.over else (point.minus, sub)
     if not other:
         return found
-    beside = _own_values(case, case.point(other), names, trial)
+    beside = _own_values(case, case.point(other), names, trial, progress)
     return {name: CaseValue(combine(one.value, beside[name].value), None) for name, one in found.items()}
 
 
-def _own_values(case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None) -> dict[str, CaseValue]:
+def _own_values(
+    case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None, progress: Progress | None
+) -> dict[str, CaseValue]:
     robot = robot_of(case, point, trial)
     known: dict[str, CaseValue] = {}
     if trial is not None:
-        point = point.model_copy(update={"placement": {**point.placement, **trial.placement}})
+        changed = {"placement": {**point.placement, **trial.placement}, "run": {**point.run, **trial.run}}
+        point = point.model_copy(update=changed)
     quantities = {name: case.quantities[name] for name in names}
     for kind in dict.fromkeys(quantity.of.partition(".")[0] for quantity in quantities.values()):
-        values = _KINDS[kind](robot, point.model or case.model, point, trial is None)
+        if kind == "run":
+            values = _run(robot, point, progress)
+        else:
+            values = _KINDS[kind](robot, point.model or case.model, point, trial is None)
         known |= {f"{kind}.{name}": value for name, value in values.items()}
     return {name: _in_unit(known[quantity.of], quantity, robot) for name, quantity in quantities.items()}
 
@@ -127,14 +146,13 @@ def _tail(robot: Robot, model: str, _point: CasePoint, _is_nominal: bool) -> dic
     return {name: CaseValue(abs(float(matrix[place])), abs(errors[name]) / 100.0) for name, place in _ENTRIES.items()}
 
 
-def _run(robot: Robot, _model: str, point: CasePoint, _is_nominal: bool) -> dict[str, CaseValue]:  # noqa: FBT001
+def _run(robot: Robot, point: CasePoint, progress: Progress | None) -> dict[str, CaseValue]:
     """Motion of the robot released in its tube, SI."""
-    return {name: CaseValue(value, None) for name, value in released_motion(robot, point.run).items()}
+    return {name: CaseValue(value, None) for name, value in released_motion(robot, point.run, progress).items()}
 
 
 _KINDS: Mapping[str, Callable[[Robot, str, CasePoint, bool], dict[str, CaseValue]]] = {
     "swimming": _swimming,
     "tail": _tail,
-    "run": _run,
 }
-"""Kinds of quantities."""
+"""Kinds of quantities of a robot at a pose."""

@@ -22,7 +22,7 @@ from spirillum.papers.case import (
     load_case,
     recorded_values,
 )
-from spirillum.papers.case_values import CaseTrial, CaseValue, trials_of, values_at
+from spirillum.papers.case_values import CaseTrial, CaseValue, has_table, trials_of, values_at
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.papers.registry import study_claims
 
@@ -59,7 +59,7 @@ class ValidationRow:
     """Relative error that the program states of its value; None where it states none."""
     effects: tuple[AssumptionEffect, ...]
     computed: bool
-    """Whether ours was computed now; else it is the recorded value, of a run that needs a table."""
+    """Whether ours was computed now; else it is the recorded value, of a run that lacks its table."""
     recorded: float
     """The program's value when the case was written."""
     recorded_within: float
@@ -240,7 +240,7 @@ def case_lines(result: CaseResult) -> Iterable[str]:
 
 
 def compute_case(name: str, progress: Progress | None = None, *, runs: bool = False) -> CaseResult:
-    """Compute all rows of a case and judge its statements; rows of runs in the tube only with `runs`."""
+    """Compute all rows of a case and judge its statements; those of runs without a table only with `runs`."""
     case, recorded = load_case(name), recorded_values(name)
     values = _values(name, case, progress, runs=runs)
     rows = tuple(
@@ -263,7 +263,7 @@ def _values(name: str, case: Case, progress: Progress | None, *, runs: bool) -> 
     """The quantities of all points, under all assumptions."""
     wanted: dict[str, list[str]] = {}
     for point, quantity in case.rows():
-        if point.run and not runs:
+        if point.run and not runs and not has_table(case, point):
             continue
         wanted.setdefault(point.label, []).append(quantity)
     work = [(case.point(label), trial) for label in wanted for trial in (None, *trials_of(case, case.point(label)))]
@@ -271,7 +271,7 @@ def _values(name: str, case: Case, progress: Progress | None, *, runs: bool) -> 
     for done, (point, trial) in enumerate(work):
         if progress:
             progress(name, done, len(work))
-        values[point.label, *_key(trial)] = values_at(case, point, wanted[point.label], trial)
+        values[point.label, *_key(trial)] = values_at(case, point, wanted[point.label], trial, progress)
     if progress:
         progress(name, len(work), len(work))
     return values

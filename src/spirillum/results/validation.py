@@ -28,8 +28,8 @@ def validate(
 
     Args:
         names: cases that ship, such as `rodenborn2013`; none: all of them, in some minutes.
-        runs: also run robots that are released in their tubes, after making the tables that they need (an hour); else
-            their rows are the recorded ones, and say so.
+        runs: also run robots, released in their tubes, whose table has to be made first (up to an hour; what is solved
+            for is kept, so that an interrupted one goes on); else their rows are the recorded ones, and say so.
         output: folder for `validation.json`, `figures/` and `report.html`; None: nothing is written.
         progress: called with the name of a case, how much of it is done, and of how much.
 

@@ -1,4 +1,4 @@
-"""Where tables of robots in tubes are found and kept: those of the presets in this package, others in the user's cache.
+"""Where tables of robots in tubes are found and kept: in this package those of presets and papers, others in the cache.
 
 A table in the cache is filed under its robot, its tube and the source of all that makes it, so that a new version of
 the solver asks for a new one. The folder is that of `cache`; it is safe to delete.
@@ -19,6 +19,7 @@ from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
 _SHIPPED = Path(__file__).parent / "tables"
+_OF_PAPERS = tuple(sorted(Path(__file__).parents[2].glob("papers/*/tables")))
 
 
 @lru_cache(maxsize=256)
@@ -85,8 +86,9 @@ def tables_are_kept() -> bool:
 
 
 def _of_key(key: str, stage: StageName) -> TubeTable | None:
-    shipped = _found(_SHIPPED / f"{key}.table", key) if stage == "fine" else None
-    return shipped or _found(_kept(key, stage), key)
+    shipped = (_found(folder / f"{key}.table", key) for folder in (_SHIPPED, *_OF_PAPERS))
+    of_stage = (table for table in shipped if table is not None and table.stage == stage)
+    return next(of_stage, None) or _found(_kept(key, stage), key)
 
 
 _mirrors: dict[str, tuple[TubeTable, TubeTable]] = {}

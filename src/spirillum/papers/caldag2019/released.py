@@ -1,7 +1,7 @@
 """Orbit, decay, tilt and speed of the swimmer released in its tube, weightless and without friction.
 
 Their contact cancels the radial force within 0.1 mm of the wall, without friction or film: here a roughness as high as
-that carries the swimmer. A run ends where the swimmer leaves its table: it yaws by more than 11 degrees.
+that carries the swimmer. Their field turns from the start: a swimmer without weight would not move while it waits.
 """
 
 from __future__ import annotations
@@ -11,23 +11,31 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.arrays import Samples
+from spirillum.arrays import Flags, Samples
+from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.simulation import simulate
+from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 
-_ROUGHNESS, _SAMPLES = 1e-4, 24
+_SAMPLES = 24
+"""Samples a turn."""
 
 
-def released_motion(robot: Robot, run: Mapping[str, Any]) -> dict[str, float]:
-    """Return what was published of a run, over a share of it, per turn of the swimmer.
+def released_motion(robot: Robot, run: Mapping[str, Any], progress: Progress | None = None) -> dict[str, float]:
+    """Return what was published of a run, per turn of the swimmer.
 
     Args:
         robot: the swimmer in its tube.
-        run: `eccentricity` of the start, `turns`, and `first` and `last`, the share of the run that is read.
+        run: `eccentricity` of the start; number of `turns`; between which of them the growth (`growth`) and all else
+            (`read`) is read; `roughness` that carries the swimmer, m; `wait` before the field turns, s.
+        progress: told what is being computed, how much is done, and of how much.
 
     Returns:
-        `decay` of the logarithm of the distance from the axis; `orbit`, turns about the axis in the sense of the own
+        `growth` of the logarithm of the distance from the axis; `orbit`, turns about the axis in the sense of the own
         rotation; mean `radius`, m; mean `tilt`, rad; `advance`, m.
+
+    Raises:
+        InputError: if the run ends early.
     """
     found = simulate(
         robot,
@@ -35,22 +43,25 @@ def released_motion(robot: Robot, run: Mapping[str, Any]) -> dict[str, float]:
         timing={"turns": run["turns"], "samples_per_turn": _SAMPLES},
         placement={"eccentricity": run["eccentricity"], "ends": "closed"},
         weight=False,
-        roughness=_ROUGHNESS,
-        in_tube={"friction_coefficient": 0.0},
+        roughness=run.get("roughness", 1e-4),
+        in_tube={"friction_coefficient": 0.0, "wait": run.get("wait", 0.0)},
+        progress=progress,
     )
-    time, angle = found["time"].values, found["body_angle"].values
-    part = (time >= run["first"] * time[-1]) & (time <= run["last"] * time[-1])
-    sense = float(np.sign(angle[-1] - angle[0]))
-    turns = sense * angle[part] / (2.0 * np.pi)
+    turns = found["body_angle"].values / (2.0 * np.pi)
+    sense = float(np.sign(turns[-1] - turns[0]))
+    turns = sense * turns
+    if turns[-1] < 0.99 * run["turns"]:
+        raise InputError(f"{robot.name}: the run ends after {turns[-1]:.3g} of {run['turns']} turns")
+    growing, read = ((turns >= first) & (turns <= last) for first, last in (run["growth"], run["read"]))
 
-    def slope(values: Samples) -> float:
-        return float(np.polyfit(turns, values, 1)[0])
+    def slope(values: Samples, part: Flags) -> float:
+        return float(np.polyfit(turns[part], values[part], 1)[0])
 
-    radius, azimuth = found["offset"].values[part], np.unwrap(found["azimuth"].values[part])
+    radius, azimuth = found["offset"].values, np.unwrap(found["azimuth"].values)
     return {
-        "decay": -slope(np.log(radius)),
-        "orbit": sense * slope(azimuth) / (2.0 * np.pi),
-        "radius": float(radius.mean()),
-        "tilt": float(np.hypot(found["pitch"].values[part], found["yaw"].values[part]).mean()),
-        "advance": abs(slope(found["position"].values[part, 0])),
+        "growth": slope(np.log(radius), growing),
+        "orbit": sense * slope(azimuth, read) / (2.0 * np.pi),
+        "radius": float(radius[read].mean()),
+        "tilt": float(np.hypot(found["pitch"].values, found["yaw"].values)[read].mean()),
+        "advance": abs(slope(found["position"].values[:, 0], read)),
     }
