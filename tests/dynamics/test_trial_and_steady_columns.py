@@ -99,6 +99,8 @@ def test_a_missing_trial_has_its_reason(overrides: dict[str, Any], options: dict
     ("overrides", "options", "state"),
     [
         pytest.param({"body.mass": "7 g"}, {}, "ceiling", id="rising"),
+        pytest.param({}, {"placement": {"flow": "1 mm/s"}}, "steady", id="imposed flow"),
+        pytest.param({}, {"placement": {"ends": "closed"}}, "steady", id="closed ends"),
         pytest.param({}, {"tail_rate": "1.2 Hz"}, "a tail rate is prescribed", id="prescribed tail rate"),
         pytest.param({"channel": "none"}, {}, "the robot has no channel", id="no channel"),
         pytest.param({}, {"model": "slender"}, "model 'slender' has no walls", id="without walls"),
@@ -110,7 +112,7 @@ def test_a_steady_column_has_its_state_or_its_reason(
     steady = sp.predict(sp.load(WIDE, **overrides), **options).steady
     assert steady is not None
     assert state in (steady.reason or steady.basis["state"])
-    assert math.isfinite(steady.values.get("forward_velocity", math.nan)) == (state == "ceiling")
+    assert math.isfinite(steady.values.get("forward_velocity", math.nan)) == (state in ("ceiling", "steady"))
 
 
 def test_a_magnetic_robot_in_one_piece_has_a_trial_and_the_reason_why_nothing_is_steady() -> None:
