@@ -13,7 +13,7 @@ import json
 import numpy as np
 
 import spirillum as sp
-from spirillum.controllers.bank import Bank
+from spirillum.controllers.estimators import Bank
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import DriveInterval, learnt
 from spirillum.controllers.loop import run_loop

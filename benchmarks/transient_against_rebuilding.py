@@ -14,8 +14,7 @@ import time
 import numpy as np
 
 import spirillum as sp
-from spirillum.dynamics.axial_robot import AxialRobot
-from spirillum.dynamics.axial_run import RUNGE_KUTTA
+from spirillum.dynamics.axial_robot import RUNGE_KUTTA, AxialRobot
 from spirillum.fluid.closed.rft import local_coefficients
 from spirillum.papers.biorob2012 import transient
 from spirillum.robot.batch import RobotBatch

@@ -2,7 +2,7 @@
 
 The flow is solved for at fifteen phases of tails of several wavelengths, at one place. From fewer phases, evenly spread
 over the Fourier sum that all of them give, the resistance is found back as a table does it: printed are the largest
-errors over a turn, in percent of what `spirillum.fluid.tube.table_errors` says.
+errors over a turn, in percent of what `spirillum.fluid.tube.stages` says.
 
     OMP_NUM_THREADS=1 python benchmarks/tube_phases.py [--t 0.065] [--f -0.5] [--yaw 0.95] [--wavelength 25 ...] ROBOT
 
@@ -31,10 +31,9 @@ from spirillum.fluid.tube.outer_resistance import (
     solutions,
 )
 from spirillum.fluid.tube.solids import Fineness
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
+from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.film_table import film_at
-from spirillum.kernels.tube_table import cut_of_film
+from spirillum.kernels.tube_table import cut_of_film, film_at
 from spirillum.robot.batch import RobotBatch
 
 _TRUE = 15

@@ -23,8 +23,8 @@ import spirillum as sp
 from spirillum.fluid.tube.nodes import CHECKED_FROM, Places
 from spirillum.fluid.tube.outer_resistance import NodeSolution, solutions
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.kernels.tube_table import INSIDE
 from spirillum.robot.tube_pose import Seat
 

@@ -17,7 +17,7 @@ import numpy as np
 import spirillum as sp
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.stokeslets import Accuracy
-from spirillum.swimming.robot_preparation import prepared
+from spirillum.swimming.preparation import prepared
 from spirillum.swimming.steady import swim
 
 TUBES = ("biorob2012-wide", "biorob2012-narrow")

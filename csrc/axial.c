@@ -25,7 +25,7 @@
 #endif
 #include "drive.h"
 
-/* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/axial_motor.py. */
+/* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/motor.py. */
 typedef struct {
     Motor motor;
     double speed, body, tail;                /* U, Omega, omega per joint torque */

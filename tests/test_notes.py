@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from spirillum.note_kinds import TRACKING
-from spirillum.notes import KINDS, LONGEST, Note, note_attributes, notes_in, shown_cautions
+from spirillum.notes import KINDS, LONGEST, TRACKING, Note, note_attributes, notes_in, shown_cautions
 
 ROOT = Path(__file__).parent.parent
 

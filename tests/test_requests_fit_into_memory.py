@@ -10,7 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.app import command_line
-from spirillum.costs import MOST_MEMORY, check_memory
+from spirillum.errors import MOST_MEMORY, check_memory
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.surface import corner_normals
 

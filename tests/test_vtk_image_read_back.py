@@ -12,7 +12,7 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.fields.flow import Flow
-from spirillum.formats.vtk_image import write_vti
+from spirillum.formats.array_files import write_vti
 
 _TYPES = {"Float64": np.float64, "UInt8": np.uint8}
 

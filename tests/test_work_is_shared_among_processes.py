@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from spirillum.processes import imap_unordered
+from spirillum.worker_pool import imap_unordered
 
 
 def test_answers_of_several_processes_are_those_of_one() -> None:
@@ -23,7 +23,7 @@ def test_answers_of_several_processes_are_those_of_one() -> None:
 def test_processes_end_with_the_one_that_asked(tmp_path: Path) -> None:
     """A process that is killed cannot end those that it has started: they notice."""
     script = (
-        "import time; from spirillum.processes import imap_unordered; list(imap_unordered(time.sleep, [60.0] * 4, 2))"
+        "import time; from spirillum.worker_pool import imap_unordered; list(imap_unordered(time.sleep, [60.0] * 4, 2))"
     )
     asking = subprocess.Popen([sys.executable, "-c", script])
     children = _waited_for(lambda: _workers_of(asking.pid), 2)

@@ -11,8 +11,7 @@ import sys
 from pathlib import Path
 
 import spirillum as sp
-from spirillum.papers.case import Case, load_case
-from spirillum.papers.case_values import robot_of, values_at
+from spirillum.papers.case import Case, load_case, robot_of, values_at
 
 PAPERS = Path(__file__).parent.parent / "src" / "spirillum" / "papers"
 

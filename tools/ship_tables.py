@@ -15,7 +15,7 @@ import spirillum
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.biorob2012.published import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.studies.study_loader import load_study
 

@@ -14,9 +14,9 @@ from .dynamics.axial_batch import AxialBatch as AxialBatch
 from .dynamics.comparison import ModelComparison as ModelComparison
 from .dynamics.comparison import compare_models as compare_models
 from .dynamics.flow_of_run import flow_of_run as flow_of_run
-from .dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
 from .dynamics.plant import Plant as Plant
 from .dynamics.prediction import predict as predict
+from .dynamics.rotating_field import magnetic_sweep as magnetic_sweep
 from .dynamics.settling import Settling as Settling
 from .dynamics.settling import settle as settle
 from .dynamics.simulation import simulate as simulate
@@ -38,9 +38,9 @@ from .interfaces.serial_remote import SerialRemote as SerialRemote
 from .interfaces.serial_remote import VirtualRemote as VirtualRemote
 from .interfaces.serial_remote import remote as remote
 from .live.observation import Observation as Observation
+from .live.observation import Tracked as Tracked
 from .live.session import track as track
 from .live.tracker import LiveTracker as LiveTracker
-from .live.tracking_summary import Tracked as Tracked
 from .measurement.feasibility import Feasibility as Feasibility
 from .measurement.feasibility import feasibility as feasibility
 from .measurement.measure import Measurement as Measurement
@@ -61,8 +61,8 @@ from .swimming.prediction import Prediction as Prediction
 from .swimming.preparation import Prepared as Prepared
 from .swimming.preparation import prepare as prepare
 from .swimming.preparation import prepare_all as prepare_all
+from .swimming.steady import Swimming as Swimming
 from .swimming.steady import swim as swim
-from .swimming.steady_quantities import Swimming as Swimming
 from .view.figures.plot import Plot as Plot
 from .view.figures.plot import plot as plot
 from .view.scene3d.film import Film as Film

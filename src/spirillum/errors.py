@@ -1,4 +1,4 @@
-"""The one error that a user's input can raise."""
+"""The one error that a user's input can raise, and the refusal of requests that would not fit into memory."""
 
 from __future__ import annotations
 
@@ -74,3 +74,14 @@ def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> st
     """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
     near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=likeness)
     return f" (did you mean {near[0]}?)" if near else ""
+
+
+MOST_MEMORY = 4 << 30
+"""Memory that the arrays of one request may take, bytes."""
+
+
+def check_memory(cause: str, count: float, items: str, each: float, instead: str) -> None:
+    """Refuse a request whose arrays would not fit."""
+    most = MOST_MEMORY / each
+    if not count <= most:
+        raise InputError(f"{cause} makes {count:.3g} {items}; allowed: at most {most:.2g}, {instead}")

@@ -14,7 +14,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.intervals import intervals_of
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Swimming
 
 WIDE = "biorob2012-wide"
 NAMES = [f.name for f in fields(Swimming) if f.name != "valid"]

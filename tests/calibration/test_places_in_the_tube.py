@@ -14,7 +14,7 @@ from scipy.optimize import root
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.calibrated import Calibrated
-from spirillum.fluid.tube.tabled import tabled
+from spirillum.fluid.tube.library import tabled
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load

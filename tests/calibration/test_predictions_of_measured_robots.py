@@ -13,7 +13,7 @@ import spirillum as sp
 from spirillum.fitted.posterior_file import PosteriorFile, posterior_checksum
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
-from spirillum.swimming.discrepancy import drawn_discrepancy
+from spirillum.swimming.drawn_resistance import drawn_discrepancy
 from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"

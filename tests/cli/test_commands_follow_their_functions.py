@@ -7,7 +7,7 @@ import pytest
 
 from spirillum.cli.app import app, command_line
 from spirillum.cli.function_command import GIVEN_OTHERWISE, FunctionSource, declarations
-from spirillum.cli.setup_commands import setup_app
+from spirillum.cli.measurement_commands import setup_app
 from spirillum.robot.arguments import Options
 
 SOURCES: dict[str, FunctionSource] = {

@@ -25,7 +25,7 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     import spirillum.fields.flow as module
     from spirillum.fluid.tube.tube import Tube
     from spirillum.swimming.prediction import predict
-    from spirillum.swimming.robot_preparation import prepared
+    from spirillum.swimming.preparation import prepared
 
     def quick(robot: Any, **options: Any) -> Any:
         known = {"model": "sbt", "resolution": None}

@@ -10,7 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics.plant import Snapshot
-from spirillum.dynamics.poses import RobotPose
+from spirillum.dynamics.run_file import RobotPose
 
 
 @dataclass(frozen=True)

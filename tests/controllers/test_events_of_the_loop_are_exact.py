@@ -12,8 +12,7 @@ import pytest
 import spirillum as sp
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
-from spirillum.controllers.sensors import FlowPulse, draw
-from spirillum.controllers.signals import Message
+from spirillum.controllers.sensors import FlowPulse, Message, draw
 from spirillum.errors import InputError
 
 SPEED = 1e-3

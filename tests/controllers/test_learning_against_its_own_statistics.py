@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.controllers.bank import Paths, interpolation, points
+from spirillum.controllers.estimators import Paths, interpolation, points
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import DriveInterval, Learner, Learning, learnt
 from spirillum.controllers.loop import run_loop
-from spirillum.controllers.signals import Detection, Message, MeterReading
+from spirillum.controllers.sensors import Detection, Message, MeterReading
 
 LAB = {"unknown": {"friction_factor": 3.0, "gap_factor": 2.0, "voltage_error": 0.01, "viscosity_error": 0.02}}
 END = 8.0

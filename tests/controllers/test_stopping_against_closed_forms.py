@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spirillum.controllers.estimators import PositionFilter
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import run_loop
-from spirillum.controllers.position_filter import PositionFilter
-from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import Detection
+from spirillum.controllers.sensors import Detection, FlowPulse
 from spirillum.controllers.stop_task import KnowingStop, StopController, Timed
 
 SPEED, GOAL, TOLERANCE = 1e-3, 5e-3, 1e-3

@@ -9,14 +9,10 @@ from scipy.optimize import minimize_scalar
 
 import posteriors
 import spirillum as sp
-from spirillum.designs.design_result import Learned
-from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.improvement import lead_warnings
-from spirillum.designs.manufacturability import Manufacturability
-from spirillum.designs.reading import condition_of, quantity_of
+from spirillum.designs.criteria import Manufacturability, condition_of, quantity_of, space_of
+from spirillum.designs.design_result import Learned, lead_warnings
+from spirillum.designs.evaluation import Evaluation, Objective, Unknowns
 from spirillum.designs.search import Archive, best_design
-from spirillum.designs.space import space_of
-from spirillum.designs.unknowns import Unknowns
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model

@@ -8,13 +8,9 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.learned import Points, chosen_model, corrected, points_of, solved_at
-from spirillum.designs.learning import learned_best
-from spirillum.designs.manufacturability import Manufacturability
-from spirillum.designs.reading import quantity_of
-from spirillum.designs.space import Variable, space_of
-from spirillum.designs.unknowns import Unknowns, unknowns_of
+from spirillum.designs.criteria import Manufacturability, Variable, quantity_of, space_of
+from spirillum.designs.evaluation import Evaluation, Objective, Unknowns, unknowns_of
+from spirillum.designs.learned import Points, chosen_model, corrected, learned_best, points_of, solved_at
 from spirillum.errors import InputError
 from spirillum.fluid.closed.rft import Rft
 from spirillum.robot.batch import RobotBatch

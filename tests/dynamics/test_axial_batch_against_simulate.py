@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import posteriors
 import spirillum as sp
-from spirillum.kernels import axial_motor as kernel
+from spirillum.kernels import motor as kernel
 
 WIDE = "biorob2012-wide"
 IN_FLOW: dict[str, Any] = {"gap": "0.5 mm", "pitch": 0.0, "flow": 0.0}

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.kernels.cavitation import lift_of_cavitation
+from spirillum.kernels.tube_table import lift_of_cavitation
 
 
 @cache

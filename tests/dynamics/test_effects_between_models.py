@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.view.figures.effects import effects_figure
+from spirillum.view.figures.comparison import effects_figure
 
 
 @pytest.fixture(scope="module")

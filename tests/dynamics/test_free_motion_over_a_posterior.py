@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.free_draws import intervals_of_free_motion
+from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 from spirillum.dynamics.free_motion import free_motion
 from spirillum.fitted.fit import fit_of_posterior
 from spirillum.fitted.posterior_file import PosteriorFile

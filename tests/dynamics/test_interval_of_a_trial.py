@@ -10,7 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.tables.parts import released_columns
-from spirillum.dynamics.trial_unknowns import RUNS, UNKNOWNS, open_unknowns, samples_of, variance_shares, with_interval
+from spirillum.dynamics.trial import RUNS, UNKNOWNS, open_unknowns, samples_of, variance_shares, with_interval
 from spirillum.robot.links import links_of
 from spirillum.swimming.released_motion import ReleasedMotion
 

@@ -8,7 +8,7 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import Reach, integrate
-from spirillum.dynamics.magnetic_sweep import _settled
+from spirillum.dynamics.rotating_field import _settled
 from spirillum.dynamics.timing import Switch
 from spirillum.kernels import rigid_links
 

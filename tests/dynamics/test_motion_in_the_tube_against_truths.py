@@ -13,21 +13,21 @@ import pytest
 import spirillum as sp
 from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.integration import Reach, integrate, observed_at
+from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import run_answer
+from spirillum.dynamics.start import StartPlace, state_at_release
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
-from spirillum.dynamics.tube_start import StartPlace, laid_down
-from spirillum.dynamics.turning_field import Field
 from spirillum.errors import InputError
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.mesh import centreline_of
 from spirillum.robot.placement import Placement
-from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.released_motion import LINKS
 from spirillum.swimming.steady import calibrated_resistance
 
 LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body
@@ -150,7 +150,7 @@ def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> 
     time = np.linspace(0.0, 400.0, 21)
     from spirillum.dynamics.timing import Switch
 
-    start = laid_down(steady.robot, links, StartPlace(gap=2e-4))
+    start = state_at_release(steady.robot, links, StartPlace(gap=2e-4))
     found = integrate(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))
     across = 0.009 * 0.02 / 0.011
     c = 3.5 * 3.0 * np.sqrt(2.0) * np.pi * across**1.5 * LENGTH
@@ -224,7 +224,7 @@ def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
         Surroundings(ends=kernel.OPEN, length=0),
     ):
         _, links, _ = made(around)
-        state = laid_down(made()[0].robot, links, StartPlace(gap=5e-4))
+        state = state_at_release(made()[0].robot, links, StartPlace(gap=5e-4))
         state[rigid_links.CURRENT] = 0.05
         speeds.append(observed_at(links, state)[0])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-9)
@@ -288,7 +288,7 @@ def test_rates_solve_the_balance(made: Any) -> None:
     steady, links, _ = made(Surroundings(roughness=4e-4, coefficient=0.3))
     for gap in (3e-4, 1e-4, 3e-5):
         for current in (0.0, 1e-3, 0.05):
-            state = laid_down(steady.robot, links, StartPlace(gap=gap, pitch=0.002, yaw=0.01))
+            state = state_at_release(steady.robot, links, StartPlace(gap=gap, pitch=0.002, yaw=0.01))
             state[rigid_links.CURRENT] = current
             assert observed_at(links, state)[kernel.BALANCE] < 1e-12
     rng = np.random.default_rng(3)
@@ -370,7 +370,7 @@ def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
     _, links, _ = made()
     robot = made()[0].robot
     for pitch in (0.07, 0.078):
-        state = laid_down(robot, links, StartPlace(gap=3e-4, pitch=pitch))
+        state = state_at_release(robot, links, StartPlace(gap=3e-4, pitch=pitch))
         smallest = np.inf
         for phase in np.linspace(0.0, 2 * np.pi, 9):
             state[rigid_links.PHASE] = phase
@@ -412,7 +412,7 @@ def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float
     steady, links, _ = made(overrides={"tail": TAILS[tail]})
     dense = [swept.position for swept in [centreline_of(steady.robot, np.linspace(0.0, 1.0, 40001) * 0.06)]]
     points = np.concatenate([dense[0] @ turn.T for turn in steady.robot.tail.form.rotations])
-    state = laid_down(steady.robot, links, StartPlace(gap=3e-4, pitch=pitch))
+    state = state_at_release(steady.robot, links, StartPlace(gap=3e-4, pitch=pitch))
     found, true = [], []
     for phase in np.linspace(0.0, 2 * np.pi, 7):
         state[rigid_links.PHASE] = phase
@@ -428,7 +428,7 @@ def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float
 def near_the_wall(steady: Prediction, links: TubeRobot) -> StartPlace:
     """Nose up until the tail's roughness is at the wall."""
     places = (StartPlace(gap=3e-4, pitch=pitch) for pitch in np.arange(0.06, 0.12, 1e-4))
-    return next(p for p in places if links.gaps(laid_down(steady.robot, links, p))[-1] < ROUGH.roughness)
+    return next(p for p in places if links.gaps(state_at_release(steady.robot, links, p))[-1] < ROUGH.roughness)
 
 
 def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
@@ -441,7 +441,7 @@ def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
     for steady, links, _ in (curve, helix):
         own = links.stations[np.argmin(links.stations[:, contacts.STATION_XI])]
         turn = np.arctan2(own[contacts.STATION_POINT + 2], own[contacts.STATION_POINT + 1])
-        state = laid_down(steady.robot, links, near_the_wall(*curve[:2]))
+        state = state_at_release(steady.robot, links, near_the_wall(*curve[:2]))
         row = []
         for phase in np.linspace(0.0, 2 * np.pi, 9):
             state[rigid_links.PHASE] = phase - turn
@@ -477,7 +477,7 @@ def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:
 def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
     """A step that is tried too far leaves no number behind with which the next one begins."""
     steady, links, _ = made()
-    state, data = laid_down(steady.robot, links, StartPlace(gap=3e-4)), links.data
+    state, data = state_at_release(steady.robot, links, StartPlace(gap=3e-4)), links.data
     before, after, inside = np.empty((3, rigid_links.STATES))
     stand_in.steps.rates(before, 0.0, state, data, links.table)
     beyond = state.copy()
@@ -519,9 +519,9 @@ def test_start_has_the_gap_pitch_yaw_and_azimuth_asked_for(made: Any) -> None:
     for name, value in (("wall_gap", 4e-4), ("wall_pitch", -0.02), ("wall_yaw", 0.015), ("azimuth", 0.4)):
         assert float(found[name][0]) == pytest.approx(value, rel=1e-9), name
     with pytest.raises(InputError, match="does not fit"):
-        laid_down(steady.robot, links, StartPlace(gap=0.02))
+        state_at_release(steady.robot, links, StartPlace(gap=0.02))
     with pytest.raises(InputError, match="cut"):
-        laid_down(steady.robot, links, StartPlace(gap=5e-4, pitch=0.2))
+        state_at_release(steady.robot, links, StartPlace(gap=5e-4, pitch=0.2))
 
 
 def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:

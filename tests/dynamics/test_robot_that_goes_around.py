@@ -10,7 +10,7 @@ import pytest
 from spirillum.dynamics.return_map import STEPS, Turn
 from spirillum.dynamics.steady_state_search import Path, _around
 from spirillum.kernels import rigid_links
-from spirillum.swimming.steady_state import State, SteadyState
+from spirillum.swimming.released_motion import State, SteadyState
 
 
 @pytest.mark.parametrize(

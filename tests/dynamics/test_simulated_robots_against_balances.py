@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.films import films_of
+from spirillum.dynamics.free_robot import films_of
 
 QUIET = {"friction.effective": "1.1e-5 N m s/rad"}
 

@@ -79,7 +79,7 @@ def test_least_gap_that_is_resolved_directly_is_told() -> None:
         sp.predict(robot, model="tube", placement={"gap": "0.02 mm", "pitch": 0.0})
     told = float(str(refused.value).split("placement.gap = ")[-1].split(" mm")[0])
     assert 0.02 < told < 0.5
-    from spirillum.swimming.robot_preparation import prepared
+    from spirillum.swimming.preparation import prepared
 
     prepared(robot, "tube", placement={"gap": 1.001e-3 * told, "pitch": 0.0})  # is not refused
     with pytest.raises(InputError, match="unknowns"):

@@ -13,7 +13,7 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.dynamics.poses import poses_of
+from spirillum.dynamics.run_file import poses_of
 
 reader: Any = pytest.importorskip("mcap.reader")
 

@@ -40,7 +40,7 @@ def test_fluid_sticks_to_the_body(swimming: sp.Flow) -> None:
 
 def test_fluid_follows_the_wire(swimming: sp.Flow) -> None:
     """Around the wire the fluid moves with it, to the accuracy of a line of blobs, which is blurred there."""
-    from spirillum.view.figures.solids import wire_lines
+    from spirillum.view.figures.scene import wire_lines
 
     motion = swimming.prediction
     (line,) = wire_lines(swimming.robot, PHASE, 1.0)
@@ -58,7 +58,7 @@ def test_fluid_follows_the_wire(swimming: sp.Flow) -> None:
 
 
 def test_a_point_inside_is_named_with_its_part(swimming: sp.Flow) -> None:
-    from spirillum.view.figures.solids import wire_lines
+    from spirillum.view.figures.scene import wire_lines
 
     (line,) = wire_lines(swimming.robot, PHASE, 1.0)
     for point, part in (((0.0, 0.0, 0.0), "body"), ((-0.022, 0.0, 0.0), "coupling"), (line[len(line) // 2], "tail")):

@@ -11,8 +11,7 @@ from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.fluid.tube.nodes import rings_of
 from spirillum.kernels import contacts, rigid_links
-from spirillum.kernels.film_table import clearance, smallest_gap
-from spirillum.kernels.tube_table import contact_offset
+from spirillum.kernels.tube_table import clearance, contact_offset, smallest_gap
 from spirillum.robot.outline import Outline, body_outline, profile_outline
 from spirillum.robot.tube_pose import Seat
 

@@ -15,8 +15,8 @@ from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.outer_resistance import even_phases, matrix_of
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.tube.table import TubeTable, key_of
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.stokeslets import Accuracy
@@ -29,7 +29,7 @@ from spirillum.kernels.tube_table import (
     largest_yaw,
     mean_resistance_at,
 )
-from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.biorob2012.published import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.tube_pose import Seat
 from spirillum.studies.study_loader import load_study

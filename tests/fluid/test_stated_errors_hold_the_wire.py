@@ -11,7 +11,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR, SOLIDS_ERROR
+from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR, SOLIDS_ERROR
 from spirillum.fluid.tube.tube import Tube, finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR

@@ -13,9 +13,8 @@ from spirillum.fluid.tube import building, library
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.outer_resistance import NodeSolution
-from spirillum.fluid.tube.stages import FINE, STAGES, STRAIGHT, YAW
+from spirillum.fluid.tube.stages import FINE, RESPONSES, STAGES, STRAIGHT, YAW, response_errors
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import INSIDE, TOO_FAR_YAWED, parts_of
 from spirillum.robot.batch import RobotBatch

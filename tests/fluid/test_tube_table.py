@@ -34,11 +34,11 @@ from spirillum.fluid.tube.outer_resistance import (
     solutions,
 )
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.stages import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.table import TubeTable, key_of, packed_from, to_bytes
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors, response_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
-from spirillum.kernels.film_table import film_at
+from spirillum.kernels.tube_table import film_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
 from spirillum.robot.tube_pose import Seat
@@ -465,7 +465,7 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
 
 
 _UNGUARDED = """
-from spirillum.processes import imap_unordered
+from spirillum.worker_pool import imap_unordered
 print("once")
 print(min(answer for _, answer in imap_unordered(abs, [-1, -2], workers=2)))
 """

@@ -88,7 +88,7 @@ def test_an_agent_sees_what_it_sent_and_not_whether_that_arrived(name: str, colu
 
 
 def test_rules_score_as_their_limits_say() -> None:
-    from spirillum.interfaces.baselines import baseline
+    from spirillum.interfaces.environments import baseline
 
     options: dict[str, Any] = {"model": "rft", "episodes": 200, "duration": 5.0}
     nothing = baseline(NAMES[0], "nothing", lab=Lab.exact(), **options)

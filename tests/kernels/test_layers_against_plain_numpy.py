@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.wire.sources import Panels
-from spirillum.kernels.field import add_layer
-from spirillum.kernels.rings import ring_blocks
+from spirillum.kernels.stokes_flow import add_layer, ring_blocks
 
 MODES = 4
 RULE = 2e-6

@@ -8,7 +8,7 @@ import spirillum as sp
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import film_table, tube_table
+from spirillum.kernels import tube_table
 from spirillum.robot.batch import RobotBatch
 
 
@@ -23,9 +23,9 @@ def table(request: pytest.FixtureRequest) -> np.ndarray:
 def film_of(film: np.ndarray, e: float, pitch: float, yaw: float) -> np.ndarray:
     """M D M' from a tensor product of splines, turned from the wall's normal to z'."""
     c = np.empty(5)
-    film_table.film_coordinates(film, e, pitch, yaw, c)
-    shape = film_table.shape_of(film)
-    values = film[film_table.HEAD :].view(np.float32)[: np.prod(shape)].astype(float).reshape(shape)
+    tube_table.film_coordinates(film, e, pitch, yaw, c)
+    shape = tube_table.shape_of(film)
+    values = film[tube_table.HEAD :].view(np.float32)[: np.prod(shape)].astype(float).reshape(shape)
     for at, (low, high, intervals) in zip(c[:2], (film[7:10], film[10:13]), strict=True):
         knots = low + (high - low) / intervals * np.arange(-3.0, intervals + 4.0)
         values = BSpline(knots, values, 3)(at)
@@ -35,10 +35,10 @@ def film_of(film: np.ndarray, e: float, pitch: float, yaw: float) -> np.ndarray:
         for j in range(i):
             lower[i, j] = next(entries) * (c[2] if i >= 3 > j else 1.0)
     d = np.exp(even[:6] + np.array([c[3], 0, 0, 0, 0, 0]))
-    order = np.array(film_table.ORDER)
-    size = np.where(order < 3, 1.0, film[film_table.BODY])
+    order = np.array(tube_table.ORDER)
+    size = np.where(order < 3, 1.0, film[tube_table.BODY])
     found = np.empty((6, 6))
-    found[np.ix_(order, order)] = film[film_table.BODY] * np.outer(size, size) * (lower * d @ lower.T)
+    found[np.ix_(order, order)] = film[tube_table.BODY] * np.outer(size, size) * (lower * d @ lower.T)
     turn, cos, sin = np.eye(6), np.cos(c[4]), np.sin(c[4])
     turn[np.ix_([0, 2], [0, 2])] = [[cos, sin], [-sin, cos]]
     return turn @ found @ turn.T
@@ -83,6 +83,6 @@ def test_the_film_is_a_tensor_product_of_splines(table: np.ndarray, pitch: float
     for share in (0.5, 0.9, 0.97):
         e = share * tube_table.contact_offset_of(table, pitch)
         expected, found = film_of(film, e, pitch, yaw), np.empty((6, 6))
-        gap = film_table.film_at(film, e, pitch, yaw, found)
-        assert gap == film_table.smallest_gap(film, e, pitch, yaw) > 0
+        gap = tube_table.film_at(film, e, pitch, yaw, found)
+        assert gap == tube_table.smallest_gap(film, e, pitch, yaw) > 0
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())

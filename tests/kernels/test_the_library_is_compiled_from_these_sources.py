@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from spirillum.kernels import native
-from spirillum.kernels.film_table import film_coordinates, spline_weights
-from spirillum.kernels.tube_table import contact_offset
+from spirillum.kernels.tube_table import contact_offset, film_coordinates, spline_weights
 
 BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
 

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from spirillum.kernels.contours import edge_places, edge_points
-from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles, sums_along
-from spirillum.kernels.pictures import profile_of_rows, sampled, stripe_fit, stripes_at
-from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
+from spirillum.kernels.edges import (
+    edge_places,
+    edge_points,
+    profiles_across,
+    robust_change,
+    shifts_of_profiles,
+    sums_along,
+)
+from spirillum.kernels.pictures import profile_of_rows, ridge_of, sampled, stripe_fit, stripes_at, wave_fit, wave_scores
 from spirillum.vision.camera.optics import Optics
 
 

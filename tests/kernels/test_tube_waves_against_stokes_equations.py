@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ive, k0e, k1e
 
-from spirillum.kernels.rings import ring_blocks
-from spirillum.kernels.tube_waves import (
+from spirillum.kernels.stokes_flow import (
     circle_waves,
+    ring_blocks,
     single_tilted_waves,
     station_waves,
     tilted_waves,

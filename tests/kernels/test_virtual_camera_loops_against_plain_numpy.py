@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.kernels.raster import blend, develop, draw, shade
-from spirillum.kernels.sightlines import still_picture
+from spirillum.kernels.rendering import blend, develop, draw, shade, still_picture
 from spirillum.virtual.optics import VirtualLens, spots
 
 EMPTY = np.float32(-1e30)

@@ -9,7 +9,7 @@ from spirillum.errors import InputError
 from spirillum.live.tracker import LiveTracker
 from spirillum.measurement.trials import trial_of
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import follow
+from spirillum.vision.track.assembly import follow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

@@ -11,10 +11,9 @@ import pytest
 
 from spirillum.cli import main
 from spirillum.errors import InputError
-from spirillum.live import session, sources
-from spirillum.live.sending import Datagrams
+from spirillum.live import session, streams
 from spirillum.live.session import at_own_pace, newest, track
-from spirillum.live.sources import Arrived, source_of
+from spirillum.live.streams import Arrived, Datagrams, source_of
 
 av = pytest.importorskip("av")
 pytest.importorskip("cv2")
@@ -115,8 +114,8 @@ def test_a_stream_of_the_network_is_tracked_by_its_own_times(filmed, pictures):
 @pytest.fixture
 def camera(monkeypatch, filmed):
     """`camera:swimmer` is the film, as a camera's driver would give it."""
-    monkeypatch.setattr(sources, "_DEVICES", {"linux": ("lavfi", "movie={}")})
-    monkeypatch.setattr(sources.sys, "platform", "linux")
+    monkeypatch.setattr(streams, "_DEVICES", {"linux": ("lavfi", "movie={}")})
+    monkeypatch.setattr(streams.sys, "platform", "linux")
     monkeypatch.chdir(filmed.parent)
     return "camera:swimmer.mp4"
 
@@ -133,11 +132,11 @@ def test_a_camera_that_stops_keeps_what_was_tracked(camera, filmed, capsys):
 
 
 def test_another_size_than_asked_for_is_said(monkeypatch, filmed):
-    monkeypatch.setattr(sources, "_DEVICES", {"linux": ("lavfi", "testsrc=size=96x64:rate=30:{}")})
-    monkeypatch.setattr(sources.sys, "platform", "linux")
+    monkeypatch.setattr(streams, "_DEVICES", {"linux": ("lavfi", "testsrc=size=96x64:rate=30:{}")})
+    monkeypatch.setattr(streams.sys, "platform", "linux")
     source = source_of("camera:duration=1")
     assert next(source.frames()).image.shape == (64, 96, 3)
-    asked = sources.Source(source.name, "camera", {**source.options, "size": (64, 64)})
+    asked = streams.Source(source.name, "camera", {**source.options, "size": (64, 64)})
     with pytest.raises(InputError, match="pictures of 96 x 64 pixels in place of 64 x 64"):
         next(asked.frames())
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from spirillum import InputError
-from spirillum.measurement.depth import apparent_distance, depth_shares
 from spirillum.measurement.feasibility import feasibility
-from spirillum.measurement.setup_template import new_setup_file, setup_answer
+from spirillum.measurement.setup_template import apparent_distance, depth_shares, new_setup_file, setup_answer
 from spirillum.swimming.prediction import predict
 from spirillum.vision.setup import load_setup
 

@@ -12,7 +12,7 @@ import xarray as xr
 
 from spirillum import InputError
 from spirillum.files import write_dataset
-from spirillum.formats.labelled import Labelled
+from spirillum.formats.array_files import Labelled
 from spirillum.measurement.measure import Measurement
 from spirillum.measurement.observations import read_observations
 from spirillum.measurement.series import movement_of, observation_rows, series_of

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spirillum.measurement.shown import shown
+from spirillum.measurement.statistics import shown
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.citations import REFERENCES
-from spirillum.papers.case import case_names, load_case, recorded_values
-from spirillum.papers.case_values import has_table, robot_of, trials_of
+from spirillum.papers.case import case_names, has_table, load_case, recorded_values, robot_of, trials_of
 from spirillum.robot.load import preset_names, preset_text, shipped_robots
 from spirillum.schemas import schema_of
 

@@ -10,7 +10,7 @@ from tests.support.commands import run_command
 from spirillum import load, predict, prepare, resistance, simulate
 from spirillum.errors import InputError
 from spirillum.robot.mesh import robot_mesh
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import robot_text
 
 BARE: dict[str, Any] = {
     "name": "bare",

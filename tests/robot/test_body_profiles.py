@@ -12,7 +12,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import spheroid_drag
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Segment
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import robot_text
 
 VISCOSITY = 3.5
 

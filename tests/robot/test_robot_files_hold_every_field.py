@@ -7,7 +7,7 @@ import pytest
 
 from spirillum.files import written_by_us
 from spirillum.robot.load import is_preset, load, preset_names
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import robot_text
 
 CHANGES: list[dict[str, Any]] = [
     {},

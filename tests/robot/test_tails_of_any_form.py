@@ -15,8 +15,8 @@ from spirillum.pages.knobs import Settings
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import robot_solids
 from spirillum.robot.mesh import robot_mesh
+from spirillum.robot.robot import robot_text
 from spirillum.robot.tail_form import strand_spacing
-from spirillum.robot.toml_writer import robot_text
 
 CONE = {"from": "1 mm", "to": "3 mm"}
 

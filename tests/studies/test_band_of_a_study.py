@@ -11,7 +11,7 @@ import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.registry import figures_of
-from spirillum.studies.band import AT_PLACES, BandTask
+from spirillum.studies.columns import AT_PLACES, BandTask
 from spirillum.view.figures.style import look_of_model
 
 MODELS = ["sbt", "walled"]

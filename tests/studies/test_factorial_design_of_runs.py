@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.studies.factorial import half_fraction, main_effects
+from spirillum.studies.released_robots import half_fraction, main_effects
 
 
 @pytest.mark.parametrize("factors", [3, 4, 5, 6])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from spirillum.results.study_store import _spread
-from spirillum.studies.estimate import Pace
-from spirillum.studies.regions import RobotBlock
+from spirillum.studies.regions import Pace, RobotBlock
 
 
 def _said(workers: int, regions: int, seconds: float, loading: float, change: float = 0.0) -> tuple[float, float]:

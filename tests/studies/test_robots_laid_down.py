@@ -4,21 +4,20 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.evidence import Evidence
-from spirillum.papers.biorob2012.readings import FrictionModelRuns
+from spirillum.papers.biorob2012.evidence import Evidence, FrictionModelRuns
 from spirillum.papers.registry import claims_of, predictions_of
 from spirillum.studies.ranking import ranking_of
 from spirillum.studies.released_robots import (
     FACTORS,
     INFERRED_BY,
     READ,
-    laid_down_runs,
     levels,
     levels_of_readings,
+    release_runs,
     without_answer,
 )
 from spirillum.studies.spec import LaidDown
-from spirillum.view.figures.release import laid_down_picture
+from spirillum.view.figures.release import release_picture
 
 SHORT = {
     "models": ["sbt", "rft"],
@@ -50,7 +49,7 @@ def readings(short) -> FrictionModelRuns:
 def test_a_reading_is_that_of_the_run_itself(short) -> None:
     """Run 1 of the narrow robot, read over the whole of it, against `simulate`, and its B_eff against `predict`."""
     robot = sp.load("biorob2012-narrow")
-    laid = laid_down_runs(robot, LaidDown(duration="2.4 s", wait=("0 s", "0.5 s")))[1]
+    laid = release_runs(robot, LaidDown(duration="2.4 s", wait=("0 s", "0.5 s")))[1]
     assert (laid.gap, laid.pitch, laid.wait, laid.roughness, laid.friction_coefficient) == (1e-4, 0.0, 0.0, 3e-5, 0.0)
     run = sp.simulate(
         robot,
@@ -73,7 +72,7 @@ def test_a_reading_is_that_of_the_run_itself(short) -> None:
 
 
 def test_the_report_draws_every_reading_over_its_median(short) -> None:
-    picture = laid_down_picture(short, ranking_of(short))
+    picture = release_picture(short, ranking_of(short))
     assert picture is not None
     axes = picture.figure().axes[0]
     rates = np.abs(
@@ -82,7 +81,7 @@ def test_the_report_draws_every_reading_over_its_median(short) -> None:
     row = [label.get_text() for label in axes.get_yticklabels()].index("body rate")
     drawn = [x for line in axes.get_lines() for x, y in line.get_xydata() if abs(y - row) < 0.5]
     assert sorted(drawn) == pytest.approx(sorted(rates / np.median(rates)), rel=1e-12)
-    assert laid_down_picture(short.drop_vars("forward_velocity_at_run"), ranking_of(short)) is None
+    assert release_picture(short.drop_vars("forward_velocity_at_run"), ranking_of(short)) is None
 
 
 def test_the_factor_on_the_drag_gives_the_speed_back(short) -> None:

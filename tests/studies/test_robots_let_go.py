@@ -7,7 +7,7 @@ import spirillum as sp
 from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.robot.placement import Placement
-from spirillum.studies.ranking import LET_GO, StudyRanking, best_in_words, ranking_of
+from spirillum.studies.ranking import STEADY_SPEED, StudyRanking, best_in_words, ranking_of
 from spirillum.studies.released_robots import SETTLED_STATES, SettledTask, not_settled
 from spirillum.studies.spec import Contact
 from spirillum.view.figures.comparison import ranking_picture
@@ -82,7 +82,7 @@ def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> No
     assert ranking.robots[0].name == "20 x 2.5 mm"
     held = [robot.values["forward_velocity"] for robot in ranking.robots[1:]]
     assert held[0] > held[1]
-    assert all(np.isnan(robot.values[LET_GO]) for robot in ranking.robots[1:])
+    assert all(np.isnan(robot.values[STEADY_SPEED]) for robot in ranking.robots[1:])
     said = best_in_words(ranking.best[0].to_dict())
     assert said.startswith("fastest once settled: 20 x 2.5 mm, among 1 of 3 robots")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.biorob2012.published import paper_study
 from spirillum.papers.studies import study_of
 
 GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\nwide = "biorob2012-wide"\n'

@@ -17,14 +17,12 @@ from backlit_pictures import INKS, Backlit
 from flat_pictures import PAINTS, Flat
 from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.mesh import STRIPE_COLOURS
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 from spirillum.units import Hz
 from spirillum.virtual.artifacts import Degradation, Troubles, stripe_edges
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.framing import framed, lens_of, swimming_range
 from spirillum.virtual.motion import motion_of
-from spirillum.virtual.optics import tank_of
+from spirillum.virtual.optics import framed, lens_of, swimming_range, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.solids import linear
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions

@@ -16,7 +16,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import Seat
 from spirillum.swimming.band import TOLERANCE, at_place, band_places, left_open
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Swimming
 
 WIDE = "biorob2012-wide"
 RADIUS = 20e-3

@@ -7,7 +7,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.robot.load import preset_text
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import robot_text
 
 ASSUMED = "assumes the same torque at every rate"
 

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from spirillum import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.placement import Placement
-from spirillum.swimming.motor import winding_resistance
+from spirillum.swimming.drives import winding_resistance
 from spirillum.swimming.steady import swim
 from spirillum.units import Hz
 
@@ -287,10 +287,9 @@ def test_batch_against_one_by_one(placed: Callable[..., Any], walled: SwimmerMod
 
 def test_run_in_time_refuses_a_flow(walled: SwimmerModel) -> None:
     import spirillum as sp
-    from spirillum.dynamics.axial_robot import AxialRobot
-    from spirillum.dynamics.axial_run import axial_run
+    from spirillum.dynamics.axial_robot import AxialRobot, axial_run
     from spirillum.dynamics.timing import Timing
-    from spirillum.kernels.axial_motor import SPEED
+    from spirillum.kernels.motor import SPEED
 
     prediction = sp.predict("biorob2012-wide", model="walled", placement={"flow": "1 mm/s"})
     with pytest.raises(InputError, match=r"placement\.flow = 1 mm/s: a run in time starts from rest; allowed: no flow"):

@@ -9,7 +9,7 @@ import spirillum as sp
 from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError
 from spirillum.fluid.tube import library
-from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.biorob2012.published import paper_study
 from spirillum.studies import run
 from spirillum.studies.study_loader import LoadedStudy, load_study
 from spirillum.swimming.model_choice import choose_model

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.virtual.framing import lens_of
-from spirillum.virtual.optics import tank_of
+from spirillum.virtual.optics import lens_of, tank_of
 from spirillum.virtual.trial_options import CameraOptions
 
 SMALL = {

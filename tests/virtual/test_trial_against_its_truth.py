@@ -13,8 +13,8 @@ import spirillum as sp
 from spirillum.robot.load import load
 from spirillum.units import Hz
 from spirillum.virtual.artifacts import Degradation
-from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import motion_of_run, steady_rates
+from spirillum.virtual.optics import swimming_range
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial import render
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialOptions
@@ -168,7 +168,7 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize("view", ["top", "side"])
 @pytest.mark.parametrize("leftwards", [False, True])
 def test_the_trajectory_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:
-    from spirillum.dynamics.poses import rolled, rotation_matrix
+    from spirillum.dynamics.run_file import rolled, rotation_matrix
 
     time = np.linspace(0.0, 3.0, 31)
     position = np.stack([1e-3 * time, 2e-4 * np.sin(time), -0.01 + 1e-4 * time], axis=-1)

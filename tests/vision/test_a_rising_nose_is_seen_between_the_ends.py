@@ -6,8 +6,7 @@ import pytest
 from spirillum.robot.load import load
 from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.disturbances import Disturbances
-from spirillum.virtual.framing import lens_of
-from spirillum.virtual.optics import tank_of
+from spirillum.virtual.optics import lens_of, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trajectory import TrialTrajectory
 from spirillum.virtual.trial_options import CameraOptions

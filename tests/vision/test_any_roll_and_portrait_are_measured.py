@@ -7,7 +7,7 @@ import spirillum as sp
 from spirillum.vision.camera.camera import opened, samples_of
 from spirillum.vision.camera.ruler import ruler_in
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import follow
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.video.frames import Frame

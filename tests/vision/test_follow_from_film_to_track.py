@@ -6,7 +6,7 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.vision.camera.camera import scale_of
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import FrameDetection, follow
+from spirillum.vision.track.assembly import FrameDetection, follow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

@@ -5,7 +5,7 @@ import pytest
 
 from spirillum.vision.track.cuts import cuts_in, hops_in
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.picture_change import PictureChange, PictureSteps, picture_steps
+from spirillum.vision.track.steadiness import PictureChange, PictureSteps, picture_steps
 from spirillum.vision.track.track import RobotMotion
 
 pytest.importorskip("cv2")

@@ -95,7 +95,7 @@ def test_a_film_is_followed_alike_where_it_is_searched_in_reduced_pictures(
 
     from spirillum.vision.setup import load_setup
     from spirillum.vision.track import search
-    from spirillum.vision.track.follow import follow
+    from spirillum.vision.track.assembly import follow
 
     pytest.importorskip("av")
     path = tmp_path_factory.mktemp("reduced") / "a.mp4"

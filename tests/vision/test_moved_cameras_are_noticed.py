@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import follow
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.steadiness import shift_between
 
 cv2 = pytest.importorskip("cv2")

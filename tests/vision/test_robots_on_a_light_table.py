@@ -7,7 +7,7 @@ import pytest
 
 from spirillum.vision.camera.camera import opened, samples_of
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import follow
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.learning import learnt_from
 
 pytest.importorskip("av")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.vision.track.direction import align_with_path
+from spirillum.vision.track.size import align_with_path
 
 FPS, PIXEL = 30.0, 2.5e-4
 

@@ -9,11 +9,11 @@ from remembered import remembered
 from spirillum.live.tracker import LiveTracker
 from spirillum.vision.camera.optics import Optics
 from spirillum.vision.setup import load_setup
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.cues import agreement_of, cue_shifts
-from spirillum.vision.track.follow import follow
 from spirillum.vision.track.initial_detection import SealSearch
+from spirillum.vision.track.track import agreement_of, cue_shifts
 
 cv2 = pytest.importorskip("cv2")
 

@@ -8,7 +8,7 @@ import pytest
 from spirillum.vision.camera import anchor
 from spirillum.vision.camera.anchor import steadied, sways
 from spirillum.vision.setup import load_setup
-from spirillum.vision.track.follow import follow
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.video.frames import Frame
 
 cv2 = pytest.importorskip("cv2")

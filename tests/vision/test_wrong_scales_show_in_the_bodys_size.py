@@ -6,8 +6,8 @@ import pytest
 from comparisons import slope
 from spirillum.vision.camera.camera import bounds_of, scale_of
 from spirillum.vision.setup import load_setup
+from spirillum.vision.track.assembly import follow
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.follow import follow
 from spirillum.vision.track.size import checked_scale
 
 pytest.importorskip("av")

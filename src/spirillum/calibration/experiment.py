@@ -34,7 +34,7 @@ from spirillum.measurement.rate_checks import convention_doubt, rows_in_words
 from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
-from spirillum.swimming.discrepancy import error_of_mean
+from spirillum.swimming.drawn_resistance import error_of_mean
 
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
@@ -65,7 +65,7 @@ class Ratio:
     """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
 
     def error_of_mean(self, error: Samples | float) -> Samples:
-        """Standard error of each mean, SI: see `spirillum.swimming.discrepancy.error_of_mean`.
+        """Standard error of each mean, SI: see `spirillum.swimming.drawn_resistance.error_of_mean`.
 
         Args:
             error: relative error of one trial by the scatter, (robots,), (draws, 1) or a number; NaN where unknown.

@@ -16,7 +16,6 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
-from spirillum.calibration.estimate import LEVEL, Estimate
 from spirillum.calibration.experiment import Experiment, Quantity, read_experiment
 from spirillum.calibration.fit_warnings import (
     check_plausible,
@@ -31,17 +30,22 @@ from spirillum.calibration.fit_warnings import (
     outlier_warnings,
     prior_warnings,
 )
-from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement, torque_error
-from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
-from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
+from spirillum.calibration.identifiability import (
+    Identifiability,
+    check_identifiable,
+    friction_sensitivity,
+    friction_statement,
+    identified,
+    torque_error,
+)
+from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit, paper_fit
 from spirillum.calibration.methods import METHODS
-from spirillum.calibration.paper_method import paper_fit
-from spirillum.calibration.parameters import UNWALLED, assumed_uncertainties, free_names, is_free_in
+from spirillum.calibration.parameters import LEVEL, UNWALLED, Estimate, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
 from spirillum.errors import InputError, check_choice
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.tabled import TabledTube
+from spirillum.fluid.tube.library import TabledTube
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.batch import RobotBatch

@@ -8,12 +8,11 @@ from itertools import pairwise
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.estimate import Estimate
 from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
-from spirillum.calibration.parameters import LogUniform, Uniform
+from spirillum.calibration.parameters import Estimate, LogUniform, Uniform
 from spirillum.calibration.problem import Problem, UnexplainedError
 from spirillum.display import percent
 from spirillum.notes import Note

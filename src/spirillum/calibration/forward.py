@@ -24,8 +24,8 @@ from spirillum.swimming.balance import (
     with_body_factors,
 )
 from spirillum.swimming.drawn_resistance import DrawnResistance, Draws
+from spirillum.swimming.drives import steady_current
 from spirillum.swimming.dry_friction import with_dry_friction
-from spirillum.swimming.motor import steady_current
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What may be fitted: parameters with their units, their weak priors, and the reasons for these.
+"""Parameters of a fit with units and weak priors, the reasons for these, and estimates with their intervals.
 
 Every parameter is a smooth function of a coordinate z whose prior is the standard normal. Fits and samplers move in z:
 all directions have the same scale there, and no bound is ever hit.
@@ -400,3 +400,16 @@ def _share(field: str, share: str | float) -> float:
             f"to {100 * _LARGEST_UNCERTAINTY:g}%"
         )
     return value
+
+
+LEVEL = 0.95
+"""Level of all intervals."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval, SI; NaN where the method gives none."""
+
+    value: float
+    low: float
+    high: float

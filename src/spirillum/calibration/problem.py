@@ -11,8 +11,14 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
 from spirillum.calibration.forward import Forward, kinematics
-from spirillum.calibration.in_trial import TrialSurfaces, check_free, trial_surfaces
-from spirillum.calibration.in_tube import Ranges, place_ranges, tube_forward
+from spirillum.calibration.forward_models import (
+    Ranges,
+    TrialSurfaces,
+    check_free,
+    place_ranges,
+    trial_surfaces,
+    tube_forward,
+)
 from spirillum.calibration.parameters import (
     ASSUMABLE,
     PARAMETERS,

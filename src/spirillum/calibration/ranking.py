@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.calibrated import Calibrated
-from spirillum.calibration.estimate import LEVEL
+from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.fit_warnings import RATES_IN_RADIANS, inertia_warnings, synthetic_warning
-from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate, free_names
+from spirillum.calibration.parameters import DEFAULT_FREE, LEVEL, PARAMETERS, Coordinate, free_names
 from spirillum.calibration.posterior import Sampling
-from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress, UnexplainedError
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity

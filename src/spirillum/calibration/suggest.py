@@ -34,7 +34,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.tabled import TabledTube, tabled
+from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.formats.tables import check_present, read_table
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -208,7 +208,7 @@ def _kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples]:
 
 def _trial_kinematics(known: PosteriorFile, robot: Robot) -> Mapping[str, Samples] | str:
     """Advance and turning of a robot's trial at every draw; a sentence where too few trials have an answer."""
-    from spirillum.calibration.in_trial import FREE, surfaces_of  # its equations are compiled
+    from spirillum.calibration.forward_models import FREE, surfaces_of  # its equations are compiled
 
     ends = {name: (float(draws.min()), float(draws.max())) for name, draws in known.draws.items() if name in FREE}
     try:

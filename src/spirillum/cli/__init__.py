@@ -202,7 +202,7 @@ def _of_usage(error: Any) -> str:
     """What is wrong with the words of a command; where a value was refused, what is allowed instead."""
     from pydantic import ValidationError
 
-    from spirillum.robot.problems import refused_value
+    from spirillum.robot.fields import refused_value
 
     names = getattr(getattr(error, "param", None), "opts", None)
     if isinstance(error.__cause__, ValidationError) and names:

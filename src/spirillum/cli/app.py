@@ -10,22 +10,13 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
-from spirillum.cli.control_commands import control
-from spirillum.cli.design_commands import design
-from spirillum.cli.export_commands import export
-from spirillum.cli.flow_commands import flow
+from spirillum.cli.calibrate_commands import calibrate, design, rank_models, suggest
+from spirillum.cli.control_commands import control, remote
 from spirillum.cli.function_command import FunctionCommand, Request, from_function
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
-from spirillum.cli.measure_commands import measure
-from spirillum.cli.motion_commands import magnetic_sweep, simulate
-from spirillum.cli.observation_commands import observations_app
-from spirillum.cli.page_commands import page
-from spirillum.cli.prepare_commands import prepare
-from spirillum.cli.remote_commands import remote
-from spirillum.cli.robot_commands import robot_app
-from spirillum.cli.settle_commands import settle
-from spirillum.cli.setup_commands import setup_app
+from spirillum.cli.measurement_commands import measure, observations_app, render, setup_app, track, virtual_experiment
+from spirillum.cli.motion_commands import magnetic_sweep, settle, simulate
+from spirillum.cli.robot_commands import export, prepare, robot_app, validate
 from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
@@ -38,10 +29,7 @@ from spirillum.cli.shared_options import (
     complete_resistance_models,
     complete_schemas,
 )
-from spirillum.cli.show_commands import film, show
-from spirillum.cli.track_commands import track
-from spirillum.cli.validate_commands import validate
-from spirillum.cli.virtual_commands import render, virtual_experiment
+from spirillum.cli.view_commands import film, flow, page, show
 
 _ROWS = 10
 
@@ -134,7 +122,7 @@ def compare_models(
     from spirillum.cli import renderer
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
-    draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.effects:effects_figure")
+    draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.comparison:effects_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
     files = {"file": draw(result), "plot": draw_effects(result)}

@@ -1,4 +1,4 @@
-"""The command `spirillum control`."""
+"""The commands `control` and `remote`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from spirillum.cli.shared_options import PANELS, Json, starting
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
     from spirillum.controllers.sensors import Senses
+
 
 _LAB = PANELS["lab"]
 _PICTURES = "Pictures"
@@ -175,3 +176,19 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
     from spirillum.robot.load import parse_setting
 
     return Lab.read(path, dict(parse_setting(text, "--with", "camera.latency=50ms") for text in changes or []))
+
+
+@from_function("spirillum.interfaces.serial_remote:remote", robot=None)
+def remote(
+    request: Request,
+    *,
+    port: Annotated[str, typer.Argument(help="Serial port of the remote, such as /dev/ttyUSB0 or COM3.")],
+    json: Json = False,
+) -> None:
+    """Switch a real motor on for a time, through a remote at a serial port. Needs the extra `control`.
+
+    Example: `spirillum remote /dev/ttyUSB0 --duty 0.5 --duration 2s`
+    """
+    from spirillum.cli import renderer
+
+    renderer.show(request(port).to_dict(), json=json)

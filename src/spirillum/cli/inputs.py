@@ -1,12 +1,11 @@
-"""From options as they are typed to what the functions take."""
+"""Options as typed: conversion into arguments, and the table of those that exclude or require each other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from spirillum.argument_rules import check_rules
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
@@ -16,6 +15,94 @@ if TYPE_CHECKING:
     import typer
 
     from spirillum.robot.robot import Robot
+
+
+class Rule(NamedTuple):
+    """Options that a request in some state has no use for."""
+
+    state: str
+    """States of the request, such as `run`: its command defines which of them hold."""
+    options: tuple[str, ...]
+    """Names of the command's parameters."""
+    conflict: str
+    """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
+
+
+_FIELDS = ("gap", "eccentricity", "pitch", "yaw", "tail_drop", "ends")
+RULES: dict[str, tuple[Rule, ...]] = {
+    "calibrate": (
+        Rule(
+            "no posterior",
+            ("seed", "doublings"),
+            "with method '{method}', which samples no posterior; allowed: with method posterior",
+        ),
+    ),
+    "export": (
+        Rule(
+            "recording",
+            (
+                *("phase", "fineness", "unit", "sidecar", "no_sidecar", "model", "friction", "calibration"),
+                *("gap", "pitch", "flow", "settings"),
+            ),
+            "with .mcap; allowed: --film and --speed, for the run has its robot",
+        ),
+        Rule("no recording", ("film", "speed"), "with {ending}; allowed: only with .mcap"),
+    ),
+    "flow": (
+        Rule(
+            "no plane",
+            ("plane", "offset", "resolution"),
+            "without a plane (-o FILE), to which it belongs; allowed: both or neither",
+        ),
+        Rule(
+            "no volume",
+            ("volume_resolution",),
+            "without --volume FILE, to which it belongs; allowed: both or neither",
+        ),
+        Rule(
+            "run",
+            ("robot", "tail_rate", "friction", "settings", "phase", *_FIELDS, "flow"),
+            "together with a run, which says it; allowed: --run and --time alone",
+        ),
+        Rule(
+            "run with another model", ("model",), "together with a run, which says it; allowed: --run and --time alone"
+        ),
+    ),
+    "measure": (
+        Rule(
+            "feasibility",
+            ("output", "marks", "tracking", "track", "annotated", "figures", "start", "end"),
+            "with --feasibility, which measures nothing; allowed: without it",
+        ),
+        Rule(
+            "no feasibility",
+            (
+                *("feasibility_tail_rate", "feasibility_body_rate", "feasibility_speed", "duration"),
+                *("feasibility_frames_per_second", "view_width", "feasibility_picture_width"),
+            ),
+            "without --feasibility; allowed: with it",
+        ),
+    ),
+    "study": (
+        Rule("store", ("rows",), "{rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)"),
+    ),
+}
+"""Rules by command, in the order in which they are checked."""
+
+
+def check_rules(command: str, states: Collection[str], given: Callable[..., list[str]], **words: object) -> None:
+    """Refuse options that conflict with the request.
+
+    Args:
+        command: its name.
+        states: of the request.
+        given: tells which of some parameters were typed, as options.
+        words: of the request, for the sentence.
+    """
+    for rule in RULES[command]:
+        if rule.state in states and (found := given(*rule.options)):
+            raise InputError(f"{', '.join(found)} {rule.conflict.format(**words)}")
+
 
 _V = TypeVar("_V")
 
@@ -82,7 +169,7 @@ def loaded_robot(
     overrides = overrides_from(settings)
     found = load(robot, **overrides)
     if overrides and not (calibration is None and posterior is None):
-        from spirillum.fitted.replaced import check_not_replaced, set_fields
+        from spirillum.fitted.fit import check_not_replaced, set_fields
 
         check_not_replaced(set_fields(overrides), found, calibration, posterior)
     return found

@@ -1,4 +1,4 @@
-"""The commands of motion in time: `spirillum simulate` and `spirillum magnetic-sweep`."""
+"""The commands of motion in time: `simulate`, `magnetic-sweep` and `settle`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import (
     NO_FORM,
+    NO_START,
     START_PANEL,
     TIMING_PANEL,
     Json,
     Output,
+    Picture,
     complete_auto_models,
     complete_models,
 )
@@ -24,6 +26,7 @@ from spirillum.notes import note_attributes, notes_in
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 _PICTURES = "Pictures"
 
@@ -174,7 +177,7 @@ def _after_the_run(what: str) -> Iterator[None]:
 
 
 @from_function(
-    "spirillum.dynamics.magnetic_sweep:magnetic_sweep",
+    "spirillum.dynamics.rotating_field:magnetic_sweep",
     without={**NO_FORM, **dict.fromkeys(("resolution.tolerance", "resolution.phases"), "of the model tube")},
     complete={"model": complete_models},
 )
@@ -200,3 +203,20 @@ def magnetic_sweep(
     write_dataset(dataset, target)
     files = {} if plot is None else {"plot": draw(dataset)}
     renderer.show(renderer.with_files(sweep_answer(dataset), file=str(output), **files), json=json)
+
+
+@from_function(
+    "spirillum.dynamics.settling:settle",
+    without={**NO_START, "placement.tail_drop": "no rigid tail moves with it"},
+)
+def settle(request: Request, *, output: Picture = None, json: Json = False) -> None:
+    """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.
+
+    Example: `spirillum settle biorob2012-wide --gap 0.5mm --roughness 20um`
+    """
+    from spirillum.cli import renderer
+
+    draw = renderer.picture(output, "settling.png", "spirillum.view.figures.release:settling_figure")
+    with renderer.progress_bar(quiet=json) as progress:
+        found = request(progress=progress)
+    renderer.show(renderer.with_files(found.to_dict(), file=draw(found)), json=json)

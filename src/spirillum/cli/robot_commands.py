@@ -1,4 +1,4 @@
-"""The commands about robot files: `spirillum robot new|show|check`."""
+"""The commands of robots and files: `robot new|show|check`, `prepare`, `export` and `validate`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, overrides_from
-from spirillum.cli.shared_options import Json, RobotArgument, Settings, complete_presets
+from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
+from spirillum.cli.shared_options import Json, RobotArgument, Settings, complete_presets, complete_robots, starting
 
 robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 
@@ -39,7 +40,7 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
     Example: `spirillum robot show biorob2012-narrow`
     """
     from spirillum.cli import renderer
-    from spirillum.robot.robot_report import robot_answer
+    from spirillum.robot.load import robot_answer
 
     renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
 
@@ -51,7 +52,7 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     Example: `spirillum robot check biorob2012-wide`
     """
     from spirillum.cli import renderer
-    from spirillum.robot.robot_report import check_answer, checked
+    from spirillum.robot.load import check_answer, checked
     from spirillum.swimming.model_choice import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))
@@ -59,4 +60,143 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
         warnings = (*warnings, *models_without_answer(loaded_robot(robot, settings)))
     renderer.show(check_answer(robot, problems, warnings), json=json)
     if problems:
+        raise typer.Exit(1)
+
+
+def prepare(
+    robots: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ROBOT]...", autocompletion=complete_robots, help="Presets' names or TOML files."),
+    ] = None,
+    study: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
+    ] = None,
+    stage: Annotated[
+        str | None,
+        typer.Option(
+            help="straight (constrained motion), yaw (motion after release too; the default) or fine (for publication)."
+        ),
+    ] = None,
+    fine: Annotated[bool, typer.Option("--fine", help="Short for --stage fine.")] = False,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Make the tables of robots in their tubes; then `predict`, `simulate` and `study` answer with walls at once.
+
+    Robots that differ in their tails share most of the work. An interrupted preparation goes on where it was.
+
+    Example: `spirillum prepare biorob2012-wide`
+    """
+    from spirillum.cli import renderer
+    from spirillum.errors import InputError
+    from spirillum.papers.studies import study_of
+    from spirillum.studies.study_loader import load_study
+    from spirillum.swimming.preparation import preparations_answer, prepare_all
+
+    if not robots and study is None:
+        raise InputError("no robot; allowed: a preset's name or a robot file, several of them, or --study FILE")
+    if fine and stage is not None:
+        raise InputError("--fine and --stage are mutually exclusive; allowed: one of them")
+    asked = [loaded_robot(robot, settings) for robot in robots or []]
+    if study is not None:
+        loaded = load_study(study_of(study), overrides_from(settings))
+        asked += [loaded.robot_at(index) for index in range(loaded.count)]
+    with renderer.progress_bar(quiet=json) as progress:
+        found = prepare_all(asked, stage="fine" if fine else stage or "yaw", workers=workers, progress=progress)
+    renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)
+
+
+def _complete_units(incomplete: str) -> list[str]:
+    return starting(("m", "mm", "um"), incomplete)
+
+
+@from_function(
+    "spirillum.exports.write:export",
+    without={
+        "path": "an argument of the command",
+        **dict.fromkeys(
+            ("placement.eccentricity", "placement.yaw", "placement.tail_drop", "placement.ends"),
+            "a unit is held at a gap and pitch, with a flow as its input",
+        ),
+    },
+    complete={"unit": _complete_units},
+    robot=Annotated[
+        str,
+        typer.Argument(
+            autocompletion=complete_robots, help="A preset's name or a TOML file; for .mcap a run of `simulate` (.nc)."
+        ),
+    ],
+)
+def export(
+    request: Request,
+    *,
+    context: typer.Context,
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
+        ),
+    ],
+    sidecar: Annotated[
+        bool,
+        typer.Option("--sidecar", help="Masses and 12x12 resistance in a JSON file beside .stl, .glb and .vtp too."),
+    ] = False,
+    no_sidecar: Annotated[bool, typer.Option("--no-sidecar", help="Leave it out beside .urdf and .mjcf.")] = False,
+    film: Annotated[Path | None, typer.Option(metavar="FILE", help="For .mcap: a video of the run to include.")] = None,
+    speed: Annotated[float, typer.Option(help="For .mcap: time of the run over time of that film.")] = 1.0,
+    json: Json = False,
+) -> None:
+    """Write the robot for a printer, Blender, ParaView, MuJoCo, a simulator of robots or systems; a run for Foxglove.
+
+    Example: `spirillum export biorob2012-wide robot.stl`
+    """
+    from spirillum.cli import renderer
+    from spirillum.errors import InputError
+
+    if target.suffix == ".mcap":
+        from spirillum.exports.recording import export_run
+
+        refuse_conflicts(context, "recording")
+        renderer.show(export_run(str(request.named_robot), target, film=film, speed=speed).to_dict(), json=json)
+        return
+    refuse_conflicts(context, "no recording", ending=target.suffix or "no ending")
+    if sidecar and no_sidecar:
+        raise InputError("--sidecar with --no-sidecar; allowed: one of them")
+    with renderer.at_work("making the files", quiet=json):
+        found = request(target, sidecar=sidecar if sidecar or no_sidecar else None)
+    renderer.show(found.to_dict(), json=json)
+
+
+def complete_cases(incomplete: str) -> list[str]:
+    """Names of validation cases."""
+    cases = (Path(__file__).parent.parent / "papers").glob("*/case.toml")
+    return starting(sorted(case.parent.name for case in cases), incomplete)
+
+
+def validate(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", autocompletion=complete_cases, help="Cases that ship; else all."),
+    ] = None,
+    runs: Annotated[
+        bool, typer.Option("--runs", help="Make the tables that runs in tubes lack (an hour; it can be resumed).")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for a report with figures.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Compute published experiments of other groups, with nothing fitted; exit code 1 if a row left its recorded range.
+
+    Example: `spirillum validate rodenborn2013`
+    """
+    from spirillum.cli import renderer
+    from spirillum.results.validation import validate as answer
+
+    with renderer.progress_bar(quiet=json) as progress:
+        found = answer(names or (), runs=runs, output=output, progress=progress)
+    renderer.show(found.to_dict(), json=json)
+    if found.outside:
         raise typer.Exit(1)

@@ -11,33 +11,43 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.controllers.bank import Bank
 from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
+from spirillum.controllers.estimators import Bank
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import Learner, RobotEstimate
 from spirillum.controllers.loop import LoopRun
-from spirillum.controllers.scores import ControlJob, Outcome, Scores, draw_plant, outcome_of, run_job, scored
 from spirillum.controllers.sensors import SampledErrors, Senses, plant_of
 from spirillum.controllers.steering import KeepAxisTask
 from spirillum.controllers.stop_task import StopAtTask
-from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
-from spirillum.costs import check_memory
+from spirillum.controllers.task import (
+    CONTROLLERS,
+    FEEDBACK,
+    ControlJob,
+    Outcome,
+    Score,
+    Scores,
+    Task,
+    draw_plant,
+    outcome_of,
+    run_job,
+    scored,
+)
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.averages import vertical_drift
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.record import run_attributes
+from spirillum.dynamics.run_summary import vertical_drift
 from spirillum.dynamics.start import reach_of
 from spirillum.envelope import envelope, quantity
-from spirillum.errors import InputError, check_choice, check_range, did_you_mean
+from spirillum.errors import InputError, check_choice, check_memory, check_range, did_you_mean
 from spirillum.fitted.fit import read_fit
 from spirillum.notes import Note, note_attributes
-from spirillum.processes import imap_unordered
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import show
+from spirillum.worker_pool import imap_unordered
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,7 +1,7 @@
 """The tasks of speed: `hold-speed`, `ride-out` and `save-battery`.
 
 Controllers of speed: by PWM at a set speed, along a course through pulses of flow, and with the remote alone.
-The position filter (`spirillum.controllers.position_filter`) gives position x, speed s at full duty and drift w of the
+The position filter (`spirillum.controllers.estimators`) gives position x, speed s at full duty and drift w of the
 fluid; v is the set speed, t the time, d = 1 or -1 the robot's way.
 
 `KeepCourse`, place by a cascade whose inner loop inverts the robot as it is estimated, drift included, for a course r:
@@ -24,11 +24,10 @@ import numpy as np
 from pydantic import AfterValidator
 
 from spirillum.arrays import Samples
+from spirillum.controllers.estimators import PositionFilter
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
-from spirillum.controllers.position_filter import PositionFilter
-from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import Controller, Detection, Message
+from spirillum.controllers.sensors import Controller, Detection, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted

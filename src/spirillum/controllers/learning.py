@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.controllers.bank import Bank, Paths, interpolation, points
+from spirillum.controllers.estimators import Bank, Paths, interpolation, points
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.signals import Command, Controller, Detection, Message, MeterReading
+from spirillum.controllers.sensors import Command, Controller, Detection, Message, MeterReading
 from spirillum.envelope import quantity
 
 BLOCK = 1.0

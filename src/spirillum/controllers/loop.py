@@ -15,8 +15,7 @@ from itertools import count, pairwise
 from typing import Any
 
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.sensors import FlowPulse, Senses
-from spirillum.controllers.signals import Command, Controller, Detection, Message, MeterReading
+from spirillum.controllers.sensors import Command, Controller, Detection, FlowPulse, Message, MeterReading, Senses
 from spirillum.dynamics.integration import INTERRUPTED, Progress
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError

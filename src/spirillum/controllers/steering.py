@@ -32,12 +32,11 @@ from pydantic import BeforeValidator
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun, run_loop
-from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import Command, Controller, Detection, Message
+from spirillum.controllers.sensors import Command, Controller, Detection, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
-from spirillum.dynamics.turning_field import Field
+from spirillum.dynamics.rotating_field import Field
 from spirillum.errors import InputError
 from spirillum.robot.arguments import one_of
 from spirillum.robot.fields import Length, Rate

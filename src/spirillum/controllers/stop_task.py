@@ -18,11 +18,10 @@ from typing import ClassVar
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.controllers.estimators import PositionFilter
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
-from spirillum.controllers.position_filter import PositionFilter
-from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import Controller, Message
+from spirillum.controllers.sensors import Controller, FlowPulse, Message
 from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted

@@ -10,34 +10,23 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
-from spirillum.designs.confirmation import CONFIRMED, best_apart, confirmed
-from spirillum.designs.criteria import Judged
-from spirillum.designs.design_result import Alternative, Design, Uncertainty
-from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.improvement import lead_warnings
-from spirillum.designs.learned import chosen_model, is_learned
-from spirillum.designs.learning import learned_best
-from spirillum.designs.manufacturability import Manufacturability
-from spirillum.designs.profiles import bound_by_of, profile_of
-from spirillum.designs.reading import condition_of, quantity_of, with_unit
-from spirillum.designs.search import Archive, best_design, pareto_front
-from spirillum.designs.space import Space, space_of
-from spirillum.designs.unknowns import SampledRobots, Unknowns, unknowns_of
+from spirillum.designs.criteria import Judged, Manufacturability, Space, condition_of, quantity_of, space_of, with_unit
+from spirillum.designs.design_result import Alternative, Design, Uncertainty, bound_by_of, lead_warnings, profile_of
+from spirillum.designs.evaluation import Evaluation, Objective, SampledRobots, Unknowns, unknowns_of
+from spirillum.designs.learned import chosen_model, is_learned, learned_best
+from spirillum.designs.search import CONFIRMED, Archive, best_apart, best_design, confirmed, pareto_front
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import with_numbers
+from spirillum.robot.robot import Robot, with_numbers
 from spirillum.robot.tube_pose import gap_of
-from spirillum.swimming.cautions import calibration_warnings
-from spirillum.swimming.drive_warnings import drive_warnings
+from spirillum.swimming.cautions import calibration_warnings, drive_warnings
 from spirillum.swimming.model_choice import AUTO, WALLED
 from spirillum.swimming.reynolds import reynolds_limits, reynolds_warnings, stokes_flow_problem
-from spirillum.swimming.steady import friction_reading
-from spirillum.swimming.steady_quantities import LEVEL, STEADY, Swimming
+from spirillum.swimming.steady import LEVEL, STEADY, Swimming, friction_reading
 from spirillum.units import KINDS, parse_option, show
 
 _MORE_DRAWS = 4

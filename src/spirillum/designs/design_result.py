@@ -1,8 +1,9 @@
-"""The answer of a design: the best values, how sure they are, and what decides them."""
+"""The result of a design: the best values, their profiles, and whether they are better than others."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -10,13 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.designs.confirmation import ConfirmedDesign
 from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.display import DisplayMixin
+from spirillum.designs.search import ConfirmedDesign
+from spirillum.display import DisplayMixin, percent
 from spirillum.envelope import envelope, quantity
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note
+from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
-from spirillum.swimming.steady_quantities import LEVEL, STEADY
+from spirillum.swimming.steady import LEVEL, STEADY
 
 _LANDSCAPE_POINTS = 41
 
@@ -234,3 +237,163 @@ class Design(DisplayMixin):
             share, low, high = known.probability
             found["probability"] = quantity(share, "1", low=low, high=high, kind="interval", level=LEVEL)
         return found
+
+
+_PROFILE_POINTS = 41
+_HALVINGS = 12
+_FLAT = 0.01
+"""Loss of the objective up to which a variable is free, relative."""
+_TOUCHES = 1e-3
+"""Share of a range, or relative excess of a constraint, within which the best design is at its bound."""
+
+
+def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectiveProfile:
+    """The objective along one variable through the best design."""
+    space, objective = searched.space, searched.objectives[0]
+    variable = space.variables[number]
+    if variable.is_whole:
+        along = np.array([variable.share(value) for value in np.arange(variable.low, variable.high + 1.0)])
+    else:
+        along = np.union1d(np.linspace(0.0, 1.0, _PROFILE_POINTS), best[number])
+    values = variable.at(along)
+    shares = np.tile(best, (len(along), 1))
+    shares[:, number] = along
+    found = searched.scores(shares).values[0]
+    own = int(np.argmin(np.abs(values - variable.at(best[None, number])[0])))
+    sign = 1.0 if objective.target is not None else objective.sign
+    near = np.where(np.isfinite(found), sign * (found[own] - found), np.inf) <= _FLAT * abs(found[own])
+    first, last = own, own
+    while first > 0 and near[first - 1]:
+        first -= 1
+    while last < len(near) - 1 and near[last + 1]:
+        last += 1
+    low, high = float(values[first]), float(values[last])
+    if not variable.is_whole:
+        low, high = (_edge(searched, best, number, along, side) for side in ((first, -1), (last, 1)))
+    return ObjectiveProfile(
+        variable.path,
+        variable.unit,
+        values,
+        found,
+        low,
+        high,
+        _binds(searched, shares, found, own),
+    )
+
+
+def _edge(searched: Evaluation, best: Samples, number: int, along: Samples, side: tuple[int, int]) -> float:
+    """Value beyond which the objective is lost or a condition broken, between two points of a profile, by bisection."""
+    variable, objective = searched.space.variables[number], searched.objectives[0]
+    sign = 1.0 if objective.target is not None else objective.sign
+    most = float(searched.scores(best[None]).values[0, 0])
+    inside, beyond = float(along[side[0]]), side[0] + side[1]
+    if not 0 <= beyond < len(along):
+        return float(variable.at(np.array([inside]))[0])
+    outside = float(along[beyond])
+    for _ in range(_HALVINGS):
+        middle = best.copy()
+        middle[number] = 0.5 * (inside + outside)
+        value = float(searched.scores(middle[None]).values[0, 0])
+        if sign * (most - value) <= _FLAT * abs(most):
+            inside = middle[number]
+        else:
+            outside = middle[number]
+    return float(variable.at(np.array([inside]))[0])
+
+
+def _binds(searched: Evaluation, shares: Samples, found: Samples, own: int) -> str:
+    """What refuses the designs next to the best one along a variable; empty where none is refused."""
+    words = []
+    for side in (own - 1, own + 1):
+        if 0 <= side < len(found) and not np.isfinite(found[side]):
+            outside = broken(searched.limits(shares[side][None]))
+            if outside:
+                words.append(outside[0].why)
+                continue
+            swum = searched.swum(shares[side][None])
+            words += [item.words for item in searched.conditions if searched.excess(item, swum)[0] > 0]
+    return "; ".join(dict.fromkeys(words))
+
+
+def bound_by_of(stated: Evaluation, best: Samples, profiles: Sequence[ObjectiveProfile]) -> tuple[str, ...]:
+    """What the best design touches: ends of ranges, and what refuses its neighbours."""
+    found = []
+    for variable, share in zip(stated.space.variables, best, strict=True):
+        value = float(variable.at(np.array([share]))[0])
+        for end, where in ((variable.low, "low"), (variable.high, "high")):
+            if abs(value - end) <= _TOUCHES * (variable.high - variable.low):
+                found.append(f"{variable.path} at the {where} end of its range")
+    return (*found, *dict.fromkeys(item.binds for item in profiles if item.binds))
+
+
+_ALIKE = 1e-9
+"""Relative range of an objective below which it does not change."""
+ALTERNATIVES = {
+    "today": "today's design",
+    "runner_up": "the best of the designs that differ by a tenth of a range or more",
+}
+"""What the designs are called that the best one is compared with."""
+_SHORT = {"today": "today's design", "runner_up": "the runner-up"}
+
+
+def lead_warnings(answer: Design) -> tuple[Note, ...]:
+    """Sentences on fields without influence, on a better design, and on differences below the error of the objective.
+
+    Returns:
+        One sentence for each such error; none where every lead is larger.
+    """
+    said = _without_effect(answer)
+    if len(said) == len(answer.profiles):  # every design is the best one
+        return said
+    leads: dict[tuple[float, str], list[str]] = {}
+    best, sign = answer.objective, answer.objectives[0].sign
+    for other in answer.alternatives:
+        error = _error(answer, other)
+        if not (other.keeps and math.isfinite(other.objective) and best):
+            continue
+        lead = sign * (best - other.objective) / abs(best)
+        if lead < -_ALIKE and other.name == "today":
+            words = (
+                f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best one within them by "
+                f"{percent(-lead)}; widen the ranges"
+            )
+            said += (Note("design-at-limit", words),)
+        elif lead < error[0]:
+            leads.setdefault(error, []).append(f"{_SHORT[other.name]} by {percent(lead)}")
+    return said + tuple(
+        Note(
+            "design-tie",
+            f"the best design leads {' and '.join(led)}, within the error of {percent(error)} {of}; they may be equal",
+            ("objective",),
+        )
+        for (error, of), led in leads.items()
+    )
+
+
+def _without_effect(answer: Design) -> tuple[Note, ...]:
+    """A sentence for each field along which the objective stays as it is."""
+    found = []
+    for profile in answer.profiles:
+        known = profile.objective[np.isfinite(profile.objective)]
+        if known.size > 1 and np.ptp(known) <= _ALIKE * np.abs(known).max():
+            name = answer.objectives[0].name.replace("_", " ")
+            words = f"the {name} does not depend on {profile.path}: every value of the range is as good"
+            found.append(Note("design-tie", words, (profile.path,)))
+    return tuple(found)
+
+
+def _error(answer: Design, other: Alternative) -> tuple[float, str]:
+    """The largest relative error that is stated of the objective, and of what it is; 0 where none is stated."""
+    objective = answer.objectives[0]
+    errors = {}
+    stated = find_swimmer_model(answer.model).known_speed_error
+    if stated is not None and objective.target is None and objective.quantity.name == "forward_velocity":
+        errors[f"that model '{answer.model}' states of a speed"] = stated
+    if answer.learned is not None:
+        known = answer.learned
+        errors["of the learned model at the best design"] = known.last
+        if other.name != "today":  # today's is solved for
+            errors["of the learned model at a design that it was not solved for"] = known.left_out
+    finite = {of: error for of, error in errors.items() if math.isfinite(error)}
+    of = max(finite, key=lambda name: finite[name], default="")
+    return finite.get(of, 0.0), of

@@ -14,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.axial_robot import PARAMETERS, STATES, AxialRobot, axial_robot, motion, responses
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
-from spirillum.kernels import axial_motor as kernel
+from spirillum.kernels import motor as kernel
 from spirillum.notes import Note
 from spirillum.robot.batch import batches
 from spirillum.robot.fields import kind_of

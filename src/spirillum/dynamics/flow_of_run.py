@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 
-from spirillum.dynamics.poses import attitudes_of, rotation_matrix
-from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
+from spirillum.dynamics.run_file import attitudes_of, numbers_of, open_run, robot_of, rotation_matrix
 from spirillum.errors import InputError, check_choice
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
@@ -25,9 +24,8 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.prediction import Prediction
-from spirillum.swimming.robot_preparation import check_domain, least_gap
-from spirillum.swimming.steady import friction_reading, requirements
-from spirillum.swimming.steady_quantities import STEADY, Swimming
+from spirillum.swimming.preparation import check_domain, least_gap
+from spirillum.swimming.steady import STEADY, Swimming, friction_reading, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.averages import DutyInterval
 from spirillum.dynamics.integration import Progress, Reach, integrate, observed_at
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
+from spirillum.dynamics.run_summary import DutyInterval
+from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, state_at_release
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -29,7 +30,6 @@ from spirillum.dynamics.tube_simulation import (
     held_by_friction,
     links_in_tube,
 )
-from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.fit import NO_FIT, Fit, friction_acts
@@ -44,11 +44,9 @@ from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.drives import current_at
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.preparation import table_for
+from spirillum.swimming.preparation import prepared, table_for
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, reynolds_limits
-from spirillum.swimming.robot_preparation import prepared
-from spirillum.swimming.steady import Rates, swimming_of
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Rates, Swimming, swimming_of
 from spirillum.units import KINDS, parse_option, show
 
 _SAMPLES = 240
@@ -148,8 +146,8 @@ def free_motion(
         _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
     laid = Release(table, placed, asked, height, contact, tail_rate, friction, weight)
-    held, links, start = let_go(ready, laid)
-    state = laid_down(ready, links, start)
+    held, links, start = prepare_release(ready, laid)
+    state = state_at_release(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
     check_in_table(links, state, observed_at(links, state)[rigid_links.OUTSIDE])
     gap = float(observed_at(links, state)[rigid_links.FILM])
@@ -186,7 +184,7 @@ def free_motion(
     return FreeMotion(found, run, links, gap, laid, checked)
 
 
-def let_go(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
+def prepare_release(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
     """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
     rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
     held = predict(

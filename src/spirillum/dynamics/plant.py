@@ -28,16 +28,23 @@ from spirillum.dynamics.integration import (
     integrate,
     observed_at,
 )
-from spirillum.dynamics.poses import RobotPose
 from spirillum.dynamics.record import series_of
-from spirillum.dynamics.start import links_without_walls, reach_of, resting_state
+from spirillum.dynamics.rotating_field import Field, TurningField
+from spirillum.dynamics.run_file import RobotPose
+from spirillum.dynamics.start import (
+    StartPlace,
+    check_in_table,
+    check_roughness,
+    links_without_walls,
+    reach_of,
+    resting_state,
+    state_at_release,
+)
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
-from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
-from spirillum.dynamics.turning_field import Field, TurningField
 from spirillum.errors import InputError, clipped
 from spirillum.fitted.fit import Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
@@ -49,10 +56,10 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.freedom import check_full
 from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
+from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
 from spirillum.units import KINDS, parse_option
 
@@ -187,7 +194,7 @@ class Plant:
             first = resting_state(own, without_walls, placed)
         else:
             links, start = self._in(self._table, placed)
-            first = laid_down(own, links, start)
+            first = state_at_release(own, links, start)
             check_roughness(links.roughness, float(links.gaps(first).min()), self.robot.body.diameter)
             check_in_table(links, first, observed_at(links, first)[rigid_links.OUTSIDE])
             self._links = links

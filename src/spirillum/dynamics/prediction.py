@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from spirillum.dynamics.trial_request import TrialRequest
+from spirillum.dynamics.trial import TrialRequest
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, read_fit
@@ -16,7 +16,7 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
-from spirillum.swimming.discrepancy import posterior_for_of
+from spirillum.swimming.drawn_resistance import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
@@ -146,7 +146,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     answer = replace(found.prediction, choice=choice)
     if fit.posterior is None:
         return answer
-    from spirillum.dynamics.free_draws import intervals_of_free_motion
+    from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 
     intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.averages import STEADY, DutyInterval, run_averages
 from spirillum.dynamics.free_robot import FreeRobot
 from spirillum.dynamics.integration import Reach, Trajectory
+from spirillum.dynamics.run_summary import STEADY, DutyInterval, run_averages
 from spirillum.kernels import rigid_links
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import attributes
-from spirillum.swimming.motor import battery_voltage, winding_resistance
+from spirillum.swimming.drives import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
 from spirillum.version import versions
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach, observed_at, watched_limits
+from spirillum.dynamics.start import StartPlace, state_at
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_start import StartPlace, state_at
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels import tube_motion as kernel

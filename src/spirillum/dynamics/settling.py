@@ -22,7 +22,7 @@ from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
 from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.run_state import state_of
+from spirillum.dynamics.run_summary import state_of
 from spirillum.dynamics.tube_options import InTube
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
@@ -36,7 +36,7 @@ from spirillum.notes import Note
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.steady_state import SteadyState
+from spirillum.swimming.released_motion import SteadyState
 from spirillum.units import KINDS, parse_option
 
 _U, _SIDE, _UP, _ROLL, _JOINT = 0, 1, 2, 3, 6

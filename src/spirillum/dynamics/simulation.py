@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.dynamics.averages import stretches_on, vertical_drift
-from spirillum.dynamics.axial_run import axial_run
+from spirillum.dynamics.axial_robot import axial_run
 from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
 from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
+from spirillum.dynamics.rotating_field import Field, TurningField, in_tilted_field
+from spirillum.dynamics.run_summary import stretches_on, vertical_drift
 from spirillum.dynamics.start import links_without_walls, reach_of, resting_state, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
-from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_field
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
 from spirillum.fitted.fit import FITTED_HELD, NO_FIT, read_fit
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.library import TabledTube
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.kernels import rigid_links
 from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.batch import RobotBatch
@@ -35,10 +35,10 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import NO_WEIGHT
-from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
+from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.steady import friction_reading, requirements
 from spirillum.units import KINDS, parse_option

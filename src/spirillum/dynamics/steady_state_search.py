@@ -16,7 +16,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.return_map import SEARCHING, STEPS, EndedTurnError, ReturnMap, Turn, fixed_place
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links
-from spirillum.swimming.steady_state import State, SteadyState
+from spirillum.swimming.released_motion import State, SteadyState
 
 _MOST_TURNS = 300
 """Turns that are followed at most."""

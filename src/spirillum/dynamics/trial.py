@@ -1,31 +1,52 @@
-"""What a trial measures of a robot that is released in its tube, and the steady motion that it approaches.
+"""Trials after release in the tube: the request, what a trial measures, its unknowns and their interval.
 
 A trial: the robot is laid down, waits with its motor off while its film drains, and swims with the motor on. Its values
 are means over the time with the motor on, as `spirillum.measure` gives them of a video: those of `spirillum.simulate`
 by its defaults (`mean_..._on`). The steady motion is that of `spirillum.settle`.
+
+The same space-filling sample (Sobol' points with a fixed seed) serves all robots, so that differences between robots
+are not those of their samples. What a robot, a calibration or a request states is not varied.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from spirillum.dynamics.run_state import is_held, state_of
+from spirillum.arrays import Samples
+from spirillum.dynamics.rotating_field import Field
+from spirillum.dynamics.run_summary import is_held, state_of
+from spirillum.dynamics.timing import TRIAL_DURATION, Timing
+from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
+from spirillum.fitted.fit import Fit, read_fit
+from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import CenterOfMass
+from spirillum.robot.links import links_of
+from spirillum.robot.load import with_resolution
+from spirillum.robot.model_options import Resolution
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.prediction import Prediction
-from spirillum.swimming.preparation import why_no_table
-from spirillum.swimming.released_motion import ReleasedMotion
-from spirillum.swimming.steady_quantities import STEADY
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import table_for, why_no_table
+from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
+from spirillum.swimming.steady import STEADY
+from spirillum.units import KINDS, display_unit, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 ASSUMPTION = "contact assumed, not validated"
 """What a released motion rests on."""
@@ -122,3 +143,381 @@ def steady_of(follow: Callable[[], Prediction]) -> ReleasedMotion:
     if lying.state != "changing":  # its means depend on when they are taken
         moving = {item.name: value for item in STEADY if np.isfinite(value := float(getattr(motion, item.name)))}
     return ReleasedMotion({**moving, **pose}, basis)
+
+
+RUNS = 64
+"""Runs over the unknowns: a power of two, at which Sobol' points fill space evenly."""
+_SEED = 36
+"""Of the scrambling: with it the unknowns of 64 points correlate by less than 0.04."""
+LEVEL = 0.9
+"""Level of the interval over the unknowns."""
+_AXIAL, _RADIAL = "body.center_of_mass.x", "body.center_of_mass.radial"
+_FEWEST = 0.5
+"""Share of the runs that have to swim."""
+
+
+class TrialUnknown(NamedTuple):
+    """An unknown of a trial, with an assumed distribution between two bounds."""
+
+    name: str
+    """`wait`, or the field that it replaces, or is added to."""
+    kind: Literal["uniform", "log-uniform"]
+    """Shape of the distribution."""
+    low: float
+    high: float
+    of: str
+    """What the ends are multiples of, or their unit."""
+    source: str
+    """Why these ends."""
+
+    def at(self, shares: Samples) -> Samples:
+        """Values at shares of the distribution, between 0 and 1."""
+        if self.kind == "uniform":
+            return self.low + (self.high - self.low) * shares
+        found: Samples = self.low * (self.high / self.low) ** shares
+        return found
+
+    def to_dict(self, share: float) -> dict[str, Any]:
+        """Its entry in `unknowns` of an answer, with its share of the variance."""
+        ends = {"low": self.low, "high": self.high, "of": self.of, "source": self.source}
+        return {"name": self.name, "distribution": self.kind, **ends, "share": quantity(share, "1")}
+
+
+UNKNOWNS = (
+    TrialUnknown("wait", "log-uniform", 10.0, 600.0, "s", "nobody states it: from a quick hand to ten minutes"),
+    TrialUnknown(
+        "roughness", "log-uniform", 1e-4, 1e-2, "body's radius", "from a smooth hull to glued and printed stripes"
+    ),
+    TrialUnknown(
+        "friction_coefficient", "uniform", 0.0, 0.3, "1", "lubricated surfaces 0.05 to 0.15; from none to dry plastics"
+    ),
+    TrialUnknown(
+        "weight",
+        "uniform",
+        0.9,
+        1.1,
+        "weight in the fluid",
+        "the difference of mass and displaced mass, each to 1 or 2 %",
+    ),
+    TrialUnknown(
+        "friction.effective",
+        "log-uniform",
+        1.0,
+        20.0,
+        "the rotor's own B_m",
+        "no seal has less than the bearings alone; B_eff inferred from trials is 10 to 16 times that",
+    ),
+    TrialUnknown(
+        "fluid.cavitation_pressure",
+        "log-uniform",
+        1e4,
+        1e5,
+        "Pa",
+        "one atmosphere for a liquid without gas; one with dissolved air may cavitate at a tenth of it",
+    ),
+    TrialUnknown(
+        "body.center_of_mass.x",
+        "uniform",
+        -0.05,
+        0.05,
+        "body's length",
+        "battery and motor fill the body unevenly; about the centre of a body of uniform density",
+    ),
+    TrialUnknown(
+        "body.center_of_mass.radial",
+        "uniform",
+        0.0,
+        0.05,
+        "body's radius",
+        "from a body that is balanced on its axis to parts that lie off it by their clearance",
+    ),
+)
+"""What the interval of a trial is over, in the order of the columns of its sample."""
+
+
+class TrialSample(NamedTuple):
+    """Settings of one run in place of unknown ones; None where the request states them."""
+
+    robot: Robot
+    wait: float | None
+    roughness: float | None
+    friction_coefficient: float | None
+
+
+def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
+    """Return the unknowns that are open.
+
+    Args:
+        robot: the robot.
+        weight: its weight in the fluid, N; 0 where its masses are not known.
+        stated: `wait`, `roughness` and `friction_coefficient` as they are requested or fitted; None where they are not.
+    """
+    free = {name for name, value in stated.items() if value is None}
+    free |= {"weight"} if weight and robot.body.mass is not None else set()
+    free |= {"friction.effective"} if robot.motor is not None and robot.friction.effective is None else set()
+    free |= {"fluid.cavitation_pressure"} - {f"fluid.{name}" for name in robot.fluid.model_fields_set}
+    if robot.has_body and robot.body.mass is not None and robot.body.center_of_mass is None:
+        free |= {_AXIAL, _RADIAL}
+    return tuple(one for one in UNKNOWNS if one.name in free)
+
+
+def samples_of(
+    robot: Robot, weight: float, unknowns: Sequence[TrialUnknown], shares: Samples | None = None
+) -> list[TrialSample]:
+    """Return the runs over the unknowns of a robot with that weight in the fluid, N.
+
+    Args:
+        robot: the robot.
+        weight: its weight in the fluid, N.
+        unknowns: what is open.
+        shares: of the distributions, (runs, unknowns), 0 to 1; None: the space-filling sample that serves all robots.
+    """
+    points = _shares(unknowns) if shares is None else shares
+    values = {one.name: one.at(column) for one, column in zip(unknowns, points.T, strict=True)}
+    found = []
+    for number in range(len(points)):
+        own = {name: float(column[number]) for name, column in values.items()}
+        fields = {name: value for name, value in own.items() if name == "fluid.cavitation_pressure"}
+        if "weight" in own and robot.body.mass is not None:
+            fields["body.mass"] = robot.body.mass + (own["weight"] - 1.0) * weight / STANDARD_GRAVITY
+        if "friction.effective" in own and robot.motor is not None:
+            fields["friction.effective"] = own["friction.effective"] * robot.motor.rotor_friction
+        one = _with_center(with_numbers(robot, fields), own)
+        height = 0.5 * robot.body.diameter * own["roughness"] if "roughness" in own else None
+        found.append(TrialSample(one, own.get("wait"), height, own.get("friction_coefficient")))
+    return found
+
+
+def _with_center(robot: Robot, own: Mapping[str, float]) -> Robot:
+    """The robot with the centre of mass of a sample, where that is open."""
+    if _AXIAL not in own:
+        return robot
+    body = robot.body
+    x = float(links_of(robot).body.centre[0]) + own[_AXIAL] * body.length
+    center = CenterOfMass().model_copy(update={"x": x, "radial": 0.5 * body.diameter * own[_RADIAL]})
+    return robot.model_copy(update={"body": body.model_copy(update={"center_of_mass": center})})
+
+
+def with_interval(
+    nominal: ReleasedMotion,
+    samples: Sequence[TrialSample],
+    unknowns: Sequence[TrialUnknown],
+    run: Callable[[TrialSample], ReleasedMotion],
+    progress: Callable[[str, int, int], None] | None = None,
+) -> ReleasedMotion:
+    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
+
+    Args:
+        nominal: the trial at nominal unknowns.
+        samples: the runs, as `samples_of` gives them.
+        unknowns: what they differ in.
+        run: makes one of them.
+        progress: told how many runs are done, and of how many.
+    """
+    if nominal.reason or not unknowns:
+        return nominal
+    runs: list[ReleasedMotion] = []
+    with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
+        try:
+            for found in pool.map(run, samples):
+                runs.append(found)
+                if progress is not None:
+                    progress("trial over its unknowns", len(runs), len(samples))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    swims = np.array([_swims(one) for one in runs])
+    basis: dict[str, Any] = {
+        "runs": len(runs),
+        "standing": sum(not one.reason for one in runs) - int(swims.sum()),
+        "without_answer": sum(bool(one.reason) for one in runs),
+    }
+    if swims.mean() < _FEWEST:
+        return replace(nominal, basis={**nominal.basis, **basis})
+    moving = [one for one, there in zip(runs, swims, strict=True) if there]
+    speeds = np.log([one.values["forward_velocity"] for one in moving])
+    shares = variance_shares(_shares(unknowns)[swims], speeds)
+    basis["unknowns"] = [one.to_dict(share) for one, share in zip(unknowns, shares, strict=True)]
+    edge = 0.5 * (1.0 - LEVEL)
+    values = {name: np.array([one.values[name] for one in moving]) for name in nominal.values}
+    quantiles = {name: np.quantile(column, [0.5, edge, 1.0 - edge]) for name, column in values.items()}
+    intervals = {
+        name: TrialInterval(float(middle), float(low), float(high), LEVEL)
+        for name, (middle, low, high) in quantiles.items()
+    }
+    return replace(nominal, basis={**nominal.basis, **basis}, intervals=intervals)
+
+
+def _swims(run: ReleasedMotion) -> bool:
+    """Whether a robot moves forward, and dry friction does not hold it."""
+    return not run.reason and run.basis["state"] != "standing" and run.values["forward_velocity"] > 0.0
+
+
+def variance_shares(shares: Samples, values: Samples) -> Samples:
+    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share.
+
+    Args:
+        shares: of the distributions, (runs, unknowns), 0 to 1.
+        values: (runs,).
+    """
+    x = 2.0 * shares - 1.0
+    terms = np.stack([x, x**2], axis=-1)
+    design = np.column_stack([np.ones(len(x)), terms.reshape(len(x), -1)])
+    factors = np.linalg.lstsq(design, values, rcond=None)[0][1:].reshape(-1, 2)
+    found: Samples = np.var(np.einsum("rud,ud->ru", terms, factors), axis=0) / np.var(values)
+    return found
+
+
+def _shares(unknowns: Sequence[TrialUnknown]) -> Samples:
+    """Shares of the distributions, (runs, unknowns): those of an unknown are the same whichever others are open."""
+    from scipy.stats import qmc
+
+    points: Samples = qmc.Sobol(len(UNKNOWNS), rng=np.random.default_rng(_SEED)).random(RUNS)
+    return points[:, [UNKNOWNS.index(one) for one in unknowns]]
+
+
+_TOLERANCE = 1e-4
+"""Error of a time step of the runs over the unknowns: their speeds are accurate to a thousandth."""
+_SAMPLES_PER_TURN = 12
+"""Samples over which their means are taken."""
+
+
+@dataclass(frozen=True)
+class TrialRequest:
+    """Arguments of `spirillum.predict` that decide the released motions of a robot."""
+
+    robot: Robot
+    friction: str | None
+    calibrated: bool
+    calibration: str | Path | None
+    fit: Fit
+    resolution: Resolution | Mapping[str, Any] | None
+    placement: Placement | Mapping[str, Any] | None
+    roughness: str | float | None
+    in_tube: InTube
+    duration: float | None
+    """Of the trial, s; None: that of a run by its defaults."""
+    interval: bool
+    progress: Callable[[str, int, int], None] | None
+
+    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
+        """Return the held answer with what gives its released motions, or with the reason why there are none.
+
+        Args:
+            held: the answer.
+            wanted: whether they are wanted.
+        """
+        if self.duration is not None and self.duration <= 0.0:
+            raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
+        reason = why_not_released(held, fitted=self.fit.posterior is not None)
+        if not wanted or reason:
+            self._check_unused(reason)
+        if not wanted:
+            return held
+        self._announce("held", held.forward_velocity)
+        if reason:
+            return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
+        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
+
+    def trial(self, held: Prediction) -> ReleasedMotion:
+        """Return the trial, with its interval where that is requested."""
+        nominal = self._run(held)
+        self._announce("trial", nominal.values.get("forward_velocity"))
+        return self._with_interval(held, nominal) if self.interval else nominal
+
+    def steady(self) -> ReleasedMotion:
+        """Return the steady motion; it is found in seconds, which no progress is told of."""
+        from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
+
+        still = self.in_tube.model_copy(update={"wait": None})
+        shared = {**self._shared(), "progress": None}
+        fit = read_fit(shared.pop("calibration"))
+        found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=fit, **shared).prediction)
+        self._announce("steady", found.values.get("forward_velocity"))
+        return found
+
+    def _run(self, held: Prediction) -> ReleasedMotion:
+        """The trial at nominal unknowns."""
+        from spirillum.dynamics.simulation import simulate  # its equations are compiled
+
+        robot, length = self._resolved(), self._length
+        settings = {"in_tube": self.in_tube, "timing": {"duration": length}, **self._shared()}
+        return trial_of(held, lambda: simulate(robot, model=WALLED, calibrated=self.calibrated, **settings), length)
+
+    @property
+    def _length(self) -> float:
+        """Time with the motor on, s."""
+        return TRIAL_DURATION if self.duration is None else self.duration
+
+    def _shared(self) -> dict[str, Any]:
+        """What all runs take of the request."""
+        names = ("friction", "calibration", "placement", "roughness", "progress")
+        return {name: getattr(self, name) for name in names}
+
+    def _resolved(self) -> Robot:
+        """The robot with the requested resolution, which a run refuses: the reason of its column."""
+        return with_resolution(self.robot, self.resolution, WALLED)
+
+    def _with_interval(self, held: Prediction, nominal: ReleasedMotion) -> ReleasedMotion:
+        """The trial with its interval over what neither robot, request nor calibration states."""
+        from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
+
+        robot, placed = self.fit.central(self.robot), Placement.of(self.placement)
+        given = None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+        rough, touching = with_contact(self.fit.contact(), given, self.in_tube)
+        derived = robot.derived().get("submerged_weight")
+        weight = 0.0 if derived is None else derived.value
+        stated = {"wait": touching.wait, "roughness": rough, "friction_coefficient": touching.friction_coefficient}
+        table = table_for(RobotBatch.of(robot, placed))
+        times = Timing(duration=self._length, samples_per_turn=_SAMPLES_PER_TURN)
+        unknowns = open_unknowns(robot, weight, stated)
+
+        def run(sample: TrialSample) -> ReleasedMotion:
+            values = {"wait": sample.wait, "friction_coefficient": sample.friction_coefficient}
+            update = {name: value for name, value in values.items() if value is not None}
+            asked = touching.model_copy(update=update).of_trial(placed)
+            height = rough if sample.roughness is None else sample.roughness
+
+            def quick() -> xr.Dataset:
+                steady = predict(
+                    sample.robot,
+                    model=WALLED,
+                    friction=self.friction,
+                    calibrated=self.calibrated,
+                    fit=self.fit,
+                    placement=placed,
+                    band=False,
+                )
+                return run_in_tube(
+                    steady,
+                    table,
+                    times,
+                    placed,
+                    asked,
+                    height,
+                    Field(),
+                    weight=True,
+                    progress=None,
+                    tolerance=_TOLERANCE,
+                )
+
+            return trial_of(held, quick, self._length)
+
+        return with_interval(nominal, samples_of(robot, weight, unknowns), unknowns, run, self.progress)
+
+    def _announce(self, column: str, speed: float | None) -> None:
+        """Tell of a column as soon as it is there."""
+        if self.progress is not None and speed is not None:
+            self.progress(f"{SPEED_OF}{column}: {show(speed, display_unit(speed, 'm/s'))}", 1, 1)
+
+    def _check_unused(self, reason: str) -> None:
+        """Refuse settings of a released motion for an answer without one, with the reason."""
+        given = {"roughness": self.roughness, "duration": self.duration, "interval": self.interval or None}
+        given |= {f"in_tube.{name}": self.in_tube.model_dump()[name] for name in self.in_tube.model_fields_set}
+        for name, value in given.items():
+            if value is not None:
+                why = f" ({reason})" if reason else ""
+                raise InputError(
+                    f"{name} = {str(value)[:40]} is of released motion in the tube, which this request does not "
+                    f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
+                )

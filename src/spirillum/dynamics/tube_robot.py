@@ -13,8 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.films import ROUGHNESS_SHARE
-from spirillum.dynamics.free_robot import FreeRobot, drive_of, friction_of, torque_scale, weight_of
+from spirillum.dynamics.free_robot import ROUGHNESS_SHARE, FreeRobot, drive_of, friction_of, torque_scale, weight_of
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film_surface import FilmBody
 from spirillum.kernels import contacts, rigid_links, tube_table

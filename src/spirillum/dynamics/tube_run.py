@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.averages import stretches_on
 from spirillum.dynamics.integration import (
     BATTERY_EMPTY,
     INTERRUPTED,
@@ -23,10 +22,10 @@ from spirillum.dynamics.integration import (
 )
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.run_file import numbers_of
-from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.run_summary import stretches_on
+from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, reach_of, state_at_release
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -83,7 +82,7 @@ def tube_run(
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
     if isinstance(start, StartPlace):
-        laid = laid_down(steady.robot, robot, start)
+        laid = state_at_release(steady.robot, robot, start)
         check_roughness(robot.roughness, float(robot.gaps(laid).min()), steady.robot.body.diameter)
         check_in_table(robot, laid, observed_at(robot, laid)[rigid_links.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)

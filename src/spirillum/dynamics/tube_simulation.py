@@ -11,15 +11,14 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
-from spirillum.dynamics.run_state import end_state
-from spirillum.dynamics.start import start_phase, turning_rate
+from spirillum.dynamics.run_summary import end_state
+from spirillum.dynamics.start import StartPlace, check_roughness, start_phase, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import ENDS, tube_run
-from spirillum.dynamics.tube_start import StartPlace, check_roughness
-from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import BELOW, TubeTable, least_checked_gap
 from spirillum.fluid.tube.tube import END_LOSS

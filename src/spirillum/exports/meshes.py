@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.costs import check_memory
+from spirillum.errors import check_memory
 from spirillum.files import MARK, scratch_folder
-from spirillum.formats.vtk_image import add_comment
+from spirillum.formats.array_files import add_comment
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import STRIPE_COLOURS, RobotMesh
 from spirillum.robot.surface import Faces, mass_properties

@@ -1,4 +1,7 @@
-"""MCAP recordings of runs for Foxglove: poses, the robot, all numbers, events, a video."""
+"""MCAP recordings of runs for Foxglove: poses, the robot, all numbers, events, a video.
+
+Names and fields are those of https://docs.foxglove.dev/docs/sdk/schemas; times are whole seconds and nanoseconds.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import base64
 import heapq
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.argument_validation import as_number
+from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.poses import Poses, poses_of, rolled
-from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.dynamics.run_file import Poses, open_run, poses_of, robot_of, rolled
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.exports import foxglove
 from spirillum.files import MARK, atomic_write, guard_inputs, output_target
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.mesh import robot_mesh
@@ -29,10 +31,158 @@ from spirillum.version import own_version
 if TYPE_CHECKING:
     import xarray as xr
 
+
+Json = dict[str, Any]
+_LATEST = 1e9
+"""Latest time of a recording, s; seconds have 32 bits."""
+
+
+def _object(**fields: Json) -> Json:
+    return {"type": "object", "properties": fields}
+
+
+def _list(item: Json) -> Json:
+    return {"type": "array", "items": item}
+
+
+_NUMBER: Json = {"type": "number"}
+_WHOLE: Json = {"type": "integer"}
+_TEXT: Json = {"type": "string"}
+_TRUTH: Json = {"type": "boolean"}
+_TIME = _object(sec=_WHOLE, nsec=_WHOLE)
+_POINT = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _object(position=_POINT, orientation=_TURN)
+_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_TRIANGLES = _object(pose=_POSE, points=_list(_POINT), color=_COLOUR, colors=_list(_COLOUR), indices=_list(_WHOLE))
+_CYLINDER = _object(pose=_POSE, size=_POINT, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR)
+_NOTES = _list(_object(key=_TEXT, value=_TEXT))
+_ENTITY = _object(
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    id=_TEXT,
+    lifetime=_TIME,
+    frame_locked=_TRUTH,
+    metadata=_NOTES,
+    cylinders=_list(_CYLINDER),
+    triangles=_list(_TRIANGLES),
+)
+
+SCHEMAS: Mapping[str, Json] = {
+    "foxglove.FrameTransform": _object(
+        timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_POINT, rotation=_TURN
+    ),
+    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
+    "foxglove.SceneUpdate": _object(deletions=_list(_object(timestamp=_TIME, id=_TEXT)), entities=_list(_ENTITY)),
+    "foxglove.CompressedImage": _object(
+        timestamp=_TIME, frame_id=_TEXT, data={**_TEXT, "contentEncoding": "base64"}, format=_TEXT
+    ),
+    "foxglove.Log": _object(timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT, file=_TEXT, line=_WHOLE),
+}
+"""JSON schemas by the names by which Foxglove knows them."""
+
+
+def numbers_schema(meanings: Mapping[str, str]) -> Json:
+    """Schema of a message of plain numbers."""
+    return _object(timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in meanings.items()})
+
+
+def nanoseconds(time: float) -> int:
+    """A time of a run, s, in whole nanoseconds."""
+    if not 0.0 <= time <= _LATEST:
+        raise InputError(f"the run has something at {time:g} s; allowed: times from 0 to {_LATEST:g} s")
+    return round(time * 1e9)
+
+
+def stamp(time: float) -> Json:
+    """A time of a run as messages have it."""
+    seconds, rest = divmod(nanoseconds(time), 1_000_000_000)
+    return {"sec": seconds, "nsec": rest}
+
+
+def place(position: Samples) -> Json:
+    """A point or vector, (3,)."""
+    return {axis: float(value) for axis, value in zip("xyz", position, strict=True)}
+
+
+def turn(quaternion: Samples) -> Json:
+    """A unit quaternion w, x, y, z."""
+    return {axis: float(value) for axis, value in zip("wxyz", quaternion, strict=True)}
+
+
+def pose_of(position: Samples, quaternion: Samples) -> Json:
+    """A position and an attitude (w, x, y, z)."""
+    return {"position": place(position), "orientation": turn(quaternion)}
+
+
+def colour(red: float, green: float, blue: float, opacity: float = 1.0) -> Json:
+    """A colour, sRGB from 0 to 1."""
+    return {"r": red, "g": green, "b": blue, "a": opacity}
+
+
+def triangles(vertices: Samples, faces: np.ndarray, colours: Samples) -> list[Json]:
+    """A surface, by one list of triangles for each of its colours.
+
+    Args:
+        vertices: (n, 3), m.
+        faces: (m, 3).
+        colours: sRGB of each triangle, (m, 3).
+    """
+    shades, which = np.unique(colours, axis=0, return_inverse=True)
+    found = []
+    for number, shade in enumerate(shades):
+        used, indices = np.unique(faces[which.reshape(-1) == number], return_inverse=True)
+        found.append(
+            {
+                "pose": pose_of(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])),
+                "points": [place(point) for point in np.round(vertices[used], 9)],
+                "color": colour(*shade.tolist()),
+                "colors": [],
+                "indices": indices.reshape(-1).tolist(),
+            }
+        )
+    return found
+
+
+def cylinder(diameter: float, length: float, middle: float) -> list[Json]:
+    """A glass tube along x.
+
+    Args:
+        diameter: m.
+        length: m.
+        middle: x of its middle, m.
+    """
+    upright = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])  # its axis is z at first
+    return [
+        {
+            "pose": pose_of(np.array([middle, 0.0, 0.0]), upright),
+            "size": place(np.array([diameter, diameter, length])),
+            "bottom_scale": 1.0,
+            "top_scale": 1.0,
+            "color": colour(0.75, 0.85, 0.95, 0.15),
+        }
+    ]
+
+
+def entity(name: str, frame: str, shapes: Sequence[Json], kind: str) -> Json:
+    """A part of a scene that moves with a frame and stays."""
+    return {
+        "timestamp": stamp(0.0),
+        "frame_id": frame,
+        "id": name,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": True,
+        "metadata": [],
+        "cylinders": [],
+        "triangles": [],
+        kind: list(shapes),
+    }
+
+
 RECORDINGS = {".mcap": "a recording for Foxglove"}
 """Endings of the files that can be written."""
 _LAB, _BODY, _ROTOR = "lab", "body", "rotor"
-_TRANSFORM, _POSE, _SCENE, _IMAGE, _LOG = foxglove.SCHEMAS
+_TRANSFORM, _POSE_IN_FRAME, _SCENE, _IMAGE, _LOG = SCHEMAS
 _NUMBERS = "spirillum.Quantities"
 _INFORMATION = 2
 _FINENESS = 0.5
@@ -114,7 +264,7 @@ class _Writer:
 
         self._writer = Writer(stream)
         self._writer.start(library=f"{MARK} {own_version()}")
-        self._schemas = {**foxglove.SCHEMAS, _NUMBERS: foxglove.numbers_schema(_meanings(dataset))}
+        self._schemas = {**SCHEMAS, _NUMBERS: numbers_schema(_meanings(dataset))}
         self._channels: dict[str, int] = {}
         names = ("robot", "model", "settings", "versions", "title")
         self._writer.add_metadata(
@@ -128,7 +278,7 @@ class _Writer:
             text = json.dumps({"title": schema, **self._schemas[schema]}).encode()
             number = self._writer.register_schema(name=schema, encoding="jsonschema", data=text)
             self._channels[topic] = self._writer.register_channel(topic, "json", number)
-        at = foxglove.nanoseconds(time)
+        at = nanoseconds(time)
         data = json.dumps(content, allow_nan=False).encode()
         self._writer.add_message(self._channels[topic], log_time=at, data=data, publish_time=at)
 
@@ -149,7 +299,7 @@ def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:
     names = _numbers_of(dataset)
     columns = {name: np.asarray(dataset[name].values, dtype=float) for name in names}
     for n, time in enumerate(poses.time.tolist()):
-        when, position, attitude = foxglove.stamp(time), poses.position[n], poses.attitude[n]
+        when, position, attitude = stamp(time), poses.position[n], poses.attitude[n]
         for parent, child, where, turned in (
             (_LAB, _BODY, position, attitude),
             (_BODY, _ROTOR, np.zeros(3), rolled(float(poses.tail_phase[n]))),
@@ -162,12 +312,12 @@ def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:
                     "timestamp": when,
                     "parent_frame_id": parent,
                     "child_frame_id": child,
-                    "translation": foxglove.place(where),
-                    "rotation": foxglove.turn(turned),
+                    "translation": place(where),
+                    "rotation": turn(turned),
                 },
             )
-        pose = foxglove.pose_of(position, attitude)
-        yield "/pose", _POSE, time, {"timestamp": when, "frame_id": _LAB, "pose": pose}
+        pose = pose_of(position, attitude)
+        yield "/pose", _POSE_IN_FRAME, time, {"timestamp": when, "frame_id": _LAB, "pose": pose}
         known = {name: float(values[n]) for name, values in columns.items() if np.isfinite(values[n])}
         yield "/quantities", _NUMBERS, time, {"timestamp": when, **known}
 
@@ -188,9 +338,7 @@ def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
     """Robot and tube; the parts move with their frames."""
     pieces = robot_mesh(robot, fineness=_FINENESS)
     entities = [
-        foxglove.entity(
-            piece.name, piece.part, foxglove.triangles(piece.vertices, piece.faces, piece.colours), "triangles"
-        )
+        entity(piece.name, piece.part, triangles(piece.vertices, piece.faces, piece.colours), "triangles")
         for piece in pieces
     ]
     if robot.channel is not None:
@@ -200,8 +348,8 @@ def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
         length = robot.channel.length
         if length is None or not np.isfinite(length):
             length, middle = _LONGEST_TUBE * (high - low + robot_length), 0.5 * (low + high) + middle
-        glass = foxglove.cylinder(robot.channel.diameter, length, middle)
-        entities.append(foxglove.entity("tube", _LAB, glass, "cylinders"))
+        glass = cylinder(robot.channel.diameter, length, middle)
+        entities.append(entity("tube", _LAB, glass, "cylinders"))
     return entities
 
 
@@ -217,7 +365,7 @@ def _events(dataset: xr.Dataset) -> Iterator[Message]:
             _LOG,
             time,
             {
-                "timestamp": foxglove.stamp(time),
+                "timestamp": stamp(time),
                 "level": _INFORMATION,
                 "message": what,
                 "name": "spirillum",
@@ -243,7 +391,7 @@ def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[
             _IMAGE,
             time,
             {
-                "timestamp": foxglove.stamp(time),
+                "timestamp": stamp(time),
                 "frame_id": "camera",
                 "data": base64.b64encode(encoded.getvalue()).decode(),
                 "format": "jpeg",

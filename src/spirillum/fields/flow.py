@@ -1,9 +1,9 @@
-"""The fluid's velocity and pressure around a swimming robot, at points and on grids."""
+"""The fluid's velocity and pressure around a swimming robot, at points and on grids, and their summary."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as repr_field
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, quantity, with_notes_last
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, flow_field
 from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
@@ -28,12 +28,13 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import Seat
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict
-from spirillum.swimming.robot_preparation import prepared
+from spirillum.swimming.preparation import prepared
 from spirillum.units import KINDS, Kind, parse_option
 from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 FLOW_MODELS = ("slender", "tube")
 """The models whose tractions give a flow: in unbounded fluid, and in the channel."""
@@ -389,3 +390,51 @@ def _checked(points: Samples) -> Samples:
 
 def _margin(extent: str | float | None) -> float | None:
     return None if extent is None else parse_option("extent", extent, KINDS["length or zero"])
+
+
+def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any]:
+    """The flow around a robot and what was computed of it, as `spirillum flow` prints them."""
+    return with_notes_last(flow.to_dict(), files=[_file(path, dataset) for path, dataset in written.items()])
+
+
+def _file(path: Path, dataset: xr.Dataset) -> dict[str, Any]:
+    axes = [str(name) for name in dataset["inside"].dims]
+    across = [axis for axis in "xyz" if axis not in axes]
+    step = float(dataset[axes[0]][1] - dataset[axes[0]][0])
+    found = {
+        "file": str(path),
+        "grid": {
+            "points": {axis: int(dataset.sizes[axis]) for axis in axes},
+            "spacing": quantity(step, "m"),
+            **{axis: quantity(np.array([dataset[axis].min(), dataset[axis].max()]), "m") for axis in axes},
+            **{axis: quantity(float(dataset[axis]), "m") for axis in across},
+        },
+        "points_inside": int(dataset["inside"].sum()),
+        **dict(extremes(dataset)),
+    }
+    if across:
+        through = quantity(flow_rate(dataset), unit_of("flow_rate_through_plane"), direction=f"+{across[0]}")
+        found["flow_rate_through_plane"] = through
+    return found
+
+
+def flow_rate(plane: xr.Dataset) -> float:
+    """Flow rate through a plane, m^3/s, along the axis across it; solids count as at rest."""
+    axes = [str(name) for name in plane["inside"].dims]
+    (across,) = (axis for axis in "xyz" if axis not in axes)
+    return float(plane[f"velocity_{across}"].fillna(0.0).integrate(axes))
+
+
+def extremes(dataset: xr.Dataset) -> Iterator[tuple[str, Any]]:
+    """Largest speed, lowest and highest pressure on a grid, with their positions; empty if all of it is solid."""
+    parts = [dataset[f"velocity_{axis}"] ** 2 for axis in "xyz"]
+    speed = (parts[0] + parts[1] + parts[2]) ** 0.5
+    if not bool(np.isfinite(speed).any()):
+        return  # every point lies inside a solid
+    for name, values, place in (
+        ("largest_speed", speed, speed.argmax(...)),
+        ("lowest_pressure", dataset["pressure"], dataset["pressure"].argmin(...)),
+        ("highest_pressure", dataset["pressure"], dataset["pressure"].argmax(...)),
+    ):
+        there = values.isel(place)
+        yield name, quantity(float(there), unit_of(name), at=quantity([float(there[axis]) for axis in "xyz"], "m"))

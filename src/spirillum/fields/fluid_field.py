@@ -126,7 +126,7 @@ def add_tractions(
     field: Samples,
     moments: Samples | None = None,
 ) -> None:
-    """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`, see `kernels.field`.
+    """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`: `kernels.stokes_flow`.
 
     Args:
         points: (n, 3), m.
@@ -136,7 +136,7 @@ def add_tractions(
         field: velocity and pressure, (n, 4), without the factors 1/(8 pi mu) and 1/(8 pi).
         moments: first moments of the forces at the stations, (stations, 3, 3).
     """
-    from spirillum.kernels.field import add_blobs, add_layer, add_moments
+    from spirillum.kernels.stokes_flow import add_blobs, add_layer, add_moments
 
     start = 0
     for wire in wires:

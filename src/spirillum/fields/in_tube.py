@@ -127,7 +127,7 @@ class TubeFlowField(FluidField):
         return _Reflection.of(self.held.strengths, self._density, self._forces)
 
     def _unbounded(self, turned: Samples) -> Samples:
-        """The flow without the wall, as `kernels.field` has it, (n, 4)."""
+        """The flow without the wall, as `kernels.stokes_flow` has it, (n, 4)."""
         strengths, field = self.held.strengths, np.zeros((len(turned), 4))
         layer = strengths.solids.panels, self._density
         add_tractions(turned, strengths.wires, self._forces, layer, field)
@@ -170,7 +170,7 @@ class _Sources(NamedTuple):
 
 @dataclass(frozen=True)
 class _Reflection:
-    """Reflection at the wall: waves and their amplitudes, see `kernels.tube_field`."""
+    """Reflection at the wall: waves and their amplitudes, see `kernels.stokes_flow`."""
 
     radius: float
     """Of the tube, m."""
@@ -186,9 +186,9 @@ class _Reflection:
     reach: float
     """Where, from there, the flow has died out, m."""
     steps: Samples
-    """Of `kernels.tube_field.wave_amplitudes`."""
+    """Of `kernels.stokes_flow.wave_amplitudes`."""
     amplitudes: Samples
-    """Of `kernels.tube_field.wave_amplitudes`."""
+    """Of `kernels.stokes_flow.wave_amplitudes`."""
 
     @classmethod
     def of(cls, strengths: Strengths, density: Amplitudes, forces: Samples) -> _Reflection:
@@ -201,7 +201,7 @@ class _Reflection:
         """
         from scipy.special import k0e, k1e
 
-        from spirillum.kernels.tube_field import wave_amplitudes
+        from spirillum.kernels.stokes_flow import wave_amplitudes
 
         seat, tolerance = strengths.solids.seat, strengths.solids.fineness.tolerance
         cut = -float(np.log(tolerance))
@@ -237,7 +237,7 @@ class _Reflection:
 
     def field(self, placed: Samples) -> Samples:
         """Velocity and pressure at points about the tube's axis, in its axes, (n, 4)."""
-        from spirillum.kernels.tube_field import add_waves
+        from spirillum.kernels.stokes_flow import add_waves
 
         field = np.zeros((len(placed), 4))
         distance = np.maximum(self.radius - np.hypot(placed[:, 1], placed[:, 2]), 0.0)

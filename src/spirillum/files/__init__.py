@@ -1,8 +1,8 @@
 """Files: the one way to read and the one way to write; what is promised of both is on the page `docs/promises.md`."""
 
 from spirillum.files.folders import claim_folder, results_folder
+from spirillum.files.limits import checked_path, file_name, is_text, text_cell
 from spirillum.files.locks import scratch_folder
-from spirillum.files.names import checked_path, file_name, is_text, text_cell
 from spirillum.files.netcdf import loaded_netcdf, netcdf_file, open_netcdf, write_dataset
 from spirillum.files.reading import (
     checked_file,

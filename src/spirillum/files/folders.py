@@ -9,8 +9,8 @@ from typing import Any
 
 from spirillum.envelope import as_json
 from spirillum.errors import InputError
+from spirillum.files.limits import checked_path
 from spirillum.files.locks import LEFTOVER, Busy, locked
-from spirillum.files.names import checked_path
 from spirillum.files.reading import read_json
 from spirillum.files.writing import output_folder, write_text
 

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from spirillum.errors import InputError
-from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS
-from spirillum.files.names import checked_path
+from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS, checked_path
 from spirillum.scalars import plain_minus
 
 _LINE = re.compile(r"at line (\d+)")

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from spirillum.errors import InputError
+from spirillum.files.limits import checked_path
 from spirillum.files.locks import LEFTOVER, private_folder
-from spirillum.files.names import checked_path
 
 PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""

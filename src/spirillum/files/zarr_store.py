@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError
+from spirillum.files.limits import checked_path
 from spirillum.files.locks import private_folder
-from spirillum.files.names import checked_path
 from spirillum.files.writing import synced
 
 if TYPE_CHECKING:

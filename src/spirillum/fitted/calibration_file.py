@@ -21,10 +21,12 @@ from spirillum.robot.fields import (
     Text,
     TorqueConstant,
     Viscosity,
+    problems_in,
+    refuse,
+    refused_table,
 )
 from spirillum.robot.model_options import Calibration, known_model
 from spirillum.robot.placement import Placement
-from spirillum.robot.problems import problems_in, refuse, refused_table
 from spirillum.robot.robot import Robot
 
 _WHAT = "a calibration file (TOML with [calibration.<model>] tables)"

@@ -38,7 +38,7 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
     options = batch.options.tube
     if not isinstance(model, Tube) or options.form == "direct":
         return model
-    from spirillum.fluid.tube.tabled import tabled
+    from spirillum.fluid.tube.library import tabled
 
     resolved = batch.options.resolution
     if resolved and options.form == "table":

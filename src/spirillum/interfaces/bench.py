@@ -9,8 +9,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 
 from spirillum.controllers.lab import Lab
-from spirillum.controllers.sensors import Senses
-from spirillum.controllers.signals import Command, Detection
+from spirillum.controllers.sensors import Command, Detection, Senses
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError
 from spirillum.files import scratch_folder

@@ -30,7 +30,7 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
 from spirillum.kernels import rigid_links, stiff_steps
-from spirillum.kernels.axial_motor import STATES as AXIAL_STATES
+from spirillum.kernels.motor import STATES as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.prediction import Prediction
 from spirillum.version import own_version

@@ -24,7 +24,7 @@ from spirillum.dynamics.axial_robot import (
 )
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
-from spirillum.kernels import axial_motor as kernel
+from spirillum.kernels import motor as kernel
 from spirillum.notes import Note
 from spirillum.optional_dependencies import import_optional
 from spirillum.quantities import unit_of

@@ -18,7 +18,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.dynamics.axial_batch import AxialBatch
 from spirillum.errors import InputError
-from spirillum.kernels import axial_motor as kernel
+from spirillum.kernels import motor as kernel
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot

@@ -1,4 +1,4 @@
-"""Brightness profiles across edges, displacements of edges, robust pose updates, scores of places: csrc/edges.c."""
+"""Edges in pictures: brightness profiles, the contour of a body, a coloured seal: csrc/edges.c, contours.c, seals.c."""
 
 from __future__ import annotations
 
@@ -122,4 +122,93 @@ def sums_along(
         middle: position where all parameters are zero, samples.
         trials: the trial parameters.
         sums: the sums.
+    """
+
+
+@native("points")
+def edge_points(
+    pose: Float64[Array, "3"],
+    factors: Float64[Array, "8 5 4 n"],
+    normals: Float64[Array, "n 2"],
+    reach: Float64[Array, "2"],
+    points: Float64[Array, "n 2"],
+) -> None:
+    """Edge points in the plane through the axis, in the body's frame.
+
+    Args:
+        pose: x, y, heading.
+        factors: Chebyshev coefficients, in the lens's place along and across, of x and y with the upper rims of flat
+            ends, and of x and y with the lower ones; the outer point of the two is taken.
+        normals: outward normals.
+        reach: largest distances of the lens along and across, m.
+        points: the points, m.
+    """
+
+
+@native("pixels", "directions", "size", "slopes")
+def edge_places(
+    pose: Float64[Array, "3"],
+    factors: Float64[Array, "8 5 4 n"],
+    normals: Float64[Array, "n 2"],
+    reach: Float64[Array, "2"],
+    axis_height: float,
+    camera: Float64[Array, "17"],
+    pixels: Float64[Array, "n 2"],
+    directions: Float64[Array, "n 2"],
+    size: Float64[Array, "n"],
+    slopes: Float64[Array, "n 3"],
+) -> None:
+    """Project a body's apparent contour into the picture.
+
+    Args:
+        pose: x, y, heading.
+        factors: coefficients of the edge points, as in `edge_points`.
+        normals: outward normals in the body's frame.
+        reach: largest distances of the lens along and across, m.
+        axis_height: height of the axis, m.
+        camera: packed, see `kernels.pictures`.
+        pixels: the edge points.
+        directions: unit normals in the picture.
+        size: pixels per m along them.
+        slopes: Jacobian of the displacement along each normal by (x, y, heading), pixels per m and per rad.
+    """
+
+
+@native("work", "share", "distance", "kind")
+def seal_shares(
+    colours: Float64[Array, "3 edges samples"],
+    offsets: Float64[Array, "samples"],
+    sides: Int64[Array, "count 3"],
+    palette: Float64[Array, "kinds 3"],
+    beside: float,
+    noise: float,
+    distinct: float,
+    white: float,
+    fewest: int,
+    pooled: int,
+    work: Float64[Array, "2 3 edges"],
+    share: Float64[Array, "edges samples"],
+    distance: Float64[Array, "edges"],
+    kind: Int64[Array, "edges"],
+) -> None:
+    """Share of the stripe's colour in the samples across each edge of a seal.
+
+    Colours are projected onto the direction that separates a stripe best from the surroundings of its side (Fisher's
+    linear discriminant). At a silhouette of known colours the share is that of the colour of which there is most.
+
+    Args:
+        colours: profiles across the edges, of 255; NaN out of view.
+        offsets: distances of the samples outward from an edge, pixels.
+        sides: first edge of each side, the one after its last, and whether the side is a silhouette.
+        palette: known colours at the silhouette; none at first.
+        beside: distance from an edge from which on colours are those of one side, pixels.
+        noise: standard deviation of a colour's noise, of 255.
+        distinct: least distance of a stripe from its surroundings, standard deviations.
+        white: brightness of glare, of 255, which hides an edge.
+        fewest: fewest edges of a side in view.
+        pooled: edges on either side whose surroundings are averaged.
+        work: memory.
+        share: 1 in the stripe to 0 beside it; NaN where unknown.
+        distance: squared distance of the stripe from its surroundings; 0 where they look alike.
+        kind: index into the palette of the nearest colour; 0 without one.
     """

@@ -1,4 +1,13 @@
-"""Colours of a picture between its pixels, and a fit of stripes on a cylinder: csrc/pictures.c."""
+"""Stripes, travelling waves and refracted rays in pictures: csrc/pictures.c, waves.c, snell.c.
+
+Columns of the strip run across the tail, rows along it. A wave is packed as K, a_0, c/L_t (0 or less: no taper) and
+amplitude; the tilt of a row as the derivatives with height e and f of the shift along and across, and g of the
+magnification.
+
+A camera is packed as 17 numbers: focal length (negative: turned by half a turn), principal point u and v, distortion k1
+and k2, height of the lens, height of the surface, refractive index below the surface over that above, and the rotation
+matrix whose rows point to the right, up and backwards of the camera. The lens stands at x = y = 0.
+"""
 
 from __future__ import annotations
 
@@ -88,3 +97,100 @@ def stripe_fit(
         answer: angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour, gains of the
             channels; unchanged where too little is visible.
     """
+
+
+@native("work", "ridge")
+def ridge_of(
+    image: UInt8[Array, "h w 3"],
+    middle: Float64[Array, "rows 2"],
+    across: Float64[Array, "rows 2"],
+    contrast: Float64[Array, "3"],
+    inner: int,
+    work: Float64[Array, "2 columns"],
+    ridge: Float64[Array, "rows columns"],
+) -> None:
+    """Ridge filter: contrast of a line at each pixel of a strip to both of its sides.
+
+    Args:
+        image: the picture.
+        middle: pixel of each row's middle.
+        across: step from one column to the next, pixels.
+        contrast: weight of each channel.
+        inner: half the width of the line, columns.
+        work: memory.
+        ridge: the strip; NaN in rows that leave the picture.
+    """
+
+
+@native("scores")
+def wave_scores(
+    ridge: Float64[Array, "rows columns"],
+    xi: Float64[Array, "rows"],
+    tilt: Float64[Array, "rows 3"],
+    wave: Float64[Array, "4"],
+    step: float,
+    every: int,
+    turns: Float64[Array, "phases 2"],
+    scores: Float64[Array, "phases"],
+) -> None:
+    """Mean ridge along the wire at evenly spaced phases; NaN with fewer than a third of the rows in the picture.
+
+    Args:
+        ridge: the strip.
+        xi: distance from the root of each row, m.
+        tilt: of each row.
+        wave: of the wire.
+        step: width of a column, m.
+        every: stride of the rows.
+        turns: cosine and sine of the phases.
+        scores: the score of each phase.
+    """
+
+
+@native("work", "answer")
+def wave_fit(
+    ridge: Float64[Array, "rows columns"],
+    xi: Float64[Array, "rows"],
+    tilt: Float64[Array, "rows 3"],
+    wave: Float64[Array, "4"],
+    phase: float,
+    step: float,
+    width: float,
+    usual: float,
+    likely_offset: float,
+    likely_lean: float,
+    work: Float64[Array, "rows 10"],
+    answer: Float64[Array, "10"],
+) -> None:
+    """Robust Gauss-Newton fit of phase, lateral offset and tilt of a wire, from a phase nearby.
+
+    Args:
+        ridge: the strip.
+        xi: distance from the root of each row, m.
+        tilt: of each row.
+        wave: of the wire.
+        phase: to begin with, rad.
+        step: width of a column, m.
+        width: of the wire, m.
+        usual: typical ridge on the wire.
+        likely_offset: prior standard deviation of the offset, m.
+        likely_lean: prior standard deviation of the difference of offsets from end to end, m.
+        work: memory.
+        answer: phase, its standard error, inlier share of the rows, offset, tilt, numerator and denominator of the
+            handedness (0 as assumed, -2 opposite) and of the relative error of the amplitude, mean ridge; unchanged
+            where too little is in view.
+    """
+
+
+@native("pixels")
+def pixels_of_points(
+    points: Float64[Array, "k 3"], camera: Float64[Array, "17"], pixels: Float64[Array, "k 2"]
+) -> None:
+    """Project points, m, to pixels (u, v); NaN behind the camera."""
+
+
+@native("points")
+def points_of_pixels(
+    pixels: Float64[Array, "k 2"], level: float, camera: Float64[Array, "17"], points: Float64[Array, "k 3"]
+) -> None:
+    """Points at the height `level` on the rays of pixels, m; NaN where a ray does not reach it."""

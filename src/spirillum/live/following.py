@@ -32,15 +32,13 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
 from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.constants import VISIBILITY
-from spirillum.vision.track.cues import CUES
-from spirillum.vision.track.direction import align_with_path
 from spirillum.vision.track.initial_detection import Start
 from spirillum.vision.track.learning import InitialDetection
 from spirillum.vision.track.lone_outline import OutlineCheck
-from spirillum.vision.track.size import checked_scale
+from spirillum.vision.track.size import align_with_path, checked_scale
 from spirillum.vision.track.steadiness import StillPicture, shift_of, view_of
 from spirillum.vision.track.steps import FrameTracker
-from spirillum.vision.track.track import RobotMotion
+from spirillum.vision.track.track import CUES, RobotMotion
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened

@@ -14,11 +14,9 @@ from typing import Any
 
 from spirillum.envelope import quantity, with_notes_last
 from spirillum.errors import InputError, check_choice
-from spirillum.live.observation import Observation
-from spirillum.live.sending import Datagrams, line_of
-from spirillum.live.sources import Arrived, Source, source_of
+from spirillum.live.observation import Observation, Tracked
+from spirillum.live.streams import Arrived, Datagrams, Source, line_of, source_of
 from spirillum.live.tracker import LiveTracker, seconds
-from spirillum.live.tracking_summary import Tracked
 from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.vision.setup import load_setup

@@ -9,7 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, clipped
-from spirillum.measurement.depth import apparent_distance
+from spirillum.measurement.setup_template import apparent_distance
 from spirillum.robot.geometry import StripeColour
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.setup import INDICES

@@ -11,7 +11,7 @@ from typing import Any
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_range
-from spirillum.measurement.depth import depth_shares, spacing_at_axis
+from spirillum.measurement.setup_template import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.notes import Note
 from spirillum.robot.load import load
@@ -260,7 +260,7 @@ def _pixel(
     if view_width is not None:
         return parse_option("view-width", view_width, KINDS["length"]) / width, "view width", width
     if video is not None:
-        from spirillum.vision.track.follow import scale_of
+        from spirillum.vision.track.assembly import scale_of
 
         found, film = scale_of(video, setup, folder=folder)
         return found.scale.length_per_pixel, "ruler in the video", film.size[0]

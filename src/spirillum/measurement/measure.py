@@ -17,25 +17,26 @@ from spirillum.files import checked_path, file_name
 from spirillum.measurement.imported import check_track, read_track
 from spirillum.measurement.marks import (
     Marks,
+    Untracked,
     check_pixels,
     check_times,
     corrected,
     frames_read,
     read_marks,
     track_of_marks,
+    untracked,
 )
 from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
 from spirillum.measurement.setup_template import setup_remarks
 from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
-from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, load_setup
-from spirillum.vision.track.follow import Watcher, follow
+from spirillum.vision.track.assembly import Watcher, follow
 from spirillum.vision.track.track import Track
 from spirillum.vision.video.frames import Video
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.files import MARK, text_cell
-from spirillum.formats.labelled import Labelled, Variable
+from spirillum.formats.array_files import Labelled, Variable
 from spirillum.measurement.observations import RATES
 from spirillum.measurement.trials import LEVEL, RATE_NAMES, Measured, Trial
 from spirillum.robot.robot import Robot

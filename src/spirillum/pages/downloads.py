@@ -12,7 +12,7 @@ from typing import Any
 from spirillum.pages.knobs import Settings
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.robot_data import quantity_list
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import robot_text
 from spirillum.version import own_version
 
 MODULES = ("format.js", "matrix.js", "renderer.js", "layers.js", "stage.js", "section.js", "plots.js", "replay.js")

@@ -12,8 +12,7 @@ from typing import Any
 from spirillum.errors import InputError, check_choice, clipped
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 from spirillum.units import KINDS, parse_option, parse_quantity
 
 _SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")

@@ -53,7 +53,7 @@ def calibration_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _row(label: str, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
-    from spirillum.measurement.shown import shown
+    from spirillum.measurement.statistics import shown
 
     seen = shown(item["value"], item.get("low"), item.get("high"), item["unit"])
     return {

@@ -19,8 +19,7 @@ from spirillum.pages.knobs import MODELS, Settings, report_fault
 from spirillum.pages.robot_data import SERIES, SampleRecording, axial_forces_of, finite, quantity_list, shape_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, preset_names
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 
 if TYPE_CHECKING:
     from spirillum.dynamics.plant import Plant, Snapshot

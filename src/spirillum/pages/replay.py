@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.poses import poses_of
-from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.dynamics.run_file import open_run, poses_of, robot_of
 from spirillum.errors import InputError
 from spirillum.files import scratch_folder
 from spirillum.pages.page_robot import PageRobot

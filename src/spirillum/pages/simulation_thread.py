@@ -17,8 +17,7 @@ from spirillum.pages.page_robot import Built, PageRobot, build
 from spirillum.pages.robot_data import prediction_answer, quantity_list, released_answer
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.robot.load import preset_names
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.model_choice import WALLED
 from spirillum.swimming.released_motion import ReleasedMotion
 

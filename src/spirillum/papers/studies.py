@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.biorob2012.published import paper_study
 
 _STUDIES: dict[str, Callable[[], dict[str, Any]]] = {"biorob2012": paper_study}
 

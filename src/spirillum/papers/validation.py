@@ -18,11 +18,15 @@ from spirillum.papers.case import (
     CasePoint,
     CaseQuantity,
     CaseStatement,
+    CaseTrial,
+    CaseValue,
     Provenance,
+    has_table,
     load_case,
     recorded_values,
+    trials_of,
+    values_at,
 )
-from spirillum.papers.case_values import CaseTrial, CaseValue, has_table, trials_of, values_at
 from spirillum.papers.claim import Claim, Verdict
 from spirillum.papers.registry import study_claims
 

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from spirillum.calibration.calibrated import Calibrated
-from spirillum.calibration.estimate import Estimate
+from spirillum.calibration.calibrated import Calibrated, posterior_tree
 from spirillum.calibration.fit import RobotSource, fit_model
+from spirillum.calibration.parameters import Estimate
 from spirillum.calibration.posterior import Sampling
-from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inputs, output_folder, results_folder
 from spirillum.fitted.posterior_file import write_posterior

@@ -31,7 +31,7 @@ def write_flow(flow: Flow, dataset: xr.Dataset, path: Path) -> None:
     if path.suffix == ".nc":
         write_dataset(dataset, path)
     elif path.suffix == ".vti":
-        from spirillum.formats.vtk_image import write_vti
+        from spirillum.formats.array_files import write_vti
 
         write_vti(dataset, path)
     else:

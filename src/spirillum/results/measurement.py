@@ -26,7 +26,7 @@ from spirillum.measurement.measure import (
     measurement_of,
 )
 from spirillum.measurement.series import movement_of, observation_rows, series_of
-from spirillum.measurement.shown import shown
+from spirillum.measurement.statistics import shown
 from spirillum.measurement.trials import MEASURED, Measured, Trial
 from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
 from spirillum.version import versions

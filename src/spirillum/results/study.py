@@ -26,13 +26,12 @@ from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import Drive, Motor
 from spirillum.studies.dataset import read_dataset
-from spirillum.studies.observed import observed_arrays
 from spirillum.studies.ranking import StudyRanking, ranking_of, robot_dims, unit_of_ranked
 from spirillum.studies.run import Progress, computed_study, make_tables, study_fingerprint
 from spirillum.studies.spec import LARGEST_STORED
-from spirillum.studies.study_loader import LARGEST_STUDY, load_study
+from spirillum.studies.study_loader import LARGEST_STUDY, load_study, observed_arrays
 from spirillum.view.figures.comparison import ranking_picture
-from spirillum.view.figures.release import laid_down_picture
+from spirillum.view.figures.release import release_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
 from spirillum.view.figures.sheet import Picture
 from spirillum.worker_pool import checked_crew
@@ -109,7 +108,7 @@ def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     ranking = ranking_of(dataset)
     robot = robot_picture(dataset, ranking)
     first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
-    laid_down = laid_down_picture(dataset, ranking)
+    laid_down = release_picture(dataset, ranking)
     drawn = {"robot": robot, "laid-down": laid_down}
     return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
 
@@ -189,7 +188,7 @@ def study(  # noqa: PLR0913 - the options of the command
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
-    from spirillum.results.study_dataset import StudyDataset
+    from spirillum.results.study_content import StudyDataset
 
     crew = checked_crew(1, workers) if isinstance(workers, str) else checked_crew(workers, None)
     if store is not None and output is not None:

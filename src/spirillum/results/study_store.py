@@ -26,13 +26,21 @@ from spirillum.files import (
 )
 from spirillum.notes import note_attributes, notes_in
 from spirillum.optional_dependencies import import_optional
-from spirillum.studies.cautions import Caution, summed
-from spirillum.studies.dataset import described
-from spirillum.studies.estimate import CostEstimate, Pace, estimate_of, is_large
-from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.regions import Plan, RobotBlock, encoded_region, layout_of, plan_of, region_jobs
+from spirillum.studies.dataset import Caution, described, summed
+from spirillum.studies.regions import (
+    CostEstimate,
+    Pace,
+    Plan,
+    RobotBlock,
+    encoded_region,
+    estimate_of,
+    is_large,
+    layout_of,
+    plan_of,
+    region_jobs,
+)
 from spirillum.studies.run import warnings_of, warnings_of_calibrations
-from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.worker_pool import WorkerPool, map_tasks
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
-from spirillum.robot.fields import Section, field_values
-from spirillum.robot.problems import problems_in, refused_table
+from spirillum.robot.fields import Section, field_values, problems_in, refused_table
 from spirillum.scalars import is_number, is_whole
 from spirillum.units import float_note
 

@@ -1,14 +1,16 @@
-"""Field types of the robot file: convert a quantity with its unit to an SI float; descriptions of fields."""
+"""Field types of the robot file, with units and descriptions, and the validation messages of its tables."""
 
 from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Callable, Iterator
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import dedent
-from typing import Annotated, Any, NamedTuple, get_args
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -17,13 +19,14 @@ from pydantic import (
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
+    ValidationError,
     WithJsonSchema,
 )
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.units import KINDS, Kind, parse_quantity
 
 __all__ = [
@@ -225,3 +228,152 @@ Charge = Annotated[float, *_quantity("charge")]
 InverseCurrent = Annotated[float, *_quantity("inverse current")]
 ResistancePerCurrent = Annotated[float, *_quantity("resistance per current")]
 Factor = Annotated[float, Field(strict=True, ge=1e-3, le=1e3, allow_inf_nan=False)]
+
+
+_OTHERWISE = {
+    "tail.turns": "tail.length over tail.wavelength is the number of turns",
+    "tail.pitch": "tail.wavelength is the pitch of the helix, a length",
+    "tail.radius": "tail.amplitude is the radius of the helix's centreline",
+    "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
+}
+"""Derived quantities that are no fields of a robot file, and their remedies."""
+_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' reverses the tail's rotation"}
+"""Remedies for out-of-range numbers whose meaning is expressed by another field."""
+_LONGEST_FIELD = 200
+"""Characters of a field's name in a sentence, so that what is allowed has room."""
+_MOST_NAMED = 6
+"""Fields with further problems that a sentence names."""
+_M = TypeVar("_M", bound=BaseModel)
+
+
+def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _M | list[str]:
+    """Check a raw table; return the model, or every problem as a sentence, unknown fields first.
+
+    A misspelt field is missing under its right name, too; its own sentence says what to do.
+    """
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        sentences: list[str] = []
+        for problem in sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden"):
+            sentences += _sentences(model, problem, under)
+        return list(dict.fromkeys(sentences))
+    except RecursionError:
+        return ["its tables are nested too deeply; see `spirillum schema robot`"]
+
+
+def refuse(*sentences: str) -> PydanticCustomError:
+    """The error of a table that is refused by whole sentences, for a validator to raise."""
+    return PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(sentences)})
+
+
+def refused_table(problems: Sequence[str], source: str = "") -> InputError:
+    """All problems of a table as one error: the first as its sentence, the fields of the others by name."""
+    every = [f"{source}: {problem}" for problem in problems] if source else list(problems)
+    if len(problems) == 1:
+        return InputError(every[0])
+    fields = [re.split(r"[^\w.-]", problem, maxsplit=1)[0][:_LONGEST_FIELD] for problem in problems[1:]]
+    named = ", ".join(fields[:_MOST_NAMED]) + (", ..." if len(fields) > _MOST_NAMED else "")
+    return InputError(f"{every[0]} (and {len(fields)} more: {named})", every)
+
+
+def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -> Iterable[str]:
+    """Our sentences for one of pydantic's findings."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    names = [str(name) for name in problem["loc"] if name != "[key]"]
+    if kind == "assembly":
+        return str(context["sentences"]).split("\n")
+    field = ".".join([under, *names] if under else names)[:_LONGEST_FIELD]
+    if kind == "value_error" and isinstance(context.get("error"), InputError):
+        return [str(context["error"])]
+    if kind == "quantity":
+        return [f"{field} {context['sentence']}"]
+    if kind == "missing":
+        entry = isinstance(problem["loc"][-1], int)
+        return [
+            f"{field.rpartition('.')[0]} has too few entries" if entry else f"{field} is missing; it has to be given"
+        ]
+    if kind == "extra_forbidden":
+        allowed = list(_fields_at(model, names[:-1]))
+        hint = f": {_OTHERWISE[field]}" if field in _OTHERWISE else did_you_mean(names[-1][:60], allowed)
+        return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
+    return [_refused(problem, field, _range_at(model, names))]
+
+
+def refused_value(error: ValidationError, field: str) -> str:
+    """A sentence for a single value that was refused."""
+    return _refused(error.errors(include_url=False)[0], field)
+
+
+def _refused(problem: Mapping[str, Any], field: str, bounds: str = "") -> str:
+    """A sentence of field, value, and what is allowed: both bounds of a range where they are known."""
+    shown, words = clipped(problem.get("input")), _allowed(problem, field)
+    if bounds and problem["type"] in ("greater_than_equal", "less_than_equal") and field not in _IN_ITS_RANGE:
+        words = bounds
+    given = problem.get("input")
+    if isinstance(given, float) and math.isnan(given):  # the limit that was looked at first says little
+        return f"{field or 'the file'} = nan is no number; allowed: {words}"
+    hint = ""
+    if problem["type"] == "literal_error":
+        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", words))
+    return f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {words}"
+
+
+def _allowed(problem: Mapping[str, Any], field: str) -> str:
+    """Allowed values, for the kinds of errors that name no fields."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    words = {
+        "model_type": f"a [{field}] table",
+        "tuple_type": "a list, [...]",
+        "list_type": "a list, [...]",
+        "dict_type": "a table, { name = value }",
+        "too_long": f"at most {_entries(context.get('max_length'))}",
+        "too_short": f"at least {_entries(context.get('min_length'))}",
+        "int_parsing": "a whole number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "float_parsing": "a number",
+        "float_type": "a number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
+    }
+    if kind in words:
+        return words[kind]
+    if kind in ("greater_than_equal", "less_than_equal") and field in _IN_ITS_RANGE:
+        return _IN_ITS_RANGE[field]
+    own = {"literal_error": "expected", "value_error": "error"}
+    return str(context[own[kind]]) if kind in own else str(problem["msg"]).removeprefix("Input should be ")
+
+
+def _entries(count: Any) -> str:
+    return "one entry" if count == 1 else f"{count} entries"
+
+
+def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
+    """Field names of the section that a location leads to."""
+    for name in names:
+        if name in model.model_fields:
+            found = _section(model.model_fields[name].annotation)
+            model = found or model
+    return tuple(model.model_fields)
+
+
+def _range_at(model: type[BaseModel], names: Sequence[str]) -> str:
+    """Both bounds of the number that a location leads to; empty where there are not two."""
+    for name in names[:-1]:
+        info = model.model_fields.get(name)
+        model = (info and _section(info.annotation)) or model
+    if not names or (info := model.model_fields.get(names[-1])) is None:
+        return ""
+    found = [getattr(item, name) for name in ("ge", "le") for item in all_metadata(info) if hasattr(item, name)]
+    return f"{found[0]:g} to {found[1]:g}" if len(found) == 2 else ""
+
+
+def _section(annotation: Any) -> type[BaseModel] | None:
+    """The section class inside an annotation such as ``Channel | Literal['none']``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in getattr(annotation, "__args__", ()):
+        if (found := _section(part)) is not None:
+            return found
+    return None

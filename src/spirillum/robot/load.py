@@ -1,10 +1,10 @@
-"""From a preset or a TOML file, with overrides, to a checked robot."""
+"""From a preset or a TOML file, with overrides, to a checked robot, and what `robot show` and `robot check` say."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -12,11 +12,12 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.notes import Note
+from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
-from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Derived, Robot
 from spirillum.robot.shape_input import DISPLACED, with_points_of_files
 from spirillum.units import show
@@ -394,3 +395,28 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> 
         problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)
+
+
+def robot_answer(robot: Robot) -> dict[str, Any]:
+    """Fields of a robot and what follows from them, as `spirillum robot show` prints them."""
+    derived = {name: quantity(item.value, item.unit, meaning=item.meaning) for name, item in robot.derived().items()}
+    fields = {
+        path: value if unit is None else quantity(value, unit.replace("**", "^"))
+        for path, value, unit in field_values(robot)
+    }
+    content = {"robot": robot.name, "fields": fields, "derived": derived}
+    return envelope("robot", content, robot.warnings)
+
+
+def checked(robot: str, overrides: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Problems and warnings of a robot file."""
+    raw_table(robot)
+    try:
+        return (), load(robot, **overrides).warnings
+    except InputError as error:
+        return error.problems, ()
+
+
+def check_answer(robot: str, problems: Sequence[str], warnings: Sequence[str]) -> dict[str, Any]:
+    """Whether a robot file is valid, as `spirillum robot check` prints it."""
+    return envelope("check", {"robot": robot, "valid": not problems, "problems": list(problems)}, warnings)

@@ -13,8 +13,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.costs import check_memory
-from spirillum.errors import InputError
+from spirillum.errors import InputError, check_memory
 from spirillum.robot.geometry import Centreline, Seal, StripeColour, centreline
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline

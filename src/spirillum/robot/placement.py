@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 
 from spirillum.arrays import Samples
 from spirillum.robot.arguments import Options
-from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw
-from spirillum.robot.problems import refuse
+from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw, refuse
 from spirillum.units import show
 
 Ends = Literal["open", "closed"]

@@ -1,21 +1,22 @@
-"""The robot: checked tables whose parts fit together, and what follows from them."""
+"""The robot: checked tables whose parts fit together, what follows from them, and its text as a robot file."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
 
-from spirillum.kernels.axial_motor import CONSTANT, SLOPE
-from spirillum.kernels.drive import MOTOR, windings
+from spirillum.files import MARK
+from spirillum.kernels.motor import CONSTANT, MOTOR, SLOPE, windings
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.fields import field_values
+from spirillum.robot.fields import default_of, field_values, refuse
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
-from spirillum.robot.problems import refuse
 from spirillum.robot.tables import Battery, Motor, RobotTables
-from spirillum.units import display_unit, in_unit, show
+from spirillum.units import USUAL, Kind, display_unit, for_people, in_unit, parse_quantity, show, shown_in
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901)."""
@@ -164,3 +165,52 @@ class Robot(RobotTables):
             "centre_of_mass": Derived(float(centre), "m", f"x of the centre of mass ({assumed})"),
             "centre_of_buoyancy": Derived(float(buoyancy), "m", "x of the centre of buoyancy"),
         }
+
+
+def robot_text(robot: Robot, comment: str = "") -> str:
+    """The text of a file from which `spirillum.load` gives the same robot."""
+    sections: dict[str, list[str]] = {"": []}
+    for path, text in _fields(robot):
+        section, _, name = path.rpartition(".")
+        sections.setdefault(section, []).append(f"{name} = {text}")
+    head = [*comment.splitlines(), f"Every field that is set, {MARK}."]
+    lines = [f"# {line}" for line in head] + sections.pop("")
+    for section, entries in sections.items():
+        lines += ["", f"[{section}]", *entries]
+    return "\n".join(lines) + "\n"
+
+
+def with_numbers(robot: Robot, values: dict[str, float]) -> Robot:
+    """The robot with numbers of its tables replaced; the whole is not checked anew."""
+    for path, value in values.items():
+        robot = _replaced(robot, path.split("."), value)
+    return robot
+
+
+def _replaced(table: Any, names: list[str], value: float) -> Any:
+    first, *rest = names
+    inner = _replaced(getattr(table, first), rest, value) if rest else value
+    return table.model_copy(update={first: inner})
+
+
+def _fields(robot: Robot) -> Iterator[tuple[str, str]]:
+    for path, value, unit in field_values(robot):
+        if value is None:
+            if default_of(robot, path) is not None:
+                yield path, '"none"'
+        elif unit is None:
+            yield path, json.dumps(list(value) if isinstance(value, (tuple, list)) else value, ensure_ascii=False)
+        elif isinstance(value, tuple):
+            yield path, json.dumps([_with_unit(item, unit) for item in value], ensure_ascii=False)
+        else:
+            yield path, f'"{_with_unit(float(value), unit)}"'
+
+
+def _with_unit(value: float, unit: str) -> str:
+    """In the unit that people read where that is exactly the same number, else in SI."""
+    shown = for_people(unit)
+    if shown in USUAL.get(unit, ()):
+        text = f"{shown_in(value, shown):.12g} {shown}"
+        if parse_quantity(text, Kind("quantity", unit, f"1 {unit}", f"-1e30 {unit}", f"1e30 {unit}")) == value:
+            return text
+    return f"{value!r} {unit}"

@@ -14,7 +14,7 @@ from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.files.limits import MOST_POINTS
 from spirillum.files.reading import csv_rows, number_in
-from spirillum.robot.problems import refuse
+from spirillum.robot.fields import refuse
 from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, centre_line, mean_of_inverse
 from spirillum.scalars import is_number
 from spirillum.units import KINDS, parse_quantity, show

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int
 
 from spirillum.arrays import Samples
-from spirillum.costs import check_memory
+from spirillum.errors import check_memory
 from spirillum.robot.outline import Outline, Piece, Segment, Smooth
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from spirillum.errors import InputError
-from spirillum.kernels.drive import MOST_POINTS
+from spirillum.kernels.motor import MOST_POINTS
 from spirillum.notes import Note
 from spirillum.robot.fields import (
     NONE,
@@ -34,10 +34,10 @@ from spirillum.robot.fields import (
     TorqueConstant,
     Voltage,
     quantity_schema,
+    refuse,
 )
 from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
-from spirillum.robot.problems import refuse
 from spirillum.robot.shape_input import DISPLACED
 from spirillum.units import KINDS, show
 

@@ -1,4 +1,4 @@
-"""The answer of a study as a labelled Dataset: coordinates are the question, variables the answer."""
+"""The result of a study as a labelled Dataset, with its cautions: coordinates are the question."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Values
+from spirillum.arrays import Flags, Values
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import QUANTITIES, attributes
-from spirillum.studies.band import BandTask, placed_at, with_band
-from spirillum.studies.factorial import main_effects
-from spirillum.studies.motion_columns import HeldTask, TrialTask, column_variables
-from spirillum.studies.observed import ObservedArrays
+from spirillum.robot.limits import broken, caution_code
+from spirillum.studies.columns import BandTask, HeldTask, TrialTask, column_variables, placed_at, with_band
 from spirillum.studies.released_robots import (
     AT_RUNS,
     FACTORS,
@@ -27,15 +25,19 @@ from spirillum.studies.released_robots import (
     INFERRED_BY,
     READ,
     WINDOWS,
-    LaidDownTask,
+    ReleaseTask,
     SettledTask,
     levels,
     levels_of_readings,
+    main_effects,
     settled_variables,
 )
 from spirillum.studies.spec import LaidDown
-from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import REASONS, ModelTask, Part, gathered
+from spirillum.swimming.cautions import accuracy_limits
+from spirillum.swimming.reynolds import reynolds_limits, stokes_flow_problem
+from spirillum.swimming.steady import STEADY, Swimming, requirements
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -51,7 +53,7 @@ _MEANINGS = {
 }
 
 
-def laid_down_coordinates(ranges: LaidDown) -> dict[str, Any]:
+def release_coordinates(ranges: LaidDown) -> dict[str, Any]:
     """Coordinates of the dimensions `run`, `window`, `inferred_by` and `factor`."""
     about = {"units": "1", "source": "design of the runs"}
     found: dict[str, Any] = {
@@ -68,8 +70,8 @@ def laid_down_coordinates(ranges: LaidDown) -> dict[str, Any]:
     return found
 
 
-def laid_down_variables(
-    answers: Sequence[tuple[LaidDownTask, Part]], robots: Sequence[str], shape: Sequence[int]
+def release_variables(
+    answers: Sequence[tuple[ReleaseTask, Part]], robots: Sequence[str], shape: Sequence[int]
 ) -> dict[str, Any]:
     """Every reading of every run, the least and largest of a robot's, and the main effects of the factors.
 
@@ -124,7 +126,7 @@ _BAND = {
 class BesideModels(NamedTuple):
     """Answers of robots one by one, beside those of the models."""
 
-    laid_down: Sequence[tuple[LaidDownTask, Part]] = ()
+    laid_down: Sequence[tuple[ReleaseTask, Part]] = ()
     """Of robots that made the runs of a design."""
     settled: Sequence[tuple[SettledTask, Part]] = ()
     """Of those that were followed to their steady motions."""
@@ -207,8 +209,8 @@ def laid_out(
     if beside.settled:
         data |= settled_variables(beside.settled, robots, shape)
     if beside.laid_down:
-        data |= laid_down_variables(beside.laid_down, robots, shape)
-        coordinates |= laid_down_coordinates(study.laid_down)
+        data |= release_variables(beside.laid_down, robots, shape)
+        coordinates |= release_coordinates(study.laid_down)
     return xr.Dataset(data, coords=coordinates)
 
 
@@ -336,3 +338,77 @@ def read_dataset(path: Path, robots: int) -> xr.Dataset | None:
     except InputError:
         return None
     return found if found.attrs.get("checksum") == _checksum(found) else None
+
+
+class Caution(NamedTuple):
+    """A requirement that robots of a task break: one of accuracy, or one without which they have no answer."""
+
+    model: str
+    flag: str
+    robots: int
+    """How many."""
+    sentence: str
+    """The first of them in words."""
+    refused: bool = False
+    """Whether they have no answer for it."""
+
+
+def _refusals(task: ModelTask, part: Part) -> list[Caution]:
+    """Why robots of a task have no answer, one for each requirement; each robot counts for the first that it breaks."""
+    left = np.any(part["outside"] != 0, axis=-1)
+    found = []
+    for limit in broken(requirements(task.batch, find_swimmer_model(task.model))):
+        of_this = left & ~np.broadcast_to(limit.holds, left.shape)
+        if of_this.any():
+            sentence = limit.sentence(int(np.argmax(of_this)))
+            found.append(Caution(task.model, limit.flag, int(np.count_nonzero(of_this)), sentence, refused=True))
+        left &= ~of_this
+    found += _beyond_stokes(task, part, left)
+    left &= ~np.any(part["outside"] == REASONS.index("beyond-stokes"), axis=-1)
+    if left.any():
+        lacking = np.count_nonzero(part["outside"][int(np.argmax(left))])
+        sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} readings of the friction"
+        found.append(Caution(task.model, "other", int(np.count_nonzero(left)), sentence, refused=True))
+    return found
+
+
+def _beyond_stokes(task: ModelTask, part: Part, left: Flags) -> list[Caution]:
+    """The refusal of robots that move far outside Stokes flow, under the first reading of the friction that has one."""
+    code = REASONS.index("beyond-stokes")
+    refused = left & np.any(part["outside"] == code, axis=-1)
+    if not refused.any():
+        return []
+    rows, reading = np.flatnonzero(refused), int(np.argmax(part["outside"][int(np.argmax(refused))] == code))
+    numbers = [part[name][rows, reading] for name in ("reynolds_number", "tail_reynolds_number")]
+    batch = task.batch.taken(rows)
+    sentence = stokes_flow_problem(batch, reynolds_limits(batch, *numbers))
+    return [Caution(task.model, "beyond-stokes", len(rows), sentence, refused=True)]
+
+
+def cautions(task: ModelTask, part: Part) -> list[Caution]:
+    """What to be careful about in a task's answer, and why robots have none, one for each kind."""
+    size = task.batch.size
+    first = Swimming(**{item.name: part[item.name][:, 0] for item in STEADY}, valid=part["outside"][:, 0] == 0)
+    found = _refusals(task, part)
+    for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
+        holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
+        holds |= part["outside"][:, 0] == REASONS.index("beyond-stokes")
+        count = int(np.count_nonzero(~holds))
+        if count:
+            found.append(Caution(task.model, limit.flag, count, limit.caution(int(np.argmin(holds)))))
+    return found
+
+
+def summed(found: Iterable[Caution], robots: int) -> list[Note]:
+    """A note for each kind of caution, over all tasks of a study."""
+    groups: dict[tuple[str, str, bool], list[Caution]] = {}
+    for caution in found:
+        groups.setdefault((caution.model, caution.flag, caution.refused), []).append(caution)
+    return [
+        Note(
+            "without-answer" if refused else caution_code(flag),
+            f"{sum(caution.robots for caution in group)} of {robots} robots "
+            f"{'have no answer ' if refused else ''}({model}), the first: {group[0].sentence}",
+        )
+        for (model, flag, refused), group in groups.items()
+    ]

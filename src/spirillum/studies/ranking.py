@@ -49,17 +49,17 @@ class QuantityRanking(NamedTuple):
         return f"{self.title}, {unit}".removesuffix(", 1")
 
 
-LET_GO = "forward_velocity_settled"
+STEADY_SPEED = "forward_velocity_settled"
 """The speed in steady motion after release."""
 HELD, TRIAL = "forward_velocity_held", "forward_velocity_trial"
 """The speed by `tube` where no model of the study computes walls, and that of a trial."""
-_BESIDE = (HELD, TRIAL, LET_GO)
+_BESIDE = (HELD, TRIAL, STEADY_SPEED)
 """Speeds beside that of a model, where the study has them."""
 RANKED = {
     "forward_velocity": QuantityRanking("speed", "fastest", 1.0),
     HELD: QuantityRanking("tube", "fastest at a fixed pose by tube", 1.0),
     TRIAL: QuantityRanking("trial", "fastest in a trial", 1.0),
-    LET_GO: QuantityRanking("steady", "fastest once settled", 1.0),
+    STEADY_SPEED: QuantityRanking("steady", "fastest once settled", 1.0),
     "hydrodynamic_efficiency": QuantityRanking("efficiency", "most efficient", 1.0),
     "motor_current": QuantityRanking("current", "least current", -1.0),
     "shaft_power": QuantityRanking("power", "least power", -1.0),
@@ -159,7 +159,7 @@ class StudyRanking:
         if not self.robots:
             return "no robot has an answer"
         first = self.robots[0]
-        by = LET_GO if np.isfinite(first.values.get(LET_GO, np.nan)) else "forward_velocity"
+        by = STEADY_SPEED if np.isfinite(first.values.get(STEADY_SPEED, np.nan)) else "forward_velocity"
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
@@ -168,7 +168,7 @@ class StudyRanking:
     @property
     def settled(self) -> bool:
         """Whether robots were released, and are ordered by the speed in steady motion."""
-        return LET_GO in self.quantities
+        return STEADY_SPEED in self.quantities
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -226,9 +226,9 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     names = list(_names(dataset))
     known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
     beside = [name for name in _BESIDE if name in chosen and bool(np.isfinite(chosen[name].values).any())]
-    known[1:1] = [name for name in beside if name != LET_GO]
-    if LET_GO in beside:
-        known.insert(0, LET_GO)
+    known[1:1] = [name for name in beside if name != STEADY_SPEED]
+    if STEADY_SPEED in beside:
+        known.insert(0, STEADY_SPEED)
     values = {name: _flat(chosen, name, names) for name in known}
     values[known[-1]] = np.abs(values[known[-1]])  # a motor that turns the other way draws no less
     low, high, kind = _ends(chosen, known, names)

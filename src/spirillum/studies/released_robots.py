@@ -1,4 +1,7 @@
-"""Robots of a study released in their tubes: the runs of an experiment with nothing fitted, and steady states.
+"""Robots of a study released in their tubes: the runs of a factorial experiment, and steady states.
+
+Half of all combinations suffice: with the last factor's level the product of the others' (with five factors a design of
+resolution V), no main effect is confounded with another or with an interaction of two (`box2005`).
 
 Publications do not report the initial placement. For the experiment, each robot makes the runs of a design of
 experiments over what decides: gap and pitch at release, time until its motor is switched on, height of
@@ -15,6 +18,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
@@ -31,18 +35,54 @@ from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.factorial import Levels, half_fraction
-from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import Contact, LaidDown
-from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
+from spirillum.swimming.released_motion import State
 from spirillum.swimming.steady import swim
-from spirillum.swimming.steady_state import State
 from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+"""Levels of the factors in each run, (runs, factors): -1 low, +1 high."""
+
+
+def half_fraction(factors: int) -> Levels:
+    """The levels of a half fraction of all combinations, the last factor's the product of the others'.
+
+    Returns:
+        (2**(factors - 1), factors); -1 low, +1 high. Every column adds up to 0, and any two are orthogonal from three
+        factors on.
+    """
+    free = np.array(list(product((-1, 1), repeat=factors - 1)), dtype=np.intp)
+    return np.concatenate([free, np.prod(free, axis=1, keepdims=True)], axis=1)
+
+
+def main_effects(values: Values, levels: Levels) -> Values:
+    """Mean at the high level less mean at the low one, for each factor; runs without an answer are left out.
+
+    Args:
+        values: answers of the runs, (..., runs); NaN where there is none.
+        levels: of the factors, (runs, factors).
+
+    Returns:
+        (..., factors); NaN where a level has no answer.
+    """
+    known = np.isfinite(values)
+    filled = np.where(known, values, 0.0)
+    means = []
+    for sign in (1, -1):
+        chosen = (levels == sign).astype(float)
+        count = known.astype(float) @ chosen
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means.append(filled @ chosen / np.where(count > 0, count, np.nan))
+    found: Values = means[0] - means[1]
+    return found
+
 
 FACTORS = ("gap", "pitch", "wait", "roughness", "friction_coefficient")
 """What differs between the runs of a robot."""
@@ -89,7 +129,7 @@ def levels_of_readings() -> Levels:
     return np.concatenate([np.repeat(runs, len(WINDOWS), axis=0), windows], axis=1)
 
 
-def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
+def release_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
     """Release of a robot in each run; its steepest pitch is what gap and tail allow."""
     batch, found = RobotBatch.of(robot), []
     for signs in levels():
@@ -100,7 +140,7 @@ def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
 
 
 @dataclass(frozen=True)
-class LaidDownTask(OneRobot):
+class ReleaseTask(OneRobot):
     """All runs of one robot."""
 
     ranges: LaidDown
@@ -120,7 +160,7 @@ class LaidDownTask(OneRobot):
 
         NaN for a run that its robot cannot make, and over a window that it does not reach.
         """
-        runs = laid_down_runs(self.robot, self.ranges)
+        runs = release_runs(self.robot, self.ranges)
         read = [self._read(laid) for laid in runs]
         part: Part = {
             name: np.array([[[window[name] for window in run] for run in read]], dtype=float) for name in AT_RUNS
@@ -207,11 +247,11 @@ def inferred(robot: Robot, seen: Part) -> Part:
     return {name: np.stack(values, axis=-1).reshape(*shape, len(INFERRED_BY)) for name, values in columns.items()}
 
 
-def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[LaidDownTask]:
+def release_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[ReleaseTask]:
     """One task for each robot, numbered from `first`; none where none is requested."""
     if loaded.study.predicted:
         for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield LaidDownTask(number, np.array([index]), robot, loaded.study.laid_down)
+            yield ReleaseTask(number, np.array([index]), robot, loaded.study.laid_down)
 
 
 def without_answer(parts: Iterable[Part]) -> list[Note]:

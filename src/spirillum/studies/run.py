@@ -15,26 +15,21 @@ from spirillum.dynamics.comparison import uneven_models
 from spirillum.files import atomic_write, opened
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.library import prepared_tables
+from spirillum.fluid.tube.library import TabledTube, prepared_tables
 from spirillum.fluid.tube.progress_messages import ANNOUNCED
 from spirillum.fluid.tube.stages import StageName
-from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.band import BandTask, band_tasks, left_out
-from spirillum.studies.cautions import cautions, summed
-from spirillum.studies.dataset import BesideModels, assembled
-from spirillum.studies.motion_columns import HeldTask, held_tasks, trial_notes, trial_tasks
-from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.released_robots import laid_down_tasks, not_settled, settled_basis, settled_tasks, without_answer
-from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.columns import BandTask, HeldTask, band_tasks, held_tasks, left_out, trial_notes, trial_tasks
+from spirillum.studies.dataset import BesideModels, assembled, cautions, summed
+from spirillum.studies.released_robots import not_settled, release_tasks, settled_basis, settled_tasks, without_answer
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import ModelTask, Part, StudyTask, groups, run_job, tasks
 from spirillum.swimming.band import left_open
-from spirillum.swimming.cautions import calibration_warnings
-from spirillum.swimming.drive_warnings import CONSTANT_TORQUE
+from spirillum.swimming.cautions import CONSTANT_TORQUE, calibration_warnings
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import requirements
@@ -115,7 +110,7 @@ def computed_study(
     todo += band_tasks(loaded, len(todo))
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
     with_table = _with_table(loaded) if followed else {}
-    runs = list(laid_down_tasks(loaded, with_table, len(todo)))
+    runs = list(release_tasks(loaded, with_table, len(todo)))
     settled = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
     holding = list(held_tasks(loaded, len(todo) + len(runs) + len(settled)))
     trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(settled) + len(holding)))

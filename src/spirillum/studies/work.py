@@ -19,12 +19,10 @@ from spirillum.kernels.native import rows_in_one_thread
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.studies.observed import ObservedArrays, observed_at
-from spirillum.studies.study_loader import LoadedStudy
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays, observed_at
 from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of, knows_torque, without_torque
-from spirillum.swimming.steady import requirements, speed_error, swim
-from spirillum.swimming.steady_quantities import STEADY, Swimming
+from spirillum.swimming.steady import STEADY, Swimming, requirements, speed_error, swim
 
 AT_RATES = (
     "forward_velocity",

@@ -31,8 +31,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.model_options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import GAP_BAND, contact_pitch, largest_gap
-from spirillum.swimming.steady import requirements
-from spirillum.swimming.steady_quantities import STEADY, Swimming
+from spirillum.swimming.steady import STEADY, Swimming, requirements
 from spirillum.units import show
 
 PLACES_PER_FIELD = 3

@@ -1,4 +1,4 @@
-"""Cautions of a predicted motion: its Reynolds number, its calibration, its pose."""
+"""Cautions of a predicted motion: Reynolds number, calibration, pose, and the drive behind it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
+from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.reynolds import reynolds_limits
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Swimming
 from spirillum.units import show
 
 NO_WEIGHT = Note(
@@ -86,3 +87,100 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     if not has_table(batch):
         more = f"`spirillum prepare --stage straight` ({TABLE_TAKES}) makes the band quick"
     return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]
+
+
+CONSTANT_TORQUE = Note(
+    "constant-torque",
+    "drive.kind = 'torque' assumes the same torque at every rate: speed and rates fall as one over the viscosity",
+    ("drive.kind",),
+)
+"""What a drive of given torque takes for granted."""
+
+
+def drive_warnings(
+    robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
+) -> list[Note]:
+    """Warnings about friction, rate and drive of an answer.
+
+    Args:
+        robot: the robot.
+        model: the hydrodynamic model.
+        reading: reading of the friction.
+        result: the answer.
+        rate: prescribed tail rate, rad/s; None: the robot's own drive.
+    """
+    motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
+    step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
+    if np.isfinite(step_out) and not follows:
+        return [
+            Note(
+                "field-slips",
+                f"the field is faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips, and rates and "
+                "speed are averages; lower the field's rate",
+                ("magnetic.rotation_rate",),
+            )
+        ]
+    factors = robot.calibration.get(model.name)
+    found = []
+    if reading == "paper" and factors is not None and factors.body_rotation < 1:
+        found.append(
+            Note(
+                "friction-counted-twice",
+                f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already includes friction on the "
+                "body, which 'paper' counts again; use --friction rotor",
+                (f"calibration.{model.name}.body_rotation",),
+            )
+        )
+    if rate is None and robot.drive is not None and robot.drive.kind == "torque":
+        found.append(CONSTANT_TORQUE)
+    if not motor_driven:
+        return found
+    if rate is None:
+        return found + _unset_friction_warning(robot, reading)
+    return found + _prescribed_rate_warnings(robot, reading, result)
+
+
+def _against_the_drive(robot: Robot, result: Swimming) -> bool:
+    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+    return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
+
+
+def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
+    if reading == "none":
+        words = "friction 'none' lets the motor turn faster than any real one: rates are upper bounds; use 'rotor'"
+        return [Note("friction-unset", words, ("friction.reading",))]
+    if robot.friction.effective is not None or robot.motor is None:
+        return []
+    name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
+    own = f"{name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
+    words = f"friction.effective is unset: only {own} acts, and rates are upper bounds; set it, or calibrate"
+    if reading == "body":
+        words = f"friction.effective is unset: the body has no wall friction, the joint {own}; set it, or calibrate"
+    return [Note("friction-unset", words, ("friction.effective",))]
+
+
+def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[Note]:
+    found = []
+    if reading in ("rotor", "paper"):
+        if robot.friction.effective is not None:
+            words = "friction.effective is ignored: with a tail rate it is inferred from (17) and (18)"
+            found.append(Note("friction-ignored", words, ("friction.effective",)))
+        if _against_the_drive(robot, result):
+            words = "the tail turns against its motor: the inferred friction has no meaning; check the rate's sign"
+            found.append(Note("tail-against-motor", words, ("motor.polarity", "tail.handedness", "effective_friction")))
+        elif result.effective_friction[0] < 0:
+            words = (
+                "the inferred effective friction is negative: the model's torque exceeds the motor's at this rate; "
+                "check rate and motor"
+            )
+            found.append(Note("friction-negative", words, ("effective_friction",)))
+    else:
+        words = (
+            f"friction '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained; "
+            "use --friction rotor"
+        )
+        found.append(Note("torque-unexplained", words, ("motor_residual_torque",)))
+    if result.electrical_power[0] < 0:
+        words = "the tail drives the motor at this rate: current and electrical power are negative; check the rate"
+        found.append(Note("tail-against-motor", words, ("motor_current", "electrical_power")))
+    return found

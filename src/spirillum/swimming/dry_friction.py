@@ -20,14 +20,13 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, MeanFlow, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.kernels.axial_motor import contact_drag
+from spirillum.kernels.motor import contact_drag
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.swimming.balance import joined, with_body_factors
-from spirillum.swimming.steady import swim
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Swimming, swim
 
 _SMOOTH = 1e-4
 """v_r over the sliding speed of a body that turns as fast as its tail, as in a run with six degrees of freedom."""

@@ -3,7 +3,7 @@
 A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
 discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
 discrepancy then goes onto speed and rates, independently for each draw, for a tail that was not observed may be missed
-by as much as those that were (of one that was observed it is known better, see `spirillum.swimming.discrepancy`).
+by as much as those that were (of one that was observed it is known better, see `spirillum.swimming.drawn_resistance`).
 Torques, currents, powers and efficiencies are computed from the rates and speeds that it leaves. An interval is of the
 robot's own motion, not of a single measured trial.
 """
@@ -19,18 +19,22 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.tabled import TabledTube, tabled
+from spirillum.fluid.tube.library import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques
-from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
-from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
+from spirillum.swimming.drawn_resistance import (
+    AxialTable,
+    PosteriorFor,
+    TubeResistance,
+    chebyshev_points,
+    drawn_discrepancy,
+)
+from spirillum.swimming.drives import battery_voltage, run_time, steady_current
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
-from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.reynolds import without_reynolds_bound
-from spirillum.swimming.steady import friction_reading
-from spirillum.swimming.steady_quantities import LEVEL, STEADY, Intervals, Swimming
+from spirillum.swimming.steady import LEVEL, STEADY, Intervals, Swimming, friction_reading
 
 OF_TORQUE = (
     "tail_torque",

@@ -16,7 +16,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.cautions import calibration_warnings
-from spirillum.swimming.freedom import Motion
+from spirillum.swimming.released_motion import Motion
 from spirillum.swimming.steady import requirements, swim
 
 

@@ -31,17 +31,15 @@ from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import (
     accuracy_limits,
     calibration_warnings,
+    drive_warnings,
     no_band_warnings,
 )
-from spirillum.swimming.discrepancy import PosteriorFor
-from spirillum.swimming.drive_warnings import drive_warnings
-from spirillum.swimming.freedom import Motion, motion_of
+from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.released_motion import ReleasedMotion
+from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
 from spirillum.swimming.scenario import Scenario, resolve_scenario
-from spirillum.swimming.steady_quantities import STEADY, Intervals, Swimming, headline
-from spirillum.swimming.steady_state import SteadyState
+from spirillum.swimming.steady import STEADY, Intervals, Swimming, headline
 from spirillum.units import show
 
 

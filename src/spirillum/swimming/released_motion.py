@@ -1,12 +1,23 @@
-"""Motion of a robot after release in its tube, as data: the columns beside its held answer."""
+"""Released motion as data: what is free to move, the steady state in the tube, columns beside an axial answer.
+
+Held, the whole robot has one velocity along x. Released, no force and no lateral torque acts on it, and the motion is
+a screw: seen from the tail, the velocity U of the origin and the rotation w = (omega, Omega_y, Omega_z) of the tail are
+constant, so that the robot advances along the fixed direction of w at U.w/|w| while its axis circles around it.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, cast, get_args
 
+import numpy as np
+
+from spirillum.arrays import PerRobot, Samples
 from spirillum.envelope import quantity
+from spirillum.errors import InputError, check_choice
+from spirillum.fluid.model import SwimmerModel
 from spirillum.quantities import QUANTITIES
 
 HELD = "held"
@@ -51,3 +62,143 @@ class ReleasedMotion:
             name: quantity(value, QUANTITIES[name].unit, **over.get(name, {})) for name, value in self.values.items()
         }
         return {**self.basis, **values}
+
+
+State = Literal["steady", "orbits", "goes around", "changing"]
+"""A fixed point of the return map; one up to the azimuth, without weight; motion around the tube, against its weight;
+or none of these within the turns that were followed.
+"""
+
+END_STATES = {
+    "reaches-end": "nose or tail reached an end of the channel",
+    "left-table": "the robot tilted farther than its table of resistances is followed",
+    "standing": "the robot stands still: dry friction holds it, or its drive is off",
+    "orbit": "the robot went around the tube against its weight",
+    "ceiling": "the robot swims along the upper half of the tube",
+    "steady": "speed and tail rate are steady over turns of the tail",
+    "changing": "the motion still changes",
+}
+"""Final states of a released robot, the first that applies, and what they mean."""
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """Pose of a free robot in its tube over its last turn of the tail (around the tube: over the last circuit).
+
+    SI; azimuths about +x from the lowest place, pitch away from the wall, yaw to +y at the lowest place.
+    """
+
+    state: State
+    """`steady`, `orbits`, `goes around` or `changing`."""
+    azimuth: float
+    """Azimuth of the body's centre, mean, rad; NaN where it goes around."""
+    gap: float
+    """Smallest distance of body and wall, mean, m."""
+    gap_range: tuple[float, float]
+    """Its least and largest value."""
+    pitch: float
+    """Mean pitch against the wall, rad."""
+    yaw: float
+    """Mean yaw against the wall, rad."""
+    orbit_rate: float
+    """Rate of the azimuth, mean, rad/s."""
+    contact_force: float
+    """Load on asperities, mean, N."""
+    time: float
+    """Time over which the motion was followed since release, s."""
+    approach_time: float
+    """Time constant with which a small distance from the steady motion decays, s; NaN where there is none."""
+    ended: str = ""
+    """Why the motion was not followed to a steady one, in half a sentence; empty where it was."""
+
+    @property
+    def statement(self) -> str:
+        """Whether a steady motion was reached, and what the means are over, a sentence."""
+        if self.state == "steady":
+            return "a steady motion was reached: every turn of the tail brings back this place"
+        if self.state == "changing":
+            return f"no steady motion was reached: {self.ended}; all values are means over the last turn of the tail"
+        circuit = abs(2.0 * math.pi / self.orbit_rate) if self.orbit_rate else math.inf
+        if self.state == "orbits":
+            around = f"orbits the tube's axis in {circuit:.3g} s" if math.isfinite(circuit) else "keeps any azimuth"
+            return f"no steady place was reached: nothing tells one azimuth from another, and the robot {around}"
+        return (
+            f"no steady motion was reached: its weight does not hold the robot, which goes around the tube in "
+            f"{circuit:.3g} s; all values are means over a circuit"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object `lying` of an answer."""
+        low, high = self.gap_range
+        over = "a circuit" if self.state == "goes around" else "a turn of the tail"
+        return {
+            "state": self.state,
+            "statement": self.statement,
+            "azimuth": quantity(self.azimuth, "rad"),
+            "gap": quantity(self.gap, "m", low=low, high=high, kind="range", over=over),
+            "wall_pitch": quantity(self.pitch, "rad"),
+            "wall_yaw": quantity(self.yaw, "rad"),
+            "orbit_rate": quantity(self.orbit_rate, "rad/s"),
+            "contact_force": quantity(self.contact_force, "N"),
+            "followed_time": quantity(self.time, "s"),
+            "approach_time": quantity(self.approach_time, "s"),
+        }
+
+
+Motion = Literal["held", "free"]
+"""Lateral motion and tilt held, or released."""
+
+LINKS = np.zeros((12, 7))
+"""Twists of body and rotor from the seven rates (U, Omega_b, omega_m), all about the origin in body axes."""
+LINKS[:6, :6] = LINKS[6:, :6] = np.eye(6)
+LINKS[9, 6] = 1.0
+
+
+class Screw(NamedTuple):
+    """The free motion, as long as both parts turn steadily; SI."""
+
+    speed: PerRobot
+    """Speed along the axis of the screw, positive where the nose leads, m/s."""
+    tilt: PerRobot
+    """Angle between the motor axis and the axis of the screw, rad."""
+    radius: PerRobot
+    """Radius of the helix on which the origin moves, m."""
+
+    @classmethod
+    def of(cls, shared: Samples, body_rate: PerRobot, tail_rate: PerRobot) -> Screw:
+        """The screw of robots with such rates.
+
+        Args:
+            shared: U (3), Omega_y and Omega_z per rate of body and rotor, (n, 5, 2), from `balance.released`.
+            body_rate: Omega, rad/s.
+            tail_rate: omega, rad/s.
+        """
+        moving = shared[..., 0] * body_rate[..., None] + shared[..., 1] * tail_rate[..., None]
+        velocity = moving[..., :3]
+        spin = np.concatenate([np.broadcast_to(tail_rate, moving.shape[:-1])[..., None], moving[..., 3:]], axis=-1)
+        size = np.linalg.norm(spin, axis=-1)
+        turning = np.where(size > 0, size, np.inf)
+        forward = np.where(tail_rate < 0, -1.0, 1.0)
+        along = forward * np.sum(velocity * spin, axis=-1) / turning
+        return cls(
+            speed=np.where(size > 0, along, velocity[..., 0]),
+            tilt=np.arctan2(np.linalg.norm(spin[..., 1:], axis=-1), np.abs(tail_rate)),
+            radius=np.linalg.norm(np.cross(spin, velocity), axis=-1) / turning**2,
+        )
+
+
+def motion_of(name: str) -> Motion:
+    """The motion of that name."""
+    check_choice("motion", name, get_args(Motion))
+    return cast("Motion", name)
+
+
+def check_full(model: SwimmerModel) -> None:
+    """Refuse a model that does not know all that a free motion needs."""
+    if model.axial_only:
+        why = "knows the entries along and about the motor axis only"
+    elif model.placed:
+        why = "answers at one place in the channel, which a free robot leaves"
+    else:
+        return
+    raise InputError(f"motion = 'free' with model '{model.name}', which {why}; allowed: motion 'held', or rft, slender")

@@ -18,13 +18,12 @@ from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
-from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
+from spirillum.swimming.drawn_resistance import PosteriorFor, posterior_for_of
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.preparation import prepared
 from spirillum.swimming.reynolds import in_stokes_flow, reynolds_limits, stokes_flow_problem
-from spirillum.swimming.robot_preparation import prepared
-from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_error
-from spirillum.swimming.steady_quantities import Swimming
+from spirillum.swimming.steady import Swimming, calibrated_balance, friction_reading, speed_error
 from spirillum.units import KINDS, parse_option
 
 

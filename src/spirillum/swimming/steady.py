@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 
 from spirillum.argument_validation import number_array
 from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.display import DisplayMixin
+from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.quantities import QUANTITIES, Quantity
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
-from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
-from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of
-from spirillum.swimming.motor import battery_voltage, run_time
+from spirillum.swimming.drives import DriveState, at_rate, battery_voltage, driven, one_piece, run_time
+from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
-from spirillum.swimming.steady_quantities import Swimming
 
 __all__ = [
     "Rates",
@@ -37,6 +38,106 @@ __all__ = [
     "swim",
     "swimming_of",
 ]
+
+
+LEVEL = 0.95
+"""Level of the intervals."""
+
+
+@dataclass(frozen=True, repr=False)
+class Swimming(DisplayMixin):
+    """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`.
+
+    Units, meanings and sources stand in `spirillum.quantities`.
+    """
+
+    forward_velocity: PerRobot
+    advance_per_radian: PerRobot
+    tail_rotation_rate: PerRobot
+    body_rotation_rate: PerRobot
+    motor_rotation_rate: PerRobot
+    tail_torque: PerRobot
+    drive_torque: PerRobot
+    motor_current: PerRobot
+    battery_voltage: PerRobot
+    effective_friction: PerRobot
+    motor_residual_torque: PerRobot
+    electrical_power: PerRobot
+    shaft_power: PerRobot
+    friction_power: PerRobot
+    dissipated_power: PerRobot
+    hydrodynamic_efficiency: PerRobot
+    propulsive_power: PerRobot
+    overall_efficiency: PerRobot
+    cost_of_transport: PerRobot
+    reynolds_number: PerRobot
+    tail_reynolds_number: PerRobot
+    battery_run_time: PerRobot
+    plug_velocity: PerRobot
+    wobble_angle: PerRobot
+    path_radius: PerRobot
+    step_out_rate: PerRobot
+    phase_lag: PerRobot
+    valid: Flags
+
+    def to_dict(self) -> dict[str, Any]:
+        """Median, least and largest of every quantity over the robots, as data."""
+        found = {item.name: np.asarray(getattr(self, item.name))[self.valid] for item in STEADY}
+        known = {name: column[np.isfinite(column)] for name, column in found.items()}
+        content = {
+            "robots": int(self.valid.size),
+            "valid": int(np.count_nonzero(self.valid)),
+            **{
+                name: quantity(np.median(column), QUANTITIES[name].unit, low=column.min(), high=column.max())
+                for name, column in known.items()
+                if column.size
+            },
+        }
+        return envelope("swimming", content, ())
+
+    def _shown(self) -> tuple[Mapping[str, Any], list[str]]:
+        """See `DisplayMixin`: the quantities that matter most."""
+        answer = self.to_dict()
+        return answer, [name for name in HEADLINE if name in answer][:_SHOWN]
+
+
+STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.name != "valid")
+"""The quantities of steady swimming, in their order."""
+
+
+HEADLINE: tuple[str, ...] = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_current",
+    "step_out_rate",
+    "hydrodynamic_efficiency",
+    "tail_torque",
+)
+"""The quantities that matter most, most first: an answer shows the first five of them that apply."""
+_SHOWN = 5
+
+
+def headline(answer: Mapping[str, Any]) -> list[str]:
+    """Names of the five quantities of a robot's JSON that matter most."""
+    return [name for name in HEADLINE if answer[name]["value"] is not None][:_SHOWN]
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Limits of the intervals of every quantity of one robot."""
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    middle: Mapping[str, float]
+    """Medians of the draws."""
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
+        if not np.isfinite(self.low[name]):
+            return {}
+        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
+
 
 _MORE = ("wobble_angle", "path_radius", "step_out_rate", "phase_lag", "plug_velocity")
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache

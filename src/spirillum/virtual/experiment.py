@@ -41,8 +41,8 @@ from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
 from spirillum.version import own_version
 from spirillum.virtual.artifacts import Degradation
-from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
+from spirillum.virtual.optics import swimming_range
 from spirillum.virtual.trial import render
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, rate_quantities

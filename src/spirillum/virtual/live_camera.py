@@ -11,16 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.argument_validation import as_number, check_kind, validate_arguments
-from spirillum.dynamics.poses import Poses, RobotPose
+from spirillum.dynamics.run_file import Poses, RobotPose
 from spirillum.errors import InputError, clipped
 from spirillum.files import write_text
 from spirillum.robot.load import is_preset, load
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 from spirillum.virtual.artifacts import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.framing import check_size, lens_of, swimming_range
-from spirillum.virtual.optics import tank_of
+from spirillum.virtual.optics import check_size, lens_of, swimming_range, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
 from spirillum.virtual.trial_options import CameraOptions, Seeded

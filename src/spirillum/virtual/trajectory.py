@@ -13,7 +13,7 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.dynamics.poses import Poses
+    from spirillum.dynamics.run_file import Poses
 
 _MAX_OBLIQUITY = 0.5
 """Largest angle of a run's robot to the channel, rad."""
@@ -170,7 +170,7 @@ def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: flo
         axis: height of the channel's axis in the camera's frame, m.
         level: height of the motor axis above the channel's in a run that does not hold it, m.
     """
-    from spirillum.dynamics.poses import poses_of
+    from spirillum.dynamics.run_file import poses_of
 
     return trajectory_of(poses_of(dataset, level), view, leftwards=leftwards, axis=axis)
 
@@ -184,7 +184,7 @@ def trajectory_of(poses: Poses, view: str, *, leftwards: bool, axis: float) -> T
         leftwards: whether the nose points to the left in the picture.
         axis: height of the channel's axis in the camera's frame, m.
     """
-    from spirillum.dynamics.poses import rotation_matrix
+    from spirillum.dynamics.run_file import rotation_matrix
 
     turn = lab_to_camera(view, leftwards=leftwards)
     turns = np.array([turn @ rotation_matrix(attitude) for attitude in poses.attitude])

@@ -30,8 +30,7 @@ from spirillum.files import (
 from spirillum.formats.h264 import h264_writer
 from spirillum.notes import Note
 from spirillum.robot.load import is_preset, load
-from spirillum.robot.robot import Robot
-from spirillum.robot.toml_writer import robot_text
+from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.version import versions
@@ -44,9 +43,8 @@ from spirillum.virtual.artifacts import (
     with_troubles,
 )
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.framing import check_size, framed, lens_of, out_of_picture
 from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, motion_of_trial
-from spirillum.virtual.optics import Tank, VirtualLens, tank_of
+from spirillum.virtual.optics import Tank, VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text

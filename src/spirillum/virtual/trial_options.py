@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
-from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity
-from spirillum.robot.problems import refuse
+from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity, refuse
 
 _USUAL_FIELD = (150e-3 + 60e-3 / 1.40) * 640.0 / 740.0
 """Width of the usual picture at the reference plane, m: the lens 150 mm above 60 mm of oil, seen through its surface,

@@ -9,10 +9,9 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.files import read_toml
-from spirillum.robot.fields import Length, LengthOrZero, Section, Text, Time
+from spirillum.robot.fields import Length, LengthOrZero, Section, Text, Time, problems_in, refused_table
 from spirillum.robot.geometry import Stripes
 from spirillum.robot.load import load
-from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
 WHAT = "a setup file (TOML, see `spirillum schema setup`)"

@@ -11,8 +11,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import outlines_of
 from spirillum.view.annotate import Annotator
 from spirillum.view.figures.robot import robot_figure, robot_words
-from spirillum.view.figures.scene import PHASE
-from spirillum.view.figures.solids import crests
+from spirillum.view.figures.scene import PHASE, crests
 from spirillum.view.figures.style import save_as
 
 

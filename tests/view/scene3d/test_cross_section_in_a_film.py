@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.poses import Poses, rolled
+from spirillum.dynamics.run_file import Poses, rolled
 from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.scene3d.film import CrossSection
 

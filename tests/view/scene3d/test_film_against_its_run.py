@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.poses import poses_of
+from spirillum.dynamics.run_file import poses_of
 from spirillum.view.scene3d.scene import DrawnRobot
 from spirillum.view.scene3d.scenery import fitted
 

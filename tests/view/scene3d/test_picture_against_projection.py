@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.poses import RobotPose
+from spirillum.dynamics.run_file import RobotPose
 from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, resting
 from spirillum.view.scene3d.scenery import VIEWS, Margins, checked_view, fitted
 from spirillum.view.scene3d.show import glass_around, shown_points

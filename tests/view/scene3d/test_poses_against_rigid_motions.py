@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.poses import poses_of, rolled, rotation_matrix
+from spirillum.dynamics.run_file import poses_of, rolled, rotation_matrix
 
 TILTED = np.array([0.5, 0.5, -0.5, 0.5])
 

@@ -31,8 +31,8 @@ from spirillum.display import fitted_words, percent, rows_of
 from spirillum.dynamics.run_summary import told
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
-from spirillum.swimming.steady_quantities import headline
-from spirillum.swimming.steady_state import END_STATES
+from spirillum.swimming.released_motion import END_STATES
+from spirillum.swimming.steady import headline
 from spirillum.units import display_unit, in_unit
 
 

@@ -18,9 +18,9 @@ from spirillum.cli.tables.parts import (
     quantity_grid,
     reason_of,
 )
-from spirillum.designs.improvement import ALTERNATIVES
+from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
-from spirillum.studies.ranking import ENDS, LET_GO, RANKED, best_in_words
+from spirillum.studies.ranking import ENDS, RANKED, STEADY_SPEED, best_in_words
 from spirillum.units import display_unit, in_unit
 
 
@@ -95,7 +95,7 @@ def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]
     if not sizes:
         return []
     shown = display_unit(max(sizes), own)
-    with_ends = name == "forward_velocity" and LET_GO not in robots[0]  # else the table is wider than a terminal
+    with_ends = name == "forward_velocity" and STEADY_SPEED not in robots[0]  # else the table is wider than a terminal
     ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
     return [
         (

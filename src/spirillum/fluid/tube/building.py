@@ -36,14 +36,12 @@ from spirillum.fluid.tube.outer_resistance import (
     solved_as_one,
 )
 from spirillum.fluid.tube.progress_messages import kept_after, progress_message
-from spirillum.fluid.tube.stages import FINE, Stage
+from spirillum.fluid.tube.stages import FINE, RESPONSES, Stage, response_errors
 from spirillum.fluid.tube.table import TubeTable
-from spirillum.fluid.tube.table_errors import RESPONSES, response_errors
 from spirillum.fluid.tube.tube import check_solvable, finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
-from spirillum.kernels.film_table import film_at
-from spirillum.kernels.tube_table import MOTIONS
+from spirillum.kernels.tube_table import MOTIONS, film_at
 from spirillum.robot.outline import Outline
 from spirillum.robot.tube_pose import Seat
 

@@ -36,7 +36,7 @@ from scipy.linalg import cholesky, solve_triangular
 from spirillum.arrays import Matrix6, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, FilmSurface, Place, film_surface, frame
-from spirillum.kernels import film_table as table
+from spirillum.kernels import tube_table as table
 from spirillum.robot.outline import Outline
 
 _EXTRA = 3
@@ -227,7 +227,7 @@ class FilmTable:
     """Resistance of a body's lubrication film in a tube, tabulated over offset, pitch and yaw."""
 
     packed: Samples
-    """Packed form for `kernels.film_table.film_at`: a head, then the spline coefficients in single precision."""
+    """Packed form for `kernels.tube_table.film_at`: a head, then the spline coefficients in single precision."""
 
     @classmethod
     def of(

@@ -1,22 +1,36 @@
-"""Where tables of robots in tubes are found and kept: in this package those of presets and papers, others in the cache.
+"""Tables of robots in tubes: where they are found and kept, and the model `tube` from them, in microseconds.
 
 A table in the cache is filed under its robot, its tube and the source of all that makes it, so that a new version of
 the solver asks for a new one. The folder is that of `cache`; it is safe to delete.
+
+What a motion along and about the axis needs is averaged over the phases of the tail. A table knows the robot with its
+turning tail, not the forces that its two parts exert on each other across their joint: the force on the whole stands
+with the body here, and nothing that follows from a force balance of the whole is changed by that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
+from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.outer_resistance import Progress
 from spirillum.fluid.tube.stages import STAGES, StageName
-from spirillum.fluid.tube.table import TubeTable, key_of
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_gap
+from spirillum.fluid.tube.tube import Tube
+from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
+from spirillum.fluid.wire.slender import Slender
+from spirillum.kernels.tube_table import INSIDE, MOTIONS, PHASES, largest_yaw, mean_resistance_at, mean_resistances
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit, within
 
 _SHIPPED = Path(__file__).parent / "tables"
 _OF_PAPERS = tuple(sorted(Path(__file__).parents[2].glob("papers/*/tables")))
@@ -113,3 +127,130 @@ def _put(table: TubeTable) -> TubeTable:
         else:
             return TubeTable.read(path)
     return table
+
+
+THINNEST_GAP = 1e-5
+"""Smallest gap over the body's diameter of the tabulated lubrication films."""
+_HELD = [0, 1, 3, 4]
+"""Indices of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
+
+
+def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
+    """Rates of a table per U along the tube, rates about the motor axis of body and rotor, and mean flow, (..., 8, 4).
+
+    Args:
+        pitch: nose up, rad, (...).
+        yaw: nose to the left, rad, (...).
+    """
+    found = np.zeros((*np.shape(pitch), MOTIONS, len(_HELD)))
+    found[..., 0, 0] = np.cos(pitch) * np.cos(yaw)
+    found[..., 1, 0] = -np.sin(yaw)
+    found[..., 2, 0] = -np.sin(pitch) * np.cos(yaw)
+    found[..., 3, 1], found[..., 6, 1] = 1.0, -1.0  # the body turns, the rotor does not
+    found[..., 6, 2] = found[..., 7, 3] = 1.0
+    return found
+
+
+def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: Samples) -> Samples:
+    """Resistance along the tube at poses, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
+
+    Args:
+        tables: packed tables of the robots, one in each row.
+        gap: smallest distances between body and wall, m, (..., robots).
+        pitch: nose up, rad, (..., robots).
+        yaw: nose to the left, rad, (..., robots).
+
+    Returns:
+        Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
+    """
+    found = np.empty((gap.size, MOTIONS, MOTIONS))
+    which = np.broadcast_to(np.arange(len(tables)), gap.shape)
+    mean_resistances(tables, which.ravel(), gap.ravel(), pitch.ravel(), yaw.ravel(), PHASES, found)
+    axes = along_the_tube(pitch, yaw)
+    whole: Samples = np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
+    return whole
+
+
+class TabledTube(Tube):
+    """The model `tube` for robots that have tables."""
+
+    form = "table"
+
+    def __init__(self, tables: Mapping[str, TubeTable]) -> None:
+        """Evaluate from tables."""
+        super().__init__()
+        self._tables = tables
+        coarsest = min(tables.values(), key=lambda table: list(STAGES).index(table.stage), default=None)
+        self.error_against = None if coarsest is None else coarsest.error_against
+
+    def table_of(self, batch: RobotBatch, index: int = 0) -> TubeTable:
+        """The table of one robot."""
+        return self._tables[_key(batch, index)]
+
+    def checked_by(self, batch: RobotBatch) -> tuple[SwimmerModel, ...]:
+        """None: the error of a table is stored, see `stated_speed_error`."""
+        return ()
+
+    def stated_speed_error(self, batch: RobotBatch) -> float:
+        """See `SwimmerModel.stated_speed_error`; none beyond the yaws at which the table was checked."""
+        seat, table = seat_of(batch, 0), self.table_of(batch)
+        known = abs(seat.yaw) <= largest_yaw(table.packed, seat.offset, seat.pitch)
+        return table.speed_error_at(seat.yaw) if known else float("nan")
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """Limits of the poses for which the table's errors were estimated."""
+        gaps, least, yaws, most = np.full((4, batch.size), np.nan)
+        for index in range(batch.size):
+            table, seat = self.table_of(batch, index), seat_of(batch, index)
+            gaps[index], least[index] = seat.clearance(table.geometry.body), least_checked_gap(table.packed)
+            yaws[index], most[index] = abs(seat.yaw), largest_yaw(table.packed, seat.offset, seat.pitch)
+        near = f"the table is below it {BELOW}"
+        aside = "the table was checked at such yaws, and there is no error estimate beyond"
+        return [
+            *super().cautions(batch),
+            Limit.of("gap", gaps, "at least", least, "mm", near, "near-glass"),
+            Limit.of("yaw", yaws, "at most", most, "deg", aside, "beyond-checked-yaw"),
+        ]
+
+    def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
+        """See `ResistanceModel.part_domain`."""
+        unbounded = Slender().part_domain(batch, part)
+        return seat_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
+
+    def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
+        found = np.full((batch.size, 5, 5), np.nan)
+        for index in within(batch, self.part_domain(batch, "robot")):
+            seat, mean = seat_of(batch, index), np.empty((MOTIONS, MOTIONS))
+            mean_resistance_at(self.table_of(batch, index).packed, seat.offset, seat.pitch, seat.yaw, PHASES, mean)
+            axes = along_the_tube(np.array(seat.pitch), np.array(seat.yaw))
+            found[index] = 0.0
+            found[index][np.ix_(_HELD, _HELD)] = number_of(batch.viscosity, index) * axes.T @ mean @ axes
+        return self._with_ends(batch, found)
+
+
+def tables_of(batch: RobotBatch) -> list[TubeTable | None]:
+    """The table of each robot of a batch; None where it has none, or no tube."""
+    radii = [tube_radius(batch, index) for index in range(batch.size)]
+    return [
+        find_table(RobotGeometry.of(batch, index), radius) if np.isfinite(radius) else None
+        for index, radius in enumerate(radii)
+    ]
+
+
+def tabled(batch: RobotBatch) -> TabledTube | None:
+    """The model `tube` from the tables of a batch; None unless every robot has a valid one at its pose."""
+    if batch.placement.tail_drop:
+        return None
+    found: dict[str, TubeTable] = {}
+    for index, table in enumerate(tables_of(batch)):
+        if table is None:
+            return None
+        seat = seat_of(batch, index)
+        if np.isfinite(seat.offset) and table.at(seat.offset, seat.pitch, seat.yaw)[1] != INSIDE:
+            return None
+        found[_key(batch, index)] = table
+    return TabledTube(found)
+
+
+def _key(batch: RobotBatch, index: int) -> str:
+    return key_of(RobotGeometry.of(batch, index), tube_radius(batch, index))

@@ -18,9 +18,9 @@ from spirillum.fluid.tube.tube import is_solved, solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import MIRROR, cut_of_film
 from spirillum.kernels.tube_table import MOTIONS as RATES
-from spirillum.processes import imap_unordered
 from spirillum.robot.tube_pose import Seat
 from spirillum.units import show
+from spirillum.worker_pool import imap_unordered
 
 HARMONICS = 4
 """Harmonics of the tail's phase that a table stores."""

@@ -220,7 +220,7 @@ class LevelRings(Rings):
 
     def _traces(self, waves: WallWaves, number: int) -> tuple[Samples, Samples]:
         """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
-        from spirillum.kernels.tube_waves import circle_waves
+        from spirillum.kernels.stokes_flow import circle_waves
 
         orders = waves.orders[number]
         theta = midpoints(max(waves.orders), self.modes)

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.costs import check_memory
+from spirillum.errors import check_memory
 from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
 from spirillum.fluid.tube.wall import WallWaves, each, waves_between
@@ -179,7 +179,7 @@ class Solids:
         return found[0], found[1]
 
     def _through_flow(self, parity: int) -> list[Samples]:
-        """Modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on tilted rings; see `kernels.rings`."""
+        """Modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on tilted rings: `stokes_flow`."""
         if parity and not self.seat.yaw:
             return []
         modes = min(4, self.modes)

@@ -28,16 +28,14 @@ from spirillum.errors import InputError
 from spirillum.files import atomic_write, read_bytes
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.nodes import CHECKED_FROM
-from spirillum.fluid.tube.stages import STAGES, StageName
-from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR, RESPONSES, SOLIDS_ERROR
+from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR, RESPONSES, SOLIDS_ERROR, STAGES, StageName
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR
-from spirillum.kernels import film_table
-from spirillum.kernels import tube_table as kernel
+from spirillum.kernels import tube_table
 from spirillum.robot.tail_form import PLAIN
 
 _REST = 3e-6
-_FILM = np.where(np.arange(film_table.ENTRIES) < len(film_table.ORDER), 2e-5, 1e-6)
+_FILM = np.where(np.arange(tube_table.ENTRIES) < len(tube_table.ORDER), 2e-5, 1e-6)
 """Quantum of the stored numbers."""
 _MOST_STEPS = 2.0**31 - 1.0
 """Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
@@ -55,18 +53,18 @@ def to_bytes(head: bytes, table: Samples) -> bytes:
 
 def film_code(table: Samples) -> bytes:
     """The film of a table, coded; the same for all tails of a body in its tube."""
-    head, film = _film_of(kernel.parts_of(table).film)
+    head, film = _film_of(tube_table.parts_of(table).film)
     return head.astype("<f8").tobytes() + _coded(film / _FILM)
 
 
 def _coded_outer(table: Samples) -> bytes:
     """All of a table but its film, coded."""
-    parts = kernel.parts_of(table)
+    parts = tube_table.parts_of(table)
     rows = _rows_of(parts.rest)
     counts = np.array([parts.nodes.size, rows.size], dtype="<f8")
     exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows))
     steps = _steps(rows)
-    yawed = _times(kernel.yaw_parts_at_nodes(), parts.yawed)
+    yawed = _times(tube_table.yaw_parts_at_nodes(), parts.yawed)
     return exact + _coded(parts.rest / steps) + _coded(yawed / steps)
 
 
@@ -113,13 +111,13 @@ class _Reader:
         """The packed table."""
         counts = self._exact(2).astype(int)
         nodes, rows = self._exact(int(counts[0])), self._exact(int(counts[1]))
-        shapes = kernel.shapes_of(nodes)
+        shapes = tube_table.shapes_of(nodes)
         rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
-        head = self._exact(film_table.HEAD)
-        yawed = _times(np.asarray(np.linalg.inv(kernel.yaw_parts_at_nodes()), dtype=np.float64), yawed)
-        film = (self._whole(film_table.shape_of(head)) * _FILM).astype(np.float32).ravel()
+        head = self._exact(tube_table.HEAD)
+        yawed = _times(np.asarray(np.linalg.inv(tube_table.yaw_parts_at_nodes()), dtype=np.float64), yawed)
+        film = (self._whole(tube_table.shape_of(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
-        return kernel.Parts(nodes, rest, yawed, packed).packed()
+        return tube_table.Parts(nodes, rest, yawed, packed).packed()
 
     def _exact(self, count: int) -> Samples:
         found = np.frombuffer(self._taken(8 * count), "<f8")
@@ -155,7 +153,7 @@ def _coded(values: Samples) -> bytes:
 
 def _rows_of(rest: Samples) -> Samples:
     """Size of each row of the factor, (8,): the geometric mean of its diagonal."""
-    row, column = np.tril_indices(kernel.MOTIONS)
+    row, column = np.tril_indices(tube_table.MOTIONS)
     found: Samples = np.exp(np.mean(rest[:, :, 0][..., row == column], axis=(0, 1)))
     return found
 
@@ -168,15 +166,15 @@ def _times(matrix: Samples, yawed: Samples) -> Samples:
 
 def _steps(rows: Samples) -> Samples:
     """Steps of the rest and of what a yaw adds to it at its nodes, (36,)."""
-    row, column = np.tril_indices(kernel.MOTIONS)
+    row, column = np.tril_indices(tube_table.MOTIONS)
     found: Samples = _REST * np.where(row == column, 1.0, rows[row])
     return found
 
 
 def _film_of(film: Samples) -> tuple[Samples, Samples]:
     """Unpack head and coefficients of a lubrication film."""
-    head, shape = film[: film_table.HEAD], film_table.shape_of(film)
-    values = film[film_table.HEAD :].copy().view(np.float32)[: int(np.prod(shape))]
+    head, shape = film[: tube_table.HEAD], tube_table.shape_of(film)
+    values = film[tube_table.HEAD :].copy().view(np.float32)[: int(np.prod(shape))]
     return head, values.reshape(shape).astype(np.float64)
 
 
@@ -229,8 +227,8 @@ class TubeTable:
             yaw: nose to the side, rad.
             phase: of the tail, rad.
         """
-        out = np.empty((kernel.MOTIONS, kernel.MOTIONS))
-        left = kernel.resistance_at(self.packed, offset, pitch, yaw, phase, out)
+        out = np.empty((tube_table.MOTIONS, tube_table.MOTIONS))
+        left = tube_table.resistance_at(self.packed, offset, pitch, yaw, phase, out)
         return out, int(left)
 
     def error_at(self, yaw: float) -> Mapping[str, float]:
@@ -253,7 +251,7 @@ class TubeTable:
     def mirrored(self) -> TubeTable:
         """The table of the robot's mirror image, whose tail has the other hand."""
         geometry = self.geometry._replace(hand=-self.geometry.hand)
-        return replace(self, geometry=geometry, packed=kernel.mirror_image(self.packed))
+        return replace(self, geometry=geometry, packed=tube_table.mirror_image(self.packed))
 
     def write(self, path: Path, film: str | None = None) -> None:
         """Write it, whole or not at all, its numbers rounded to some 1e-5.
@@ -321,7 +319,7 @@ def _checked(table: TubeTable) -> TubeTable:
         or table.stage not in STAGES
     ):
         raise ValueError("not the numbers of a table")
-    if not kernel.is_whole(table.packed, table.radius):
+    if not tube_table.is_whole(table.packed, table.radius):
         raise ValueError("not the nodes of a table")
     return table
 
@@ -336,4 +334,4 @@ def key_of(geometry: RobotGeometry, radius: float) -> str:
 
 def least_checked_gap(packed: Samples) -> float:
     """Smallest gap of a packed table's check poses, m."""
-    return CHECKED_FROM * float(kernel.range_of(packed).gaps[0])
+    return CHECKED_FROM * float(tube_table.range_of(packed).gaps[0])

@@ -276,7 +276,7 @@ class TiltedRings(Rings):
         Returns:
             component; even, odd; angle; ring; real, imaginary; order; wall component.
         """
-        from spirillum.kernels.tube_waves import single_tilted_waves, tilted_waves
+        from spirillum.kernels.stokes_flow import single_tilted_waves, tilted_waves
 
         shape, k = placed.shape[:2], float(waves.k[number])
         x, y, z = np.moveaxis(placed, -1, 0)

@@ -22,8 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
-from spirillum.costs import MOST_MEMORY
-from spirillum.errors import InputError
+from spirillum.errors import MOST_MEMORY, InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, validation_note, what_is_fitted
@@ -31,7 +30,7 @@ from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
-from spirillum.fluid.tube.table_errors import LARGEST_WIRE_ERROR
+from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.slender import FINEST_WIRE_ERROR, Slender
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire

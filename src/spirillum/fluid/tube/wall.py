@@ -2,7 +2,7 @@
 
 A force at y moves the fluid at x, besides by the Stokeslet, by -2/pi int dk sum_p eps_p U_p(x) S_p U_p(y)', over
 k > 0 and the even and odd waves of order p, with eps_0 = 1, else 2, and without the factor 1/(8 pi mu); see
-`kernels.tube_waves`. No net flux passes along the tube. Near k = 0 the integrand goes as A + B log k: the nodes in k
+`kernels.stokes_flow`. No net flux passes along the tube. Near k = 0 the integrand goes as A + B log k: the nodes in k
 crowd there, and what lies below the first is summed.
 
 Axes here: x along the tube, y up, z to the right; angles count from y.
@@ -147,7 +147,7 @@ def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 
     """
     from scipy.special import i0e
 
-    from spirillum.kernels.tube_waves import wave_extensions
+    from spirillum.kernels.stokes_flow import wave_extensions
 
     scale = i0e(k * rho) / i0e(k * radius) * np.exp(k * (rho - radius))
     found = np.empty((rho.size, orders - first, 3, 3))
@@ -159,7 +159,7 @@ def weighted_layers(waves: WallWaves, number: int) -> Samples:
     """eps_p S_p at one k times its weight, (orders, 3, 3)."""
     from scipy.special import k0e, k1e
 
-    from spirillum.kernels.tube_waves import wall_layers
+    from spirillum.kernels.stokes_flow import wall_layers
 
     z = float(waves.k[number] * waves.radius)
     layers = np.empty((waves.orders[number], 3, 3))
@@ -189,7 +189,7 @@ def point_waves(points: Samples, waves: WallWaves, number: int, first: int = 0, 
         first: the first order.
         last: the order after the last; None: of all that are kept.
     """
-    from spirillum.kernels.tube_waves import station_waves
+    from spirillum.kernels.stokes_flow import station_waves
 
     k, last = float(waves.k[number]), waves.orders[number] if last is None else last
     values = extensions(k, waves.radius, np.hypot(points[:, 1], points[:, 2]), last, first)

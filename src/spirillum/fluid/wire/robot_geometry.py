@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
-from spirillum.costs import check_memory
+from spirillum.errors import check_memory
 from spirillum.fluid.wire.stokeslets import Wire, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import End, ProfilePoints, Shape, amplitude_envelope, centreline

@@ -19,9 +19,10 @@ from spirillum.papers.biorob2012.evidence import (
     NO_RATES,
     ROBOT_LENGTH,
     Evidence,
+    FrictionModelRuns,
+    Judgement,
 )
 from spirillum.papers.biorob2012.published import VELOCITY_DROPS
-from spirillum.papers.biorob2012.readings import FrictionModelRuns, Judgement
 from spirillum.papers.claim import Claim, PredictedVerdict, Verdict
 from spirillum.robot.load import load
 from spirillum.studies.released_robots import INFERRED_BY

@@ -1,7 +1,9 @@
-"""Numbers that the paper states of a robot that is predicted, beside those of the prediction."""
+"""What the paper states: the numbers of a predicted robot, and its study of sixteen tails in two channels."""
 
 from __future__ import annotations
 
+import tomllib
+from importlib.resources import files
 from typing import Any, NamedTuple
 
 from spirillum.dynamics.prediction import predict
@@ -95,3 +97,9 @@ def _difference(found: Prediction, beside: Prediction, sign: float) -> float | N
     """Difference of the trials' speeds, m/s; None where one has none."""
     speeds = [None if one.trial is None else one.trial.values.get("forward_velocity") for one in (found, beside)]
     return None if speeds[0] is None or speeds[1] is None else sign * (speeds[0] - speeds[1])
+
+
+def paper_study() -> dict[str, Any]:
+    """The tables of the paper's study, as a study file has them."""
+    text = (files("spirillum.papers.biorob2012") / "study.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)

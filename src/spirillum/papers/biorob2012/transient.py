@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.axial_robot import AxialRobot, rates
-from spirillum.dynamics.axial_run import AxialIntegrator, axial_run
+from spirillum.dynamics.axial_robot import AxialIntegrator, AxialRobot, axial_run, rates
 from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
 from spirillum.swimming.prediction import Prediction

@@ -121,7 +121,7 @@ _MOST = 4
 """Robots of the figure."""
 
 
-def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
+def release_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
     """Every reading of every run over the median of its robot; None if no robot was released."""
     if "forward_velocity_at_run" not in dataset:
         return None

@@ -17,12 +17,14 @@ from spirillum.view.figures.scene import (
     INK,
     PHASE,
     DrawingLayout,
+    Metal,
     dimension_line,
+    draw_solid,
+    draw_wire,
     label,
     length_words,
     thin_line,
 )
-from spirillum.view.figures.solids import Metal, draw_solid, draw_wire
 from spirillum.view.figures.style import COLOURS, PAGE, new_figure, plain, styled
 
 

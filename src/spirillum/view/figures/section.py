@@ -18,7 +18,7 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import Seat
-from spirillum.view.figures.solids import wire_lines
+from spirillum.view.figures.scene import wire_lines
 
 _GLASS, _RIM = "#dfe9f1", "#5d7486"
 _FILL, _EDGE, _BEYOND = "#a3a8ac", "#22292e", "#4a5258"

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.studies.band import reference_place
+from spirillum.studies.columns import reference_place
 from spirillum.units import Hz
 from spirillum.view.figures.style import UnitPrefix, plain
 

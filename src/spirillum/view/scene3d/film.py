@@ -12,8 +12,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.poses import Poses, RobotPose, poses_of
-from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.dynamics.run_file import Poses, RobotPose, open_run, poses_of, robot_of
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.poses import RobotPose
+from spirillum.dynamics.run_file import RobotPose
 from spirillum.optional_dependencies import import_optional
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.poses import RobotPose
+from spirillum.dynamics.run_file import RobotPose
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
 from spirillum.files import MARK, atomic_write, output_target

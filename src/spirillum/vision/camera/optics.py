@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.snell import pixels_of_points, points_of_pixels
+from spirillum.kernels.pictures import pixels_of_points, points_of_pixels
 from spirillum.vision.setup import Setup
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""From what was seen on every frame to a track: lengths, continuous angles, true times, and all flags.
+"""From a video to a track: following the robot, then lengths, continuous angles, true times, and all flags.
 
 Frames on which something else than the robot was followed: its marks are not there, and its place jumps.
 Where a still picture hides a slow robot, or clutter looks like a body, the outline may lie beside the robot for a
@@ -8,7 +8,10 @@ while and then find it. Neither stripes nor tail can be read meanwhile, as they 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +19,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.robust import least_squares_line, repeated_median_line, stretches_of
-from spirillum.vision.camera.anchor import Steadied
+from spirillum.vision.camera.anchor import Steadied, steadied, sways
+from spirillum.vision.camera.camera import opened, samples_of, scale_of
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.camera.scale import CalibratedCamera
 from spirillum.vision.flag import Flag
@@ -24,21 +28,26 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, LOST_FRAMES, STRIPES
 from spirillum.vision.track.contour import EDGE_CUES
-from spirillum.vision.track.cues import CUES, Agreement, agreement_of
 from spirillum.vision.track.cuts import clock_of, cuts_in, hops_in, one_picture, stands_flag, stands_still
-from spirillum.vision.track.direction import AlignedTrack, align_with_path
 from spirillum.vision.track.identity import Identified
-from spirillum.vision.track.learning import InitialDetection
-from spirillum.vision.track.lone_outline import OutlineCheck
+from spirillum.vision.track.learning import InitialDetection, learnt_from
+from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
 from spirillum.vision.track.lost_frames import FrameSeries, restored_times
-from spirillum.vision.track.picture_change import picture_steps
-from spirillum.vision.track.size import LENGTHS, checked_scale
-from spirillum.vision.track.steps import Record
-from spirillum.vision.track.track import RobotMotion, Track
+from spirillum.vision.track.size import LENGTHS, AlignedTrack, align_with_path, checked_scale
+from spirillum.vision.track.steadiness import camera_flags, picture_steps
+from spirillum.vision.track.steps import FrameDetection, FrameTracker, Record
+from spirillum.vision.track.track import CUES, Agreement, RobotMotion, Track, agreement_of
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
-from spirillum.vision.video.frames import Video
+from spirillum.vision.video.frames import Frame, Video
+
+__all__ = [
+    "FrameDetection",
+    "Watcher",
+    "follow",
+    "scale_of",
+]
 
 
 @dataclass(frozen=True)
@@ -356,3 +365,69 @@ def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
     for k in np.flatnonzero(np.isfinite(pose[:, 0])):
         out[k] = optics.pixels(placed(axis, BodyPose(*pose[k].tolist()), optics.axis_height)).ravel()
     return out
+
+
+Watcher = Callable[[int, np.ndarray, FrameDetection], None]
+"""Called with a frame's number, its picture (8-bit RGB) and its observation."""
+
+
+def follow(
+    video: str | Path | Video,
+    setup: Setup,
+    robot: Robot,
+    *,
+    folder: Path | None = None,
+    progress: Callable[[int, int | None], None] | None = None,
+    on_frame: Watcher | None = None,
+) -> Track:
+    """Follow a robot through a video.
+
+    Args:
+        video: the video, or a folder of images.
+        setup: camera, tank, markers and robot of the experiment.
+        robot: the robot in front of the camera.
+        folder: folder of the setup file, to which the checkerboard's folder is relative; unset: the working directory.
+        progress: called with the number of frames done and of all frames, None where unknown.
+        on_frame: called with each frame's number, its picture (8-bit RGB) and its observation.
+    """
+    video = opened(video, setup)
+    frames = samples_of(video, setup.start, setup.end)
+    still = steadied(video.frames(setup.start, setup.end)) if sways(frames) else None
+    if still is not None:
+        frames = [still.frame(frame) for frame in frames]
+    learnt = learnt_from(video, frames, setup, robot, folder)
+    frames = [frame.small(learnt.sight.reduction) for frame in frames]  # large pictures have done their duty
+    follower = FrameTracker(learnt.known, learnt.still)
+    aside = ThreadPoolExecutor(1)  # runs while the frames are followed
+    moved = aside.submit(camera_flags, frames, learnt.known.start, ruled=setup.markers.spacing is not None)
+    aside.shutdown(wait=False)
+    total = video.count
+    for count, taken in enumerate(video.frames(setup.start, setup.end), 1):
+        frame = taken if still is None else still.frame(taken)
+        seen = follower.step(frame)
+        if on_frame is not None:
+            on_frame(frame.index, frame.image, seen)
+        if progress is not None:
+            progress(count, total)
+    flags = (*video.flags, *learnt.sight.flags, *moved.result(), *learnt.flags)
+    outline = _outline_check(frames, learnt, follower.record, setup)
+    return track_of(video, setup, learnt, follower.record, flags, still, outline)
+
+
+_SAME_TIME = 1e-3
+"""Largest difference between two times of one frame, s."""
+
+
+def _outline_check(frames: Sequence[Frame], learnt: InitialDetection, record: Record, setup: Setup) -> OutlineCheck:
+    """What cover and background leave open of the outline; nothing of what is not the robot."""
+    start, times = learnt.known.start, np.array(record.time)
+    if not learnt.known.robot:
+        return OutlineCheck()
+    nearest = [int(np.argmin(np.abs(times - frame.time))) for frame in frames]
+    seen = [
+        (Frame(at, frame.time, frame.image), record.placed[at].pose)
+        for frame, at in zip(frames, nearest, strict=True)
+        if record.placed[at].known and abs(times[at] - frame.time) < _SAME_TIME
+    ]
+    some, poses = [frame for frame, _ in seen], [pose for _, pose in seen]
+    return check_outline(some, poses, start.body, setup.robot.appearance, alone=start.search is None)

@@ -15,9 +15,9 @@ from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.constants import OUTLINE, SEAL
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
-from spirillum.vision.track.cues import cue_shifts
 from spirillum.vision.track.seal import ColourPart, SealEdges, colour_part
 from spirillum.vision.track.search import Shape
+from spirillum.vision.track.track import cue_shifts
 
 
 class PoseFit(NamedTuple):

@@ -19,8 +19,8 @@ from spirillum.arrays import Samples
 from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import STANDING
-from spirillum.vision.track.picture_change import PictureSteps
 from spirillum.vision.track.size import LENGTHS
+from spirillum.vision.track.steadiness import PictureSteps
 from spirillum.vision.track.track import RobotMotion
 from spirillum.vision.track.visibility import EVERYTHING
 

@@ -22,7 +22,7 @@ from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
 from spirillum.vision.track.multiples import Multiples, all_alike, multiples_of, near_their_mean
-from spirillum.vision.track.picture_change import PictureSteps
+from spirillum.vision.track.steadiness import PictureSteps
 from spirillum.vision.track.visibility import EVERYTHING
 
 

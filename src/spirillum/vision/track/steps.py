@@ -16,8 +16,8 @@ from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import PoseFit
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.initial_detection import close_place, pose_on_path
-from spirillum.vision.track.picture_change import PictureChange
 from spirillum.vision.track.search import PoseCandidate, candidates
+from spirillum.vision.track.steadiness import PictureChange
 from spirillum.vision.video.frames import Frame
 
 

@@ -1,18 +1,126 @@
-"""What was seen of a robot on every frame of a video, and its motion as time series."""
+"""Per-frame detections of a robot, the cues they rest on, and its motion as time series."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.robust import repeated_median_line
 from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.cues import Cue
+from spirillum.vision.track.contour import EDGE_CUES
+
+_ALONG = 0, 0, 1
+"""Coordinate of the pose that each cue of edges tells: x, or y for the coupling, of which the sides are seen."""
+
+
+@dataclass(frozen=True)
+class CueConstants:
+    """Agreement of the cues to where the body is."""
+
+    fewest: int = 5
+    """Fewest edges of a cue on a frame."""
+    frames: int = 8
+    """Fewest frames with outline and seal from which is told whether they move alike."""
+    apart: float = 0.4
+    """Standard error of the way from the first frame to the last by cues that disagree that is flagged, pixels."""
+    colour_drift: float = 0.1
+    """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
+    of this way.
+
+    Compression lets colours lag by this much: of nine path traced videos, at most 0.22 pixels were seen."""
+
+
+CUES = CueConstants()
+
+
+class Cue(NamedTuple):
+    """How far a cue was used in a video."""
+
+    share: float
+    """Share of the frames on which it was used, 0 to 1."""
+    disagreement: float
+    """Root mean square distance from the joint fit, standard deviations; NaN where it is not known."""
+
+
+class Agreement(NamedTuple):
+    """Cues of a video, and what their disagreement leaves in the speed."""
+
+    cues: dict[str, Cue]
+    """Cues by name."""
+    drift: float
+    """Standard error of the way from the first frame to the last by cues that disagree, m."""
+    flags: tuple[Flag, ...]
+    """A flag where outline and seal do not move alike, and both count."""
+
+
+def cue_shifts(left: Samples, slopes: Samples, used: Samples, cue: np.ndarray, level: float) -> Samples:
+    """Displacement of each cue of edges from the joint pose, and its standard error, m, (cues, 2); NaN if unused.
+
+    Args:
+        left: residual displacement of each edge along its normal, pixels, (n,).
+        slopes: Jacobian of the displacements by the pose, (n, 3).
+        used: weights of the edges, 0 for outliers, (n,).
+        cue: index into `EDGE_CUES` of each edge, (n,).
+        level: standard error over the one by the weights.
+    """
+    found = np.full((len(EDGE_CUES), 2), np.nan)
+    for number, along in enumerate(_ALONG):
+        mine = (cue == number) & (used > 0.0)
+        if np.count_nonzero(mine) < CUES.fewest:
+            continue
+        slope, weight = slopes[mine, along], used[mine]
+        square = float(np.sum(weight * slope**2))
+        if square > 0.0:
+            found[number] = float(np.sum(weight * slope * left[mine])) / square, level / math.sqrt(square)
+    return found
+
+
+def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel: float, suspect: str = "") -> Agreement:
+    """Cues of a video: how often each was used, and whether they agree.
+
+    Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
+    mixture of both, with their weights.
+
+    Args:
+        time: times of the frames, s, (n,).
+        shifts: results of `cue_shifts` on each frame.
+        tail: phase of the tail on each frame, (n,); NaN where unreadable.
+        pixel: length per pixel, m.
+        suspect: what the outline may follow in place of the body; empty where nothing else is there.
+    """
+    stack = np.array(shifts)
+    cues = {}
+    for number, name in enumerate(EDGE_CUES):
+        ratio = stack[:, number, 0] / stack[:, number, 1]
+        known = np.isfinite(ratio)
+        off = float(np.sqrt(np.mean(ratio[known] ** 2))) if known.any() else math.nan
+        cues[name] = Cue(float(np.mean(known)), off)
+    cues["tail"] = Cue(float(np.mean(np.isfinite(tail))), math.nan)
+    (outline, seal), spread = stack[:, :2, 0].T, stack[:, :2, 1]
+    known = np.isfinite(outline) & np.isfinite(seal)
+    if np.count_nonzero(known) < CUES.frames:
+        return Agreement(cues, 0.0, ())
+    apart = outline[known] - seal[known]
+    way = float(repeated_median_line(time[known], apart).slope) * float(np.ptp(time[known]))
+    weight = np.median(1.0 / spread[known] ** 2, axis=0)
+    share = float(weight[0] / weight.sum())
+    drift = abs(way) * math.sqrt(share * (1.0 - share))
+    if drift < CUES.apart * pixel:
+        return Agreement(cues, drift, ())
+    odd = int(np.flatnonzero(known)[np.argmax(np.abs(apart - np.median(apart)))])
+    why = f"the outline follows {suspect}" if suspect else "outline and seal of the body disagree"
+    sentence = (
+        f"{why}: frame {odd} ({time[odd]:.2f} s) of the annotated video; it moves by {abs(way) / pixel:.1f} pixels "
+        "against the seal, and the interval of the speed holds both"
+    )
+    return Agreement(cues, drift, (Flag("cues-disagree", sentence, (), odd),))
 
 
 class RobotMotion(NamedTuple):

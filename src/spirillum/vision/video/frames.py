@@ -20,14 +20,16 @@ from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 from spirillum.vision.video.display import AS_STORED, Display, converter, display_flags, frame_display, stated_aspect
-from spirillum.vision.video.image_sequence import ImageSequence, image_folder, image_stack
 from spirillum.vision.video.pictures import STACKS, reduced
 from spirillum.vision.video.streams import (
     UNSTATED,
     VIDEO,
+    ImageSequence,
     Stated,
     film_stream,
     frame_clock,
+    image_folder,
+    image_stack,
     one_line,
     open_container,
     short_reason,

@@ -1,0 +1,275 @@
+"""Forward models in tubes: each robot's own table at the pose of every draw, and trials through smooth surfaces.
+
+A table (`spirillum prepare`) answers for any gap and pitch in microseconds, so that a fit takes seconds. Its error at
+places that were not used for it stands in it: no prediction is taken to be better.
+
+A trial takes a second, a fit asks for many thousands of them. Each robot makes some trials that fill the ranges of the
+priors evenly (Sobol' points in the logarithms); between them its advance, turning and motor rate are interpolated by
+thin-plate splines (`scipy.interpolate.RBFInterpolator`). How far a surface through three quarters of them misses the
+others is their error: no prediction is taken to be better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import Experiment
+from spirillum.calibration.forward import DryContact, Forward
+from spirillum.dynamics.simulation import simulate
+from spirillum.dynamics.trial import trial_means
+from spirillum.errors import InputError
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.library import TabledTube, tables_of
+from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.kernels.native import thread_count
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.placement import Placement, gap_on_asperities
+from spirillum.robot.robot import Robot, with_numbers
+from spirillum.swimming.band import band_places
+from spirillum.swimming.drawn_resistance import Draws, TubeResistance
+from spirillum.swimming.dry_friction import weights_in_fluid
+from spirillum.swimming.model_choice import WALLED, has_table
+from spirillum.swimming.preparation import prepare_all
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RBFInterpolator
+
+
+ROUGHNESS_BAND = (1e-4, 1e-2)
+"""Least and largest height of asperities over the body's radius: from polished surfaces (1 um for the paper's robot) to
+burrs and seams of moulded parts (0.1 mm)."""
+_NAMED = 6
+
+Ranges = dict[str, tuple[float, float]]
+
+
+def place_ranges(batch: RobotBatch, model: SwimmerModel, names: Sequence[str]) -> Ranges:
+    """Gaps, pitches and roughnesses that every robot of a batch allows: ends of their priors, m and rad."""
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
+    for _, one in batch.blocks(1):
+        radius = 0.5 * float(one.body_diameter[0])
+        rough = (ROUGHNESS_BAND[0] * radius, ROUGHNESS_BAND[1] * radius)
+        known = {"gap": float(gap_on_asperities(rough[0]))} if "roughness" in names else {}
+        places = band_places(one.placed(Placement().model_copy(update=known)), model)
+        gaps = [place.gap or 0.0 for place in places]
+        # The steepest pitch depends on the gap; what holds at every gap is the least of them.
+        steepest = min(max(place.pitch or 0.0 for place in places if place.gap == gap) for gap in gaps)
+        own = {"gap": (min(gaps), max(gaps)), "pitch": (0.0, steepest), "roughness": rough}
+        for name in names:
+            found[name].append(own[name])
+    ranges = {name: (max(low for low, _ in ends), min(high for _, high in ends)) for name, ends in found.items()}
+    for name, (low, high) in ranges.items():
+        if not low < high:
+            raise InputError(
+                f"free = '{name}': the robots share no range of it; allowed: robots that fit their channels"
+            )
+    return ranges
+
+
+def tube_forward(
+    experiment: Experiment,
+    batch: RobotBatch,
+    free: Sequence[str],
+    tell: Callable[[str, int, int], None],
+    *,
+    prepare: bool,
+) -> tuple[Forward, float]:
+    """The forward model, and the largest relative error of the robots' tables in speed and body rate."""
+    model = _tables(experiment, batch, tell, prepare=prepare)
+    level = replace(batch, placement=Placement().model_copy(update={"pitch": 0.0}))
+    contact = _contact(experiment, batch) if "friction_coefficient" in free else None
+    forward = Forward(TubeResistance.of(level, model), batch.electrics, batch.viscosity, contact=contact)
+    errors: list[Mapping[str, float]] = [model.table_of(batch, index).error_without_yaw for index in range(batch.size)]
+    return forward, max(error[name] for error in errors for name in ("forward_velocity", "body_rotation_rate"))
+
+
+def _tables(
+    experiment: Experiment, batch: RobotBatch, tell: Callable[[str, int, int], None], *, prepare: bool
+) -> TabledTube:
+    """The robots' tables."""
+    found = tables_of(batch)
+    lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
+    if lacking and not prepare:
+        otherwise = ", or model 'sbt', which leaves out the walls"
+        raise without_tables(experiment, lacking, "model 'tube' asks a table", otherwise)
+    made = [one.table for one in prepare_all(experiment.robots, stage="straight", progress=tell)] if lacking else found
+    return TabledTube({table.key: table for table in made if table is not None})
+
+
+def without_tables(experiment: Experiment, lacking: Sequence[str], need: str, otherwise: str = "") -> InputError:
+    """The error of a fit some of whose robots lack the table that it needs."""
+    more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
+    return InputError(
+        f"{experiment.source}: {need} of every robot, and {len(lacking)} of {len(experiment.robots)} have none "
+        f"({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
+        f"{TABLE_TAKES}{otherwise}"
+    )
+
+
+def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
+    """Parameters of dry friction."""
+    weight = weights_in_fluid(experiment.robots)
+    if not np.all(weight > 0):
+        place = int(np.argmin(weight > 0))
+        raise InputError(
+            f"free = 'friction_coefficient', but robot {experiment.robots[place].name} has no weight in the fluid that "
+            "would press it onto the floor; allowed: robots with body.mass and tail.density that sink"
+        )
+    if not np.all(np.isfinite(experiment.tail_rate)):
+        place = int(np.argmin(np.isfinite(experiment.tail_rate)))
+        raise InputError(
+            f"{experiment.source}, row {experiment.rows[place][0]}, column tail_rate_Hz: empty; allowed: a tail rate, "
+            "which dry friction is balanced at (free = 'friction_coefficient')"
+        )
+    return DryContact(weight, np.broadcast_to(0.5 * batch.body_diameter, (batch.size,)), experiment.tail_rate)
+
+
+FREE = ("shared_friction", "friction_coefficient", "roughness")
+"""Parameters that a fit of trials may free: where a robot lies follows from the run."""
+_RUNS = {1: 16, 2: 32, 3: 64}
+"""Trials of each robot, by the number of free parameters."""
+_FEWEST = 0.75
+"""Share of a robot's trials that have to have an answer."""
+Ends = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class TrialSurfaces:
+    """Observables of the trials of an experiment as functions of the free parameters."""
+
+    names: tuple[str, ...]
+    ends: Ends
+    """Least and largest value of each parameter at which trials were made."""
+    surfaces: tuple[RBFInterpolator, ...]
+    """For each robot U/omega, Omega/omega and the motor's rate over the logarithms of the parameters."""
+    scales: Samples
+    """Sizes of these three of each robot, (robots, 3)."""
+    error: float
+    """Median relative error of advance and motor rate at trials that were left out."""
+
+    def at(self, draws: Draws) -> tuple[Samples, Samples, Samples]:
+        """U/omega, m/rad, Omega/omega and omega_m, rad/s, (draws, robots) each; beyond the ends as at these."""
+        logs = [np.log(np.clip(draws[name], *self.ends[name])) for name in self.names]
+        found = []
+        for place, surface in enumerate(self.surfaces):
+            x = np.stack([column[:, min(place, column.shape[1] - 1)] for column in logs], axis=-1)
+            found.append(surface(x) * self.scales[place])
+        stacked = np.stack(found, axis=1)
+        return stacked[..., 0], stacked[..., 1], stacked[..., 2]
+
+
+def check_free(free: Sequence[str], model: str) -> None:
+    """Refuse parameters that a trial does not have, and models without one.
+
+    Raises:
+        InputError: naming them.
+    """
+    if model != WALLED:
+        raise InputError(f"answer = 'trial' with model '{model}', which has no trials; allowed: model '{WALLED}'")
+    wrong = [name for name in free if name not in FREE]
+    if wrong:
+        raise InputError(f"free = '{wrong[0]}' with answer = 'trial'; allowed: {', '.join(FREE)}")
+
+
+def trial_surfaces(
+    experiment: Experiment, ends: Ends, tell: Callable[[str, int, int], None], *, prepare: bool
+) -> TrialSurfaces:
+    """Make the trials of all robots and lay surfaces through them.
+
+    Args:
+        experiment: the observations with their robots.
+        ends: free parameter to the least and largest value that its prior allows.
+        tell: progress.
+        prepare: make tables with yawed poses that are not there.
+    """
+    _check_yaw_tables(experiment, tell, prepare=prepare)
+    return surfaces_of(experiment.robots, ends, tell)
+
+
+def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, int], None]) -> TrialSurfaces:
+    """Make the trials of robots with tables, and lay surfaces through them.
+
+    Args:
+        robots: the robots.
+        ends: free parameter to the least and largest value at which trials are made.
+        tell: progress.
+    """
+    names, count = tuple(ends), _RUNS[len(ends)]
+    logs = _points(ends, count)
+    surfaces, scales, errors = [], [], []
+    for place, robot in enumerate(robots):
+        seen = np.full((count, 3), np.nan)
+        values = [dict(zip(names, row.tolist(), strict=True)) for row in np.exp(logs)]
+        with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
+            for number, measured in enumerate(pool.map(partial(_measured, robot), values)):
+                tell("trials of the robots", place * count + number, len(robots) * count)
+                seen[number] = measured
+        known = np.isfinite(seen).all(axis=1)
+        if known.mean() < _FEWEST:
+            raise InputError(
+                f"{robot.with_tail}: {count - int(known.sum())} of {count} trials have no answer; allowed: robots that "
+                "stay in their tables"
+            )
+        scale = np.abs(seen[known]).max(axis=0)
+        surfaces.append(_surface(logs[known], seen[known] / scale))
+        scales.append(scale)
+        errors.append(_left_out(logs[known], seen[known] / scale))
+    return TrialSurfaces(names, ends, tuple(surfaces), np.array(scales), float(np.max(errors)))
+
+
+def _check_yaw_tables(experiment: Experiment, tell: Callable[[str, int, int], None], *, prepare: bool) -> None:
+    """Make the tables that are not there, or refuse."""
+    known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
+    lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
+    if lacking and not prepare:
+        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses")
+    if lacking:
+        prepare_all(experiment.robots, stage="yaw", progress=tell)
+
+
+def _points(ends: Ends, count: int) -> Samples:
+    """Logarithms of the parameters at the trials, (trials, parameters)."""
+    from scipy.stats import qmc
+
+    shares = qmc.Sobol(len(ends), rng=np.random.default_rng(1)).random(count)
+    low, high = (np.log([pair[end] for pair in ends.values()]) for end in (0, 1))
+    found: Samples = low + (high - low) * shares
+    return found
+
+
+def _measured(robot: Robot, values: Mapping[str, float]) -> tuple[float, float, float]:
+    """U/omega, Omega/omega and the motor's rate of a trial; NaN where there is none."""
+    more: dict[str, Any] = {}
+    if "roughness" in values:
+        more["roughness"] = values["roughness"]
+    if "friction_coefficient" in values:
+        more["in_tube"] = {"friction_coefficient": values["friction_coefficient"]}
+    if "shared_friction" in values:
+        robot = with_numbers(robot, {"friction.effective": values["shared_friction"]})
+    try:
+        trial = trial_means(simulate(robot, model=WALLED, **more)).values
+    except InputError:
+        return (np.nan, np.nan, np.nan)
+    tail = trial["tail_rotation_rate"]
+    return trial["forward_velocity"] / tail, trial["body_rotation_rate"] / tail, trial["motor_rotation_rate"]
+
+
+def _surface(x: Samples, values: Samples) -> RBFInterpolator:
+    from scipy.interpolate import RBFInterpolator
+
+    return RBFInterpolator(x, values, kernel="thin_plate_spline", degree=1)
+
+
+def _left_out(x: Samples, values: Samples) -> float:
+    """Median relative error of advance and motor rate at every fourth trial, by a surface through the others."""
+    apart = np.arange(len(x)) % 4 == 3
+    missed = _surface(x[~apart], values[~apart])(x[apart]) - values[apart]
+    relative = np.median(np.abs(missed / values[apart]), axis=0)
+    return float(max(relative[0], relative[2]))

@@ -1,0 +1,355 @@
+"""The commands of videos: `measure`, `track`, `render`, `virtual-experiment`, `setup` and `observations`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from spirillum.cli.function_command import FunctionCommand, Request, from_function
+from spirillum.cli.inputs import overrides_from, refuse_conflicts
+from spirillum.cli.shared_options import DISTURBANCES_PANEL, PANELS, Json, Settings, optional_robot, starting
+
+if TYPE_CHECKING:
+    from spirillum.live.observation import Observation, Tracked
+
+
+@from_function(
+    "spirillum.results.measurement:measure",
+    without={
+        "overrides": "--set",
+        **dict.fromkeys(("feasibility.setup", "feasibility.video", "feasibility.overrides"), "those of measure"),
+    },
+    robot=None,
+    tables={"feasibility": ("spirillum.measurement.feasibility:feasibility",)},
+)
+def measure(
+    request: Request,
+    *,
+    context: typer.Context,
+    videos: Annotated[
+        list[Path] | None, typer.Argument(metavar="VIDEO...", help="Videos or folders of images, one a trial.")
+    ] = None,
+    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "spirillum-measurement"
+    ),
+    feasibility: Annotated[
+        bool,
+        typer.Option(
+            "--feasibility",
+            help="Does the camera of --setup resolve the expected rates?",
+            rich_help_panel=PANELS["feasibility."],
+        ),
+    ] = False,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Measure speed and rotation rates in videos, each a trial, with 95 % intervals.
+
+    Example: `spirillum measure trial-1.mp4 trial-2.mp4 --setup setup.toml -o measured`
+    """
+    from spirillum.cli import renderer
+    from spirillum.errors import InputError
+
+    if setup is None:
+        raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
+    overrides = overrides_from(settings)
+    refuse_conflicts(context, "feasibility" if feasibility else "no feasibility")
+    expected = request.take("feasibility")
+    if feasibility:
+        from spirillum.measurement.feasibility import feasibility as verdict
+
+        if videos and len(videos) > 1:
+            raise InputError(f"--feasibility with {len(videos)} videos; allowed: none, or one that shows the ruler")
+        found = verdict(
+            setup,
+            **expected,
+            video=videos[0] if videos else None,
+            overrides=overrides,
+        )
+        renderer.show(found.to_dict(), json=json)
+        if not found.feasible:
+            raise typer.Exit(1)
+        return
+    from spirillum.measurement.trials import RATE_NAMES
+
+    with renderer.progress_bar(quiet=json) as progress:
+        result = request(videos or [], setup, output, overrides=overrides, progress=progress)
+    renderer.show(result.to_dict(), json=json)
+    if result.failures:
+        video, sentence = result.failures[0]
+        more = "" if len(result.failures) == 1 else f" (and {len(result.failures) - 1} more)"
+        where = "" if Path(video).name in sentence else f"{video}: "
+        raise InputError(f"{where}{sentence}{more}")
+    values = [trial.quantities[name].value for trial in result.trials for name in RATE_NAMES]
+    if values and not any(math.isfinite(value) for value in values):
+        trial = result.trials[0]
+        raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
+
+
+def _complete_paces(incomplete: str) -> list[str]:
+    return starting(("fast", "real"), incomplete)
+
+
+@from_function(
+    "spirillum.live.session:track",
+    without={"overrides": "--set", "on_observation": "the terminal or --udp"},
+    complete={"pace": _complete_paces},
+    robot=None,
+)
+def track(
+    request: Request,
+    *,
+    source: Annotated[
+        str,
+        typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...)."),
+    ],
+    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Track a robot live: a JSON line for every frame, and a last one for all of them.
+
+    With --udp the lines go out as datagrams, and the terminal shows the end alone.
+
+    Example: `spirillum track camera:0 --setup setup.toml --size 640x480 --fps 30`
+    """
+    from spirillum.cli import renderer
+    from spirillum.errors import InputError
+    from spirillum.live.session import observation_line
+    from spirillum.live.streams import line_of
+
+    if setup is None:
+        raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
+
+    def say(said: Observation, latency: float | None) -> None:
+        typer.echo(line_of(observation_line(said, latency)))
+
+    typed = request.typed
+    if "size" in typed:
+        typed["size"] = _size(typed["size"])
+    lines = "udp" not in typed
+    result = request(source, setup, overrides=overrides_from(settings), on_observation=say if lines else None)
+    if lines:
+        typer.echo(line_of(result.to_dict()))
+    else:
+        renderer.show(result.to_dict(), json=json)
+    _end(result, source)
+
+
+def _end(result: Tracked, source: str) -> None:
+    """Leave with the exit code of how it ended."""
+    from spirillum.errors import InputError
+    from spirillum.measurement.trials import RATE_NAMES
+
+    if result.interrupted:
+        raise KeyboardInterrupt
+    if result.stopped:
+        raise InputError(result.stopped)
+    if result.trial is not None:
+        rates = [result.trial.quantities[name] for name in RATE_NAMES]
+        if all(rate.value != rate.value for rate in rates):
+            slow = result.pace == "real" and Path(source).exists() and result.dropped > result.tracked
+            hint = "; most frames passed while the robot was learnt: --pace fast looks at all of them" if slow else ""
+            raise InputError(f"{result.source}: no rate could be given: {rates[0].reason}{hint}")
+
+
+def _size(word: str) -> tuple[int, int]:
+    from spirillum.errors import InputError
+
+    parts = word.lower().split("x")
+    if len(parts) != 2 or not all(part.isascii() and part.isdigit() and 1 <= len(part) <= 5 for part in parts):
+        raise InputError(f"size = {word[:40]!r}; allowed: WIDTHxHEIGHT in pixels, for example 640x480")
+    return int(parts[0]), int(parts[1])
+
+
+def _complete_presets(incomplete: str) -> list[str]:
+    return starting(("clean", "degraded"), incomplete)
+
+
+_Preset = Annotated[
+    str,
+    typer.Option(
+        "--preset",
+        autocompletion=_complete_presets,
+        help="clean, or degraded: all disturbances but bubbles and hand.",
+        rich_help_panel=DISTURBANCES_PANEL,
+    ),
+]
+_Trouble = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME,...",
+        help="Artifacts of a recording: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
+        "mirrored-lamps, grid-paper, glass-cover, noise, lamp, compression, missing-frames, tilted, glare, "
+        "standing-glare, bubbles, hand; with commas between them, or repeated.",
+        rich_help_panel=DISTURBANCES_PANEL,
+    ),
+]
+
+
+@from_function(
+    "spirillum.virtual.trial:render",
+    without={"path": "-o FILE", "setup": "it is written beside the video", "troubles.": "--trouble, by name"},
+    robot=optional_robot("A preset's name or a TOML file; else that of --run."),
+)
+def render(
+    request: Request,
+    *,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
+    ],
+    preset: _Preset = "clean",
+    trouble: _Trouble = None,
+    json: Json = False,
+) -> None:
+    """Film a robot with a virtual laboratory camera, to try `measure` before the experiment. Needs the extra `video`.
+
+    The video is synthetic, and its truth is written beside it. For a film to show to people, see `film`.
+
+    Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
+    """
+    from spirillum.cli import renderer
+
+    request.typed["degradation.preset"] = preset
+    with renderer.progress_bar(quiet=json) as progress:
+        found = request(output, troubles=None if trouble is None else ",".join(trouble), progress=progress)
+    renderer.show(found.to_dict(), json=json)
+
+
+@from_function(
+    "spirillum.virtual.experiment:virtual_experiment",
+    without={
+        **dict.fromkeys(("motion.forward_velocity", "motion.body_rate"), "of one robot, render"),
+        **dict.fromkeys(("camera.exposure", "camera.field_of_view", "camera.distortion"), "of render"),
+    },
+    robot=None,
+)
+def virtual_experiment(
+    request: Request,
+    *,
+    study: Annotated[
+        Path | None, typer.Argument(help="Study file (see `spirillum schema study`); else the paper's two presets.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the videos.")] = Path(
+        "spirillum-virtual-experiment"
+    ),
+    preset: _Preset = "clean",
+    json: Json = False,
+) -> None:
+    """Film five trials of each robot of a study with that camera, with their truth: synthetic. A rerun resumes.
+
+    Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
+    """
+    from spirillum.cli import renderer
+
+    request.typed["degradation.preset"] = preset
+    with renderer.progress_bar(quiet=json) as progress:
+        found = request(study, output, progress=progress)
+    renderer.show(found.to_dict(), json=json)
+
+
+setup_app = typer.Typer(name="setup", help="Setup files: camera, tank, ruler and robot.", no_args_is_help=True)
+
+
+@setup_app.command("new", cls=FunctionCommand)
+@from_function("spirillum.measurement.setup_template:new_setup_file", without={"path": "the argument"}, robot=None)
+def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to write (.toml).")]) -> None:
+    """Write a setup file to fill in.
+
+    Example: `spirillum setup new setup.toml`
+    """
+    request(file)
+    typer.echo(f"{file}: fill in heights, their uncertainties and the robot; comments explain them")
+
+
+@setup_app.command("propose", cls=FunctionCommand)
+@from_function("spirillum.measurement.proposal:propose_setup", robot=None)
+def propose(
+    request: Request,
+    *,
+    film: Annotated[Path, typer.Argument(help="A film, or a folder of images.")],
+    robot: Annotated[
+        str | None, typer.Argument(help="Preset or robot file; else the paper's robot is looked for.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.toml).")] = Path(
+        "setup.toml"
+    ),
+    json: Json = False,
+) -> None:
+    """Inspect a video and write a setup file: detected values are filled in, the rest is marked.
+
+    Example: `spirillum setup propose trial-1.mp4 my-robot.toml --spacing 2mm -o setup.toml`
+    """
+    from spirillum.cli import renderer
+
+    with renderer.progress_bar(quiet=json) as progress:
+        found = request(film, robot, output, progress=progress)
+    renderer.show(found.to_dict(), json=json)
+
+
+@setup_app.command("check")
+def check_setup(
+    file: Annotated[Path, typer.Argument(help="Setup file (TOML).")],
+    film: Annotated[Path | None, typer.Argument(help="A film that was taken with it, to look at too.")] = None,
+    json: Json = False,
+) -> None:
+    """Check a setup file, the effect of its uncertain heights on lengths, and its agreement with a video.
+
+    Example: `spirillum setup check setup.toml trial-1.mp4`
+    """
+    from spirillum.cli import renderer
+    from spirillum.measurement.setup_template import setup_answer
+
+    renderer.show(setup_answer(file, film), json=json)
+
+
+observations_app = typer.Typer(name="observations", help="Files of observed speeds and rates.", no_args_is_help=True)
+
+
+@observations_app.command("new")
+def new_observations(
+    file: Annotated[Path, typer.Argument(help="File to write (.csv).")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
+) -> None:
+    """Write an empty observations file to fill in.
+
+    Example: `spirillum observations new observations.csv`
+    """
+    from spirillum.measurement.observations import new_observations_file
+
+    new_observations_file(file, overwrite=force)
+    typer.echo(f"{file}: columns and their units are explained in its comments")
+
+
+@observations_app.command("check")
+def check_observations(
+    file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")],
+    json: Json = False,
+) -> None:
+    """Check an observations file and count what is in it.
+
+    Example: `spirillum observations check observations.csv`
+    """
+    from spirillum.cli import renderer
+    from spirillum.measurement.observations import observations_answer
+
+    renderer.show(observations_answer(file), json=json)
+
+
+@observations_app.command("join")
+def join_observations(
+    files: Annotated[list[Path], typer.Argument(help="Observations files (CSV or Parquet), two or more.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.csv).")],
+) -> None:
+    """Join several observations files, such as one of each robot, to one for `calibrate`.
+
+    Example: `spirillum observations join measured/*/observations.csv -o all.csv`
+    """
+    from spirillum.measurement.observations import join_observations
+
+    rows = join_observations(files, output)
+    typer.echo(f"{output}: {rows} rows of {len(files)} files")

@@ -1,0 +1,194 @@
+"""The commands of pictures: `page`, `show`, `film` and `flow`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.inputs import refuse_conflicts
+from spirillum.cli.shared_options import NO_FORM, Json, complete_frames, complete_planes, optional_robot, starting
+from spirillum.errors import InputError
+
+
+@from_function(
+    "spirillum.pages.launch:page",
+    robot=optional_robot("A preset's name or a robot file (TOML); else that of --run, or biorob2012-wide."),
+)
+def page(request: Request) -> None:
+    """Show a robot alive in the browser: it swims, its knobs turn, its numbers follow. Needs the extra `page`.
+
+    Example: `spirillum page biorob2012-wide`
+    """
+    if not request.settings:
+        request.robot = request.named_robot  # the page offers its name in commands
+    request(tell=typer.echo)
+
+
+_VIEWS = ("front", "perspective", "rear", "side", "top")
+
+
+def _complete_views(incomplete: str) -> list[str]:
+    return starting(_VIEWS, incomplete)
+
+
+def _complete_cameras(incomplete: str) -> list[str]:
+    return starting(("auto", "fixed", "follow"), incomplete)
+
+
+_View = Annotated[
+    str, typer.Option(autocompletion=_complete_views, help="perspective, or to scale: side, top, front, rear.")
+]
+
+
+@from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _complete_views})
+def show(
+    request: Request,
+    *,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
+    ] = None,
+    window: Annotated[bool, typer.Option("--window", help="Open an interactive window.")] = False,
+    json: Json = False,
+) -> None:
+    """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
+
+    Example: `spirillum show biorob2012-wide -o robot.png --view side`
+    """
+    from spirillum.cli import renderer
+
+    target = output if output is not None or window else Path("robot.png")
+    with renderer.at_work("drawing the robot", quiet=json):
+        found = request(target, window=window)
+    renderer.show(found.to_dict(), json=json)
+
+
+def film(
+    run: Annotated[Path, typer.Argument(help="A run (NetCDF), written by `spirillum simulate`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The film: .mp4 or .gif.")],
+    view: _View = "perspective",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the film, even numbers.")] = "1280x720",
+    fps: Annotated[int, typer.Option(help="Frames a second.")] = 30,
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Seconds of the run in a second of film; else 1, or slower where the tail turns fast."),
+    ] = None,
+    camera: Annotated[
+        str,
+        typer.Option(autocompletion=_complete_cameras, help="fixed, follow, or auto (follow a robot that swims far)."),
+    ] = "auto",
+    json: Json = False,
+) -> None:
+    """Film a run of `simulate` in three dimensions, to show to people. Needs the extra `3d`.
+
+    Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
+    """
+    from spirillum.cli import renderer
+    from spirillum.dynamics.run_file import open_run
+    from spirillum.files import output_target
+    from spirillum.view.scene3d.film import film as answer
+    from spirillum.view.scene3d.rendering import FILMS
+
+    output_target(output, FILMS, "run.mp4")
+    dataset = open_run(run)
+    with renderer.progress_bar(quiet=json) as progress:
+        found = answer(dataset, output, view=view, size=size, fps=fps, speed=speed, camera=camera, progress=progress)
+    renderer.show(found.to_dict(), json=json)
+
+
+def _complete_models(incomplete: str) -> list[str]:
+    from spirillum.fields.flow import FLOW_MODELS
+
+    return starting(("auto", *FLOW_MODELS), incomplete)
+
+
+@from_function(
+    "spirillum.fields.flow:flow",
+    without={
+        **NO_FORM,
+        "resolution.phases": "an option of the robot, model.tube.phases",
+        "calibrated": "factors stand for walls that are not in the flow",
+    },
+    complete={"model": _complete_models, "frame": complete_frames},
+    robot=optional_robot("A preset's name or a TOML file; none with --run."),
+)
+def flow(
+    request: Request,
+    *,
+    context: typer.Context,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
+    ] = None,
+    volume: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A box around the robot: .vti for ParaView, or .nc.")
+    ] = None,
+    plane: Annotated[
+        str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
+    ] = "xz",
+    offset: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Position of the plane on the axis normal to it, such as -50mm.")
+    ] = "0mm",
+    extent: Annotated[
+        str | None,
+        typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
+    ] = None,
+    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
+    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
+    run: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The flow at a moment of a free run in a tube instead, by `simulate`."),
+    ] = None,
+    time: Annotated[str | None, typer.Option(metavar="TIME", help="With --run: the moment, such as 0.5s.")] = None,
+    json: Json = False,
+) -> None:
+    """Compute velocity and pressure of the fluid around the swimming robot: a picture, or numbers on a grid.
+
+    Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
+    """
+    from spirillum.cli import renderer
+    from spirillum.fields.flow import box_around, flow_answer, plane_around, seat_in_tube
+    from spirillum.files import guard_inputs
+    from spirillum.fluid.tube.domain import seat_of
+    from spirillum.results.flow import check_targets, write_flow
+
+    with guard_inputs(run):
+        check_targets(output, volume)
+    model = request.typed.get("model", "auto")
+    states = {"no plane": output is None, "no volume": volume is None, "run": run is not None}
+    states["run with another model"] = run is not None and model not in ("auto", "tube")
+    refuse_conflicts(context, *(state for state, holds in states.items() if holds))
+    fineness = request.arguments.get("resolution")
+    if run is None:
+        if request.named_robot is None or time is not None:
+            said = "no robot" if request.named_robot is None else f"time = {time} without a run"
+            raise InputError(f"{said}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
+        loaded = request.robot
+        seat = seat_in_tube(loaded, model, request.arguments.get("placement"), fineness)
+    else:
+        from spirillum.dynamics.flow_of_run import flow_of_run, moment_of_run
+
+        if time is None:
+            raise InputError("no moment of the run; allowed: --time, such as 0.5s")
+        moment = moment_of_run(run, time, fineness).prediction
+        loaded, seat = moment.robot, seat_of(moment.batch)
+    plane_around(loaded, plane, offset, extent, resolution, seat)
+    if volume is not None:
+        box_around(loaded, extent, volume_resolution, seat)
+    with renderer.progress_bar(quiet=json) as progress, guard_inputs(run):
+        if run is None:
+            progress("flow: forces on the robot", 0, 1)
+            found = request()
+        else:
+            frame = request.typed.get("frame", "lab")
+            found = flow_of_run(run, str(time), frame=frame, resolution=fineness, progress=progress)
+        written = {}
+        if output is not None:
+            written[output] = found.plane(plane, offset=offset, extent=extent, resolution=resolution, progress=progress)
+        if volume is not None:
+            written[volume] = found.volume(extent=extent, resolution=volume_resolution, progress=progress)
+        for path, dataset in written.items():
+            write_flow(found, dataset, path)
+    renderer.show(flow_answer(found, written), json=json)

@@ -1,0 +1,429 @@
+"""A rotating magnetic field: its rate, axis and strength over time, and one-piece swimmers against its rate.
+
+Held to the axis about which the field turns, the answer is a closed form (see `spirillum.swimming.drives`). A free
+robot finds its own attitude: at low rates it may turn about a short axis or wobble, at higher ones its axis comes
+near that of the field and it swims as a corkscrew, until the field turns faster than it can follow (K. I. Morozov and
+A. M. Leshansky, Nanoscale 6:1580, 2014; Y. Man and E. Lauga, Phys. Fluids 25:071904, 2013). Here every rate is a run
+in time that goes on from the attitude of the one before, as when the field is slowly sped up.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.free_robot import FreeRobot, TwoLinks, two_links
+from spirillum.dynamics.integration import Reach, integrate
+from spirillum.dynamics.timing import Switch
+from spirillum.errors import InputError, check_range
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels import rigid_links
+from spirillum.notes import Note, note_attributes
+from spirillum.quantities import attributes
+from spirillum.robot.arguments import Options
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
+from spirillum.robot.load import load, with_resolution
+from spirillum.robot.model_options import Resolution
+from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO, UNBOUNDED
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.released_motion import check_full
+from spirillum.swimming.reynolds import (
+    body_reynolds,
+    reynolds_limits,
+    reynolds_warnings,
+    stokes_flow_problem,
+    tail_reynolds,
+    without_reynolds_bound,
+)
+from spirillum.swimming.steady import Swimming, swim
+from spirillum.units import KINDS, parse_option, show
+from spirillum.version import versions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+_A = TypeVar("_A", bound=FreeRobot)
+
+
+class Field(Options):
+    """Settings of the coils from now on; what is not given stays as it was."""
+
+    argument: ClassVar[str] = "field"
+    prefixed: ClassVar[bool] = True
+
+    rotation_rate: Rate | None = None
+    """Rotation rate of the field about its axis."""
+    yaw: Yaw | None = None
+    """Angle to +y of the field's axis of rotation, up to 45 degrees; along the lab's +x without it."""
+    pitch: Pitch | None = None
+    """Elevation of that axis from the horizontal."""
+    strength: MagneticField | None = None
+    """Flux density, at right angles to the axis."""
+
+
+@dataclass(frozen=True)
+class TurningField:
+    """A uniform field that turns about an axis, at right angles to it; SI."""
+
+    rotation_rate: float
+    """rad/s."""
+    strength: float
+    """T."""
+    yaw: float = 0.0
+    """Of the axis, rad."""
+    pitch: float = 0.0
+    """Of the axis, rad."""
+    phase: float = 0.0
+    """Angle at time 0 at this rate, from up, rad."""
+
+    @classmethod
+    def of(cls, links: FreeRobot) -> TurningField | None:
+        """The field of a robot's file; None for another drive."""
+        if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
+            return None
+        return cls(float(links.drive[rigid_links.FIELD_RATE]), float(links.drive[rigid_links.FIELD]))
+
+    @property
+    def axis(self) -> Samples:
+        """Direction of the axis in the lab, (3,)."""
+        level = np.cos(self.pitch)
+        return np.array([level * np.cos(self.yaw), level * np.sin(self.yaw), np.sin(self.pitch)])
+
+    def changed(self, asked: Field, time: float) -> TurningField:
+        """The field from a time on; its angle does not jump.
+
+        Args:
+            asked: what changes.
+            time: s.
+        """
+        given = asked.model_dump(exclude_none=True)
+        rate = given.get("rotation_rate", self.rotation_rate)
+        return replace(self, **given, phase=self.phase + (self.rotation_rate - rate) * time)
+
+    def on(self, links: _A) -> _A:
+        """A robot in this field."""
+        drive = links.drive.copy()
+        drive[rigid_links.FIELD_RATE], drive[rigid_links.FIELD] = self.rotation_rate, self.strength
+        drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE] = self.axis[1:]
+        drive[rigid_links.FIELD_PHASE] = self.phase
+        return replace(links, drive=drive)
+
+
+def in_tilted_field(links: _A, asked: Field) -> _A:
+    """A robot in the field of its file, which rotates about the given axis.
+
+    Args:
+        links: what its rates follow from.
+        asked: yaw and pitch of the axis; what is not given is 0.
+    """
+    given = asked.model_dump(exclude_none=True)
+    if not given:
+        return links
+    own = TurningField.of(links)
+    if own is None:
+        raise InputError(f"field.{next(iter(given))} without a field; allowed: with drive.kind = 'magnetic'")
+    for name in ("rotation_rate", "strength"):
+        if name in given:
+            place = "magnetic.field" if name == "strength" else f"magnetic.{name}"
+            raise InputError(f"field.{name} of a run; allowed: {place} of the robot")
+    return own.changed(asked, 0.0).on(links)
+
+
+_TILT = 0.1
+"""Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance."""
+_SAMPLES = 64
+_OPEN = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
+_SETTLED = 1e-3
+"""Largest relative change of the velocity from one stretch to the next."""
+_STILL = 1e-4
+"""Largest change of the wobble from one stretch to the next, rad."""
+_MOST_STRETCHES = 25
+_MOST_RATES = 2000
+_MOST_WORK = 3e7
+"""Turns of all stretches, each over the share of the step-out rate at which it is turned: a quarter of an hour."""
+
+
+class _Mean(NamedTuple):
+    """Averages over one stretch of a run at one rate."""
+
+    velocity: float
+    rate: float
+    wobble: float
+    least_wobble: float
+    most_wobble: float
+    lag: float
+    """NaN where the robot slips."""
+    state: Samples
+    """At the end."""
+
+    @property
+    def follows(self) -> bool:
+        """Whether the robot follows the field."""
+        return bool(np.isfinite(self.lag))
+
+    def agrees(self, other: _Mean) -> bool:
+        """Whether nothing has changed any more."""
+        same = abs(self.velocity - other.velocity) <= _SETTLED * max(abs(self.velocity), abs(other.velocity))
+        return same and abs(self.wobble - other.wobble) <= _STILL and self.follows == other.follows
+
+
+def magnetic_sweep(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    rates: Sequence[str | float] | Samples | None = None,
+    *,
+    model: str = AUTO,
+    turns: float = 30.0,
+    resolution: Resolution | Mapping[str, Any] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> xr.Dataset:
+    """Speed, lag and wobble of a one-piece swimmer against the field's rate; floats are in SI units, rates in rad/s.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.
+        rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
+            None: 40 rates up to one and a half times the step-out rate of the held robot.
+        model: `slender` or `rft`; or `auto`: `slender` for a robot without a channel. A robot in a channel needs the
+            name of a model: a sweep leaves the walls out.
+        turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
+            at most 25, and the last is averaged, over whole slips where the robot slips.
+        resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.
+        progress: told what is being computed, how many rates are done, and of how many.
+
+    Returns:
+        Dataset over `field_rate` (rad/s): `forward_velocity` along the field's axis, `tail_rotation_rate` about it,
+        `wobble_angle` with its least and largest, `phase_lag` (NaN where the robot slips), `settled` (0 where they
+        still change), and the same of the held robot in closed form; `step_out_rate` of the held robot as a scalar.
+
+    Raises:
+        InputError: for another drive, wrong rates, a model without all entries, or a rate at which the robot moves far
+            outside Stokes flow.
+    """
+    loaded = load(robot)
+    if model == AUTO and loaded.channel is not None and loaded.magnetic is not None:
+        raise InputError(
+            f"{loaded.name} has a channel, whose walls a sweep does not know; allowed: model 'slender' or 'rft', which "
+            "leave them out, or `simulate` at each rate"
+        )
+    model = UNBOUNDED if model == AUTO else model
+    check_full(find_swimmer_model(model))
+    own = with_resolution(loaded, resolution, model)
+    # The rates of the sweep decide whether there is an answer, not the robot's own.
+    held = replace(predict(without_reynolds_bound(own), model=model, calibrated=False), robot=own)
+    if held.batch.drive != "magnetic":
+        raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
+    check_range("turns", turns, 4, 10_000)
+    asked = _rates(rates, held)
+    _check_work(asked, turns, held.step_out_rate)
+    batch = replace(held.batch, options=own.model)
+    closed = swim(held.batch.with_values({"magnetic.rotation_rate": asked}), held.model, calibrated=False)
+    inertia = _check_stokes(batch, asked, closed.forward_velocity, closed.tail_rotation_rate)
+    links = two_links(
+        held.robot,
+        held.batch,
+        held.model,
+        friction="none",
+        effective=0.0,
+        calibrated=False,
+        weight=False,
+        roughness=None,
+    )
+    level: Samples = np.array([1.0, 0.0, 0.0, 0.0])
+    attitude: Samples = level
+    found, settled = [], []
+    for done, rate in enumerate(asked):
+        if progress is not None:
+            progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, asked.size)
+        mean, still = _settled(links, float(rate), _pushed(attitude), turns)
+        attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
+        found.append(mean)
+        settled.append(still)
+        inertia |= _check_stokes(batch, np.array([rate]), np.array([mean.velocity]), np.array([mean.rate]))
+    said = [*_without_walls(held), *held.robot.warnings, *inertia.values()]
+    return _dataset(held, closed, asked, found, np.array(settled, dtype=float), turns, said)
+
+
+def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, Note]:
+    """Notes where the motion at some rates of the field leaves Stokes flow, by limit: that of the last rate."""
+    found: dict[str, Note] = {}
+    for rate, one, turned in zip(rates.tolist(), speed, turning, strict=True):
+        limits = reynolds_limits(batch, body_reynolds(batch, one), tail_reynolds(batch, turned))
+        if problem := stokes_flow_problem(batch, limits):
+            raise InputError(f"at a field of {show(rate, 'Hz')} (--rate) {problem}")
+        where = f"at a field of {show(rate, 'Hz')} "
+        found |= {flag: note.prefixed(where) for flag, note in reynolds_warnings(limits).items()}
+    return found
+
+
+def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
+    if rates is None:
+        angle = float(held.batch.moment_angle[0])
+        if np.sin(angle) < 1e-6:
+            raise InputError(
+                f"magnetic.moment_angle = {show(angle, 'deg')}: a moment along the motor axis has no step-out rate; "
+                "allowed: a moment across it, or rates (--rate)"
+            )
+        return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
+    given: Any = [rates] if isinstance(rates, str) else rates
+    if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:
+        raise InputError(f"rates = {str(rates)[:40]}; allowed: a list of rates")
+    asked = np.array(
+        [parse_option("rates", float(r) if isinstance(r, np.floating) else r, KINDS["rate"]) for r in given]
+    )
+    if not 1 <= asked.size <= _MOST_RATES:
+        raise InputError(f"rates has {asked.size} values; allowed: 1 to {_MOST_RATES}")
+    growing = bool(np.all(np.diff(np.abs(asked)) > 0)) and bool(np.all(asked * asked[0] > 0))
+    if not growing:
+        raise InputError(
+            "rates do not increase in size from above 0 in one sense; allowed: increasing rates, all > 0 or < 0"
+        )
+    return asked
+
+
+def _check_work(rates: Samples, turns: float, step_out: float) -> None:
+    """Refuse a sweep that takes hours: steps are those of step-out, and slower turns take more of them."""
+    slowness = np.maximum(step_out / np.abs(rates), 1.0) if np.isfinite(step_out) else np.ones(rates.size)
+    work = turns * float(np.sum(slowness))
+    if work > _MOST_WORK:
+        raise InputError(
+            f"rates from {show(float(np.abs(rates).min()), 'Hz')} on, {turns:g} turns each, take as long as {work:.2g} "
+            f"turns near step-out ({show(step_out, 'Hz')}); allowed: {_MOST_WORK:.0e}, as with higher or fewer rates"
+        )
+
+
+def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
+    """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
+    drive = links.drive.copy()
+    drive[rigid_links.FIELD_RATE] = rate
+    here = replace(links, drive=drive)
+    start: Samples = np.zeros(rigid_links.STATES)
+    start[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = attitude
+    whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up
+    time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
+    before = None
+    for _ in range(_MOST_STRETCHES):
+        try:
+            run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN).require_completion()
+        except InputError as error:
+            raise InputError(
+                f"rates: at {show(rate, 'Hz')} {str(error).partition(';')[0]}; allowed: rates nearer to step-out"
+            ) from error
+        mean = _averaged(here, rate, run.time, run.states)
+        if before is not None and mean.agrees(before):
+            return mean, True
+        before, start = mean, mean.state
+    return mean, False
+
+
+def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
+    from scipy.spatial.transform import Rotation
+
+    attitudes = Rotation.from_quat(states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4], scalar_first=True)
+    rotation = np.asarray(attitudes.as_matrix())
+    moment = rotation @ links.drive[rigid_links.MOMENT : rigid_links.FIELD]
+    behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
+    slipped = behind - behind[0]
+    follows = abs(float(slipped[-1])) < 0.5 * np.pi
+    slips = int(slipped[-1] // (2.0 * np.pi))
+    last = time.size - 1 if slips < 1 else int(np.searchsorted(slipped, 2.0 * np.pi * slips))
+    wobble = np.arccos(np.clip(np.abs(rotation[: last + 1, 0, 0]), 0.0, 1.0))
+    span = float(time[last])
+    return _Mean(
+        velocity=float(states[last, 0] - states[0, 0]) / span,
+        rate=rate - float(np.sign(rate) * slipped[last]) / span,
+        wobble=float(np.mean(wobble)),
+        least_wobble=float(np.min(wobble)),
+        most_wobble=float(np.max(wobble)),
+        lag=float(np.angle(np.mean(np.exp(1j * behind)))) if follows else np.nan,
+        state=states[-1],
+    )
+
+
+def _pushed(attitude: Samples) -> Samples:
+    """The attitude with the robot's axis pushed aside a little."""
+    from scipy.spatial.transform import Rotation
+
+    push = Rotation.from_rotvec([0.0, 0.0, _TILT])
+    return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
+
+
+def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[Note]:
+    """A sentence on the rates at which the motion still changes."""
+    if np.all(settled):
+        return []
+    open_ = np.abs(rates[settled == 0])
+    words = (
+        f"at {open_.size} of {rates.size} rates ({show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}) "
+        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns; use more turns"
+    )
+    return [Note("unsteady", words, ("forward_velocity", "wobble_angle"))]
+
+
+def _without_walls(held: Prediction) -> list[Note]:
+    """A sentence on the walls of a robot's channel, which a sweep leaves out; none without a channel."""
+    if held.robot.channel is None:
+        return []
+    words = (
+        f"wall effects are not modelled by '{held.model.name}': speed and step-out rate are too high; predict with tube"
+    )
+    return [Note("walls-left-out", words, ("model", "channel"))]
+
+
+def _dataset(
+    held: Prediction,
+    closed: Swimming,
+    rates: Samples,
+    found: Sequence[_Mean],
+    settled: Samples,
+    turns: float,
+    notes: Sequence[Note],
+) -> xr.Dataset:
+    import xarray as xr
+
+    table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
+    free = {
+        "forward_velocity": (table["velocity"], "mean velocity along the axis of the field"),
+        "tail_rotation_rate": (table["rate"], "mean rate at which the moment turns about it"),
+        "wobble_angle": (table["wobble"], "mean angle between the motor axis and the axis of the field"),
+        "least_wobble_angle": (table["least_wobble"], None),
+        "largest_wobble_angle": (table["most_wobble"], None),
+        "phase_lag": (table["lag"], "mean angle of the moment behind the field; NaN where it slips"),
+        "settled": (settled, None),
+    }
+    data: dict[str, Any] = {
+        name: ("field_rate", values, attributes(name, meaning=meaning, source="two rigid links, one piece, m x B"))
+        for name, (values, meaning) in free.items()
+    }
+    for name in ("forward_velocity", "tail_rotation_rate", "phase_lag"):
+        values = np.broadcast_to(getattr(closed, name), rates.shape)
+        meaning = f"{name.replace('_', ' ')} of the held robot, closed form"
+        data[f"held_{name}"] = ("field_rate", values, attributes(name, meaning=meaning, source="m B sin(lag)"))
+    data["step_out_rate"] = (
+        (),
+        held.step_out_rate,
+        attributes("step_out_rate"),
+    )
+    return xr.Dataset(
+        data,
+        coords={"field_rate": ("field_rate", rates, attributes("field_rate"))},
+        attrs={
+            "title": f"{held.robot.name} in a rotating field",
+            "robot": held.robot.name,
+            "model": held.model.name,
+            "turns": float(turns),
+            "settings": json.dumps(held.robot.model_dump(), sort_keys=True),
+            "known_error": held.known_error,
+            "integrator": TwoLinks.integrator(),
+            "references": " ".join(held.references),
+            **note_attributes([*notes, *_unsettled(rates, settled, turns)]),
+            "versions": versions(),
+        },
+    )

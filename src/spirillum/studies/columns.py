@@ -1,0 +1,364 @@
+"""Columns of a study beside its models: bands over open poses, axial motion by `tube`, trials after release.
+
+Robots of one channel that share a place come one after the other: what is solved for body and wall there serves them
+all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.dynamics.prediction import predict
+from spirillum.dynamics.trial import ASSUMPTION
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model, quickest
+from spirillum.notes import Note
+from spirillum.quantities import QUANTITIES, attributes
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import all_hold, assembly_limits, broken
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.robot.tube_pose import GAP_SHARE
+from spirillum.studies.spec import Contact
+from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
+from spirillum.studies.work import OneRobot, Part, StudyTask, gathered, groups
+from spirillum.swimming.band import at_place, band_places, joined
+from spirillum.swimming.model_choice import WALLED, has_table
+from spirillum.swimming.steady import requirements, swim
+from spirillum.units import show
+
+AT_PLACES = (
+    "forward_velocity",
+    "advance_per_radian",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "tail_torque",
+    "hydrodynamic_efficiency",
+    "plug_velocity",
+)
+"""Quantities that have a band, and a value at each of its poses."""
+
+
+@dataclass(frozen=True)
+class BandTask(StudyTask):
+    """One model for the robots of one channel that share a pose of their bands."""
+
+    model: str
+    place: int
+    """Index of the pose in the band of each robot."""
+    robots: tuple[RobotBatch, ...]
+    """The robots at that pose, one by one."""
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Models whose linear algebra is limited to one thread."""
+        return (self.model,)
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
+        return f"{self.model}, band: {self.where}, {self.size} robots"
+
+    @property
+    def where(self) -> str:
+        """The pose in words."""
+        placement = self.robots[0].placement
+        return f"gap {show(placement.gap or 0.0, 'mm')}, pitch {show(placement.pitch or 0.0, 'deg')}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return set(AT_PLACES)
+
+    def leading(self, readings: int) -> tuple[int, ...]:
+        """Return the sizes of the first axes of all arrays: robots, friction readings."""
+        return self.size, readings
+
+    def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Compute steady swimming at this pose, (robots, friction readings); NaN where there is none."""
+        model = find_swimmer_model(self.model)
+        there = [_quickly(robot, model) for robot in self.robots]
+        found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
+        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
+
+
+def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
+    """The tasks of the band, always in the same order, numbered from `first`; none where it is not requested."""
+    if not loaded.study.band:
+        return
+    number = first
+    for indices, batch in groups(loaded):
+        robots = [block for _, block in batch.blocks(1)]
+        for name in loaded.study.models:
+            model = find_swimmer_model(name)
+            for place, sharing in _shared_places(robots, model):
+                there = tuple(sharing.values())
+                yield BandTask(number, indices[list(sharing)], name, place, there)
+                number += 1
+
+
+def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, SwimmerModel]:
+    """A robot with the form of a model that answers first: from its table, or solved with the resolution of a band."""
+    quick = quickest(model, robot)
+    return (at_place(robot, robot.placement), model) if quick is model else (robot, quick)
+
+
+def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
+    """Index of a pose of the band, and the robots that share it, by their index, at that pose."""
+    bands = {}
+    for index, single in enumerate(robots):
+        if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
+            bands[index] = band_places(single, model)
+    places = max((len(band) for band in bands.values()), default=0)
+    for place in range(places):
+        sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
+        for index, band in bands.items():
+            key = (band[place].gap, band[place].pitch)
+            sharing.setdefault(key, {})[index] = robots[index].placed(band[place])
+        for there in sharing.values():
+            yield place, there
+
+
+def reference_place(settings: Mapping[str, Any]) -> str:
+    """Poses of the robots of a study for the models that compute the walls, in words.
+
+    Args:
+        settings: the study's settings, as the attribute `settings` of its dataset holds them.
+    """
+    if settings.get("placements"):
+        return "where the calibration places them"
+    placement = settings.get("study", {}).get("placement") or {}
+    if placement.get("eccentricity") is not None:
+        return f"level, eccentricity {placement['eccentricity']:g}"
+    radii = [0.5 * robot["body"]["diameter"] for robot in settings.get("robots", [])]
+    gaps = sorted({show(placement.get("gap") or GAP_SHARE * radius, "mm") for radius in radii}, key=len)
+    pitch = placement.get("pitch") or 0.0
+    yaw = placement.get("yaw") or 0.0
+    tilts = [f"{name} {show(angle, 'deg')}" for name, angle in (("pitch", pitch), ("yaw", yaw)) if angle]
+    tilt = ", ".join(tilts) or "level"
+    return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference pose'}, {tilt}"
+
+
+def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
+    """A sentence for each pose at which robots have no answer, though they have one at the reference pose."""
+    found = []
+    for task, part in answers:
+        missing = np.flatnonzero(np.isnan(part["forward_velocity"]).all(axis=-1))
+        if missing.size:
+            first = task.robots[int(missing[0])]
+            outside = broken(requirements(first, find_swimmer_model(task.model)))
+            why = outside[0].sentence() if outside else "they find no steady motion there"
+            words = f"{task.model}: the band leaves out {missing.size} robots at {task.where}, the first: {why}"
+            found.append(Note("without-answer", words))
+    return found
+
+
+def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
+    """`gap_at_place` and `pitch_at_place` of every robot, (robots, poses), m and rad; NaN where it has no band."""
+    tasks = [task for task, _ in answers]
+    places = max(task.place for task in tasks) + 1
+    names = ("gap_at_place", "pitch_at_place")
+    found: dict[str, Values] = {name: np.full((count, places), np.nan) for name in names}
+    for task in tasks:
+        found["gap_at_place"][task.indices, task.place] = task.robots[0].placement.gap
+        found["pitch_at_place"][task.indices, task.place] = task.robots[0].placement.pitch
+    return found
+
+
+def with_band(
+    flat: dict[str, Values], answers: Iterable[tuple[BandTask, Part]], models: tuple[str, ...]
+) -> dict[str, Values]:
+    """Quantities at all poses, and the least and largest of all poses and the reference pose.
+
+    Args:
+        flat: the answers at the reference place, (models, robots, friction readings).
+        answers: those at the places of the band.
+        models: names of the models, in their order.
+
+    Returns:
+        `<quantity>_at_place`, (models, robots, friction readings, places), `<quantity>_low` and `<quantity>_high`,
+        (models, robots, friction readings); NaN for models without a band.
+    """
+    pairs = list(answers)
+    places = max(task.place for task, _ in pairs) + 1
+    banded = {models.index(task.model) for task, _ in pairs}
+    found: dict[str, Values] = {}
+    for name in AT_PLACES:
+        there = np.full((*flat[name].shape, places), np.nan)
+        for task, part in pairs:
+            there[models.index(task.model), task.indices, :, task.place] = part[name]
+        everywhere = np.concatenate([there, flat[name][..., None]], axis=-1)
+        everywhere[[number for number in range(len(models)) if number not in banded]] = np.nan
+        found[f"{name}_at_place"] = there
+        found[f"{name}_low"] = np.fmin.reduce(everywhere, axis=-1)
+        found[f"{name}_high"] = np.fmax.reduce(everywhere, axis=-1)
+    return found
+
+
+MOVING = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate", "motor_current")
+"""Quantities of both columns."""
+POSE = ("gap", "pitch", "yaw", "azimuth", "contact_force")
+"""Pose and contact of a robot, means over a trial."""
+ENDS = ("median", "low", "high")
+"""Of an interval over the unknowns."""
+TRIAL_STATES = ("no-trial", "swimming", "standing")
+"""State of a robot in its trial; the index in this list is the value in the dataset."""
+_MOST_HELD = 1000
+"""Robots of a study that are computed by `tube` without a request."""
+
+
+@dataclass(frozen=True)
+class HeldTask(OneRobot):
+    """One robot held in its tube by `tube`, whatever the models of the study are."""
+
+    placement: Placement
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
+        return f"held, model {WALLED}: {self.robot.with_tail}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return set(MOVING)
+
+    def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Compute every quantity, (1,); NaN for a robot outside the model's domain."""
+        robot = calibrated_robot(self.robot, CalibrationFile.model_construct(friction=loaded.friction))
+        try:
+            found = predict(robot, model=WALLED, motion="held", band=False, placement=self.placement)
+        except InputError:
+            return {name: np.full(1, np.nan) for name in MOVING}
+        return {name: np.array([float(getattr(found, name))]) for name in MOVING}
+
+
+@dataclass(frozen=True)
+class TrialTask(OneRobot):
+    """The trial of one robot, as `spirillum.predict` has it."""
+
+    placement: Placement
+    contact: Contact
+    interval: bool
+
+    @property
+    def words(self) -> str:
+        """Progress message."""
+        return f"trial{' with its interval' if self.interval else ''}: {self.robot.with_tail}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        ends = {f"{name}_{end}" for name in MOVING for end in ENDS} if self.interval else set()
+        return {*MOVING, *POSE, "state", *ends}
+
+    def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
+        """Compute every quantity, (1,); NaN for a robot without a trial."""
+        part: Part = {name: np.full(1, np.nan) for name in self.needed}
+        part["state"] = np.zeros(1)
+        stated = self.contact.model_fields_set  # the others are unknowns of the interval
+        contact = {name: getattr(self.contact, name) for name in stated}
+        roughness = contact.pop("roughness", None)
+        try:
+            held = predict(
+                self.robot, model=WALLED, band=False, placement=self.placement, roughness=roughness, in_tube=contact,
+                interval=self.interval,
+            )  # fmt: skip
+        except InputError:
+            return part
+        trial = held.trial
+        if trial is None or trial.reason:
+            return part
+        part["state"] = np.array([float(TRIAL_STATES.index(trial.basis["state"]))])
+        part |= {name: np.array([trial.values.get(name, np.nan)]) for name in (*MOVING, *POSE)}
+        for name, over in trial.intervals.items():
+            if name in MOVING:
+                part |= {f"{name}_{end}": np.array([getattr(over, end)]) for end in ENDS}
+        return part
+
+
+def held_tasks(loaded: LoadedStudy, first: int) -> Iterator[HeldTask]:
+    """One task for each robot with a table, numbered from `first`, where no model of the study computes walls."""
+    if any(find_swimmer_model(name).placed for name in loaded.study.models) or loaded.count > _MOST_HELD:
+        return
+    for index in range(loaded.count):
+        robot = loaded.robot_at(index)
+        if robot.channel is not None and has_table(RobotBatch.of(robot)):
+            yield HeldTask(first, np.array([index]), robot, _placement(loaded, index))
+            first += 1
+
+
+def trial_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[TrialTask]:
+    """One task for each of the robots, numbered from `first`; none where no trials are requested."""
+    study = loaded.study
+    if study.trial:
+        for number, (index, robot) in enumerate(robots.items(), start=first):
+            yield TrialTask(
+                number, np.array([index]), robot, _placement(loaded, index), study.contact, interval=study.interval
+            )
+
+
+def _placement(loaded: LoadedStudy, index: int) -> Placement:
+    """Where the robot at an index in the flat order of the study is held, or released."""
+    return loaded.placement_of(index // (loaded.count // len(loaded.robots)))
+
+
+def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:
+    """Assumptions of the trials, and the robots without one."""
+    if not answers:
+        return []
+    words = f"trial: {ASSUMPTION}; released, 60 s of waiting, 20 s with the motor on, as `spirillum predict` has it"
+    found = [Note("settled-basis", words, ("contact",))]
+    lost = [task for task, part in answers if part["state"][0] == 0.0]
+    if lost:
+        words = (
+            f"{len(lost)} of {len(answers)} robots have no trial, the first: {lost[0].robot.with_tail}; "
+            "`spirillum predict` says why"
+        )
+        found.append(Note("without-answer", words, ("forward_velocity_trial",)))
+    return found
+
+
+def column_variables(
+    held: Sequence[tuple[HeldTask, Part]],
+    trials: Sequence[tuple[TrialTask, Part]],
+    robots: Sequence[str],
+    shape: Sequence[int],
+) -> dict[str, Any]:
+    """Return the columns as variables over the robots: `<quantity>_held`, `<quantity>_trial`, and the state `trial`."""
+    found: dict[str, Any] = {}
+
+    def add(answers: Sequence[tuple[OneRobot, Part]], name: str, column: str, meaning: str, source: str) -> None:
+        base = name if name in QUANTITIES else name.rpartition("_")[0]
+        about = attributes(base, meaning=f"{QUANTITIES[base].meaning}, {meaning}", source=source)
+        found[f"{base}_{column}{name.removeprefix(base)}"] = (tuple(robots), gathered(answers, name, shape), about)
+
+    for name in MOVING if held else ():
+        add(held, name, "held", "held at its pose", f"model {WALLED}")
+    for name in sorted(trials[0][0].needed - {"state"}) if trials else ():
+        add(trials, name, "trial", _meaning(name), f"model {WALLED}, {ASSUMPTION}")
+    if trials:
+        about = {
+            "units": "1",
+            "long_name": "what became of a robot in its trial",
+            "source": "trial in the tube",
+            "flag_values": np.arange(len(TRIAL_STATES), dtype="int8"),
+            "flag_meanings": " ".join(TRIAL_STATES),
+        }
+        state = np.nan_to_num(gathered(trials, "state", shape)).astype("int8")
+        found["trial"] = (tuple(robots), state, about)
+    return found
+
+
+def _meaning(name: str) -> str:
+    """Meaning of a value of a trial."""
+    end = name.rpartition("_")[2]
+    return "mean over a trial" if end not in ENDS else f"over what is not stated of a trial: {end} (90 % interval)"
