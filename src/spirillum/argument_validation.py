@@ -101,13 +101,7 @@ def validate_arguments(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_kind(name: str, value: Any, annotation: str) -> None:
-    """Refuse a value of a wrong kind.
-
-    Args:
-        name: what it is called.
-        value: the value.
-        annotation: kinds that are allowed, such as ``int | None``.
-    """
+    """Refuse a value of a wrong kind."""
     _check(name, value, _kinds(ast.parse(annotation, mode="eval").body, {}))
 
 

@@ -28,12 +28,7 @@ class QuantityRow(NamedTuple):
 
 
 def rows_of(items: Mapping[str, Any], only: Iterable[str] | None = None) -> list[QuantityRow]:
-    """A row for each quantity of an answer that has a single value.
-
-    Args:
-        items: an answer, or a part of one; what is no quantity is passed over.
-        only: names of the quantities to show; None: all.
-    """
+    """A row for each quantity of an answer that has a single value."""
     known = {
         name: item
         for name, item in items.items()

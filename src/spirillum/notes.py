@@ -379,13 +379,7 @@ def notes_in_answer(answer: Mapping[str, Any]) -> tuple[Note, ...]:
 
 
 def shown_cautions(notes: Iterable[Note], most: int = 3, width: int = 80) -> list[Note]:
-    """The weightiest cautions, one of a code, as many as fit into three rows of a terminal.
-
-    Args:
-        notes: all notes of an answer.
-        most: rows, and most notes.
-        width: characters in a row.
-    """
+    """The weightiest cautions, one of a code, as many as fit into three rows of a terminal."""
     order = list(KINDS)
     first: dict[str, Note] = {}
     for note in notes:

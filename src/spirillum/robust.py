@@ -30,22 +30,12 @@ class LineFit(NamedTuple):
 
 
 def mad_scale(residuals: Samples, axis: int | None = None) -> Samples:
-    """Standard deviation of residuals about zero from their median absolute value; NaN is left out.
-
-    Args:
-        residuals: of any shape.
-        axis: along which; None: all of them.
-    """
+    """Standard deviation of residuals about zero from their median absolute value; NaN is left out."""
     return np.asarray(MAD_TO_SIGMA * np.nanmedian(np.abs(residuals), axis=axis))
 
 
 def running_median(values: Samples, window: int) -> Samples:
-    """Median of each value and its neighbours, (n,); the first and last value are repeated beyond the ends.
-
-    Args:
-        values: (n,).
-        window: odd number of values.
-    """
+    """Median of each value and its neighbours, (n,); the first and last value are repeated beyond the ends."""
     padded = np.pad(values, window // 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1))
 

@@ -18,12 +18,7 @@ def schema_of(name: str) -> dict[str, Any]:
     from spirillum.studies.spec import Study
     from spirillum.vision.setup import Setup
 
-    known: dict[str, type[BaseModel]] = {
-        "robot": Robot,
-        "study": Study,
-        "calibration": CalibrationFile,
-        "setup": Setup,
-    }
+    known: dict[str, type[BaseModel]] = {"robot": Robot, "study": Study, "calibration": CalibrationFile, "setup": Setup}
     if name not in known:
         raise InputError(f"schema {name!r}{did_you_mean(name, known)}; allowed: {', '.join(known)}")
     schema = known[name].model_json_schema()

@@ -11,14 +11,7 @@ from spirillum.scalars import plain_minus
 
 _WORD = re.compile(r"([^\W\d_]+|°)((?:\^|\*\*)-?\d)?")
 _SIGNS = str.maketrans({"º": "°", "·": "*", "⋅": "*", "∙": "*", "•": "*", "×": "*", "∕": "/", "⁄": "/"})
-_MEANT = {
-    "cps": ("cP", "rps"),
-    "gs": ("G",),
-    "gm": ("g",),
-    "gms": ("g",),
-    "r": ("turn",),
-    "u": ("turn",),
-}
+_MEANT = {"cps": ("cP", "rps"), "gs": ("G",), "gm": ("g",), "gms": ("g",), "r": ("turn",), "u": ("turn",)}
 """Abbreviations that no registry knows, or knows as another unit; the quantity decides which one is meant."""
 _MOST = 64
 _LONGEST_SYMBOL = 4

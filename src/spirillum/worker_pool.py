@@ -40,15 +40,7 @@ _Answer = TypeVar("_Answer")
 def imap_unordered(
     work: Callable[[_Task], _Answer], tasks: Iterable[_Task], workers: int, *, besides: str = "", single: bool = False
 ) -> Iterator[tuple[_Task, _Answer]]:
-    """Tasks with their answers: in order from this process, in any order from several.
-
-    Args:
-        work: what is done; a function of a module of this package.
-        tasks: what it is done to; they can be pickled. They are taken as they are needed.
-        workers: number of processes; 1: this one.
-        besides: what the sentence of an error says at its end, such as what is kept.
-        single: whether every process keeps to one thread.
-    """
+    """Tasks with their answers: in order from this process, in any order from several."""
     ahead = iter(tasks)
     first = list(islice(ahead, AHEAD * workers))
     if workers == 1 or len(first) < 2:
@@ -174,12 +166,7 @@ class WorkerPool:
 
 
 def checked_crew(workers: int, cluster: str | None) -> WorkerPool:
-    """A crew of so many workers, or of those of a cluster.
-
-    Args:
-        workers: number of processes.
-        cluster: address of a scheduler, as `tcp://192.168.1.5:8786`; None: this machine.
-    """
+    """A crew of so many workers, or of those of a cluster."""
     if not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {str(workers)[:40]}; allowed: a whole number of 1 to {_MOST_WORKERS}")
     if cluster is not None and not _ADDRESS.fullmatch(cluster):

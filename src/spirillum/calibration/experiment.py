@@ -163,12 +163,7 @@ def with_tail(robot: Robot, wavelength: float, amplitude: float) -> Robot:
 
 
 def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
-    """Read observations and lay them onto robots: by channel diameter; the tail is that of the row.
-
-    Args:
-        path: observations file.
-        robots: one robot for each channel; what of them is not in a row (body, fluid, motor) holds for it.
-    """
+    """Read observations and lay them onto robots: by channel diameter; the tail is that of the row."""
     path = Path(path)
     observations = read_observations(path)
     by_channel = _by_channel(robots)

@@ -324,12 +324,7 @@ def _middle(draws: Samples) -> Estimate:
 
 
 def _friction(
-    problem: Problem,
-    z: Samples,
-    best: Samples,
-    error: Mapping[Quantity, float],
-    reading: str,
-    rng: np.random.Generator,
+    problem: Problem, z: Samples, best: Samples, error: Mapping[Quantity, float], reading: str, rng: np.random.Generator
 ) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...], tuple[Estimate, ...]]:
     """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it.
 

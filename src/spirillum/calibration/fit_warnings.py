@@ -81,8 +81,7 @@ def prior_warnings(problem: Problem, z: Samples) -> list[Note]:
         Note(
             "prior-decides",
             f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from its prior's "
-            "median "
-            f"({item.prior.words(item.parameter.unit)}); check model, units and robot",
+            f"median ({item.prior.words(item.parameter.unit)}); check model, units and robot",
             (item.label,),
         )
         for item, place in zip(problem.coordinates, z, strict=True)
@@ -91,12 +90,7 @@ def prior_warnings(problem: Problem, z: Samples) -> list[Note]:
 
 
 def edge_warnings(problem: Problem, draws: Samples) -> list[Note]:
-    """Posteriors that pile up at an end of their prior, which then decides their interval.
-
-    Args:
-        problem: the fit.
-        draws: coordinates of the posterior, (n, coordinates).
-    """
+    """Posteriors that pile up at an end of their prior, which then decides their interval."""
     from scipy.special import ndtr
 
     found = []
@@ -132,22 +126,15 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[Note]:
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
             words = (
-                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is "
-                f"{percent(float(relative[place]))} off "
-                "the fit, far more than that of other tails; check the row"
+                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
+                "off the fit, far more than that of other tails; check the row"
             )
             found.append(Note("outlier", words, (name,)))
     return found
 
 
 def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[Note]:
-    """State the model's discrepancy, so that a wrong model does not look certain.
-
-    Args:
-        problem: the fit.
-        discrepancy: relative misfit by quantity.
-        fit: its best fit, with the degrees of freedom that are left and what the residuals say of the misfit.
-    """
+    """State the model's discrepancy, so that a wrong model does not look certain."""
     found = []
     model = problem.model.name
     for name, size in discrepancy.items():
@@ -190,22 +177,15 @@ def factor_misfit_warnings(problem: Problem, z: Samples) -> list[Note]:
         size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.seen] ** 2)))
         if size > _LARGE_MISFIT:
             words = (
-                f"'{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root "
-                "mean square "
-                "over the tails, errors of trials included)"
+                f"'{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root mean "
+                "square over the tails, errors of trials included)"
             )
             found.append(Note("misfit", words, (name,)))
     return found
 
 
 def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[Note]:
-    """Assumptions of a fit about the friction.
-
-    Args:
-        problem: the fit.
-        z: coordinates of the best fit.
-        reading: reading of the friction under which B_eff follows from (18).
-    """
+    """Assumptions of a fit about the friction."""
     unset = all(robot.friction.effective is None for robot in problem.experiment.robots)
     if problem.by_motor_rate and unset and "shared_friction" not in problem.free:
         words = (
@@ -252,9 +232,8 @@ def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) ->
             continue
         overlap = " (their intervals overlap)" if less.high >= more.low else ""
         words = (
-            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower "
-            "channel has "
-            "more drag; check which channel is which"
+            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower channel "
+            "has more drag; check which channel is which"
         )
         found.append(Note("drag-order", words, (narrow, wide)))
     return found
@@ -290,9 +269,8 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note
     negative = [n for n, item in enumerate(friction) if item.value < 0]
     if negative:
         words = (
-            f"B_eff is negative for {len(negative)} of {len(friction)} robots "
-            f"({experiment.labels()[negative[0]]}, ...): the "
-            "model's torque exceeds the motor's; predictions use zero"
+            f"B_eff is negative for {len(negative)} of {len(friction)} robots ({experiment.labels()[negative[0]]}, "
+            "...): the model's torque exceeds the motor's; predictions use zero"
         )
         found.append(Note("friction-negative", words, ("friction",)))
         if 2 * len(negative) > len(friction):

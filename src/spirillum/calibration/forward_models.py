@@ -166,11 +166,7 @@ class TrialSurfaces:
 
 
 def check_free(free: Sequence[str], model: str) -> None:
-    """Refuse parameters that a trial does not have, and models without one.
-
-    Raises:
-        InputError: naming them.
-    """
+    """Refuse parameters that a trial does not have, and models without one."""
     if model != WALLED:
         raise InputError(f"answer = 'trial' with model '{model}', which has no trials; allowed: model '{WALLED}'")
     wrong = [name for name in free if name not in FREE]
@@ -181,26 +177,13 @@ def check_free(free: Sequence[str], model: str) -> None:
 def trial_surfaces(
     experiment: Experiment, ends: Ends, tell: Callable[[str, int, int], None], *, prepare: bool
 ) -> TrialSurfaces:
-    """Make the trials of all robots and lay surfaces through them.
-
-    Args:
-        experiment: the observations with their robots.
-        ends: free parameter to the least and largest value that its prior allows.
-        tell: progress.
-        prepare: make tables with yawed poses that are not there.
-    """
+    """Make the trials of all robots and lay surfaces through them."""
     _check_yaw_tables(experiment, tell, prepare=prepare)
     return surfaces_of(experiment.robots, ends, tell)
 
 
 def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, int], None]) -> TrialSurfaces:
-    """Make the trials of robots with tables, and lay surfaces through them.
-
-    Args:
-        robots: the robots.
-        ends: free parameter to the least and largest value at which trials are made.
-        tell: progress.
-    """
+    """Make the trials of robots with tables, and lay surfaces through them."""
     names, count = tuple(ends), _RUNS[len(ends)]
     logs = _points(ends, count)
     surfaces, scales, errors = [], [], []

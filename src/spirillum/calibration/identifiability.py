@@ -145,8 +145,7 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
     words = (
         f"{_listed(changes)} trade off: together they move predictions by {effect} standard errors, and the "
-        "observations "
-        f"say {known}; fix one"
+        f"observations say {known}; fix one"
     )
     return Note("not-identifiable", words, labels)
 

@@ -348,10 +348,7 @@ def _drawn_discrepancy(total: float, expected: float, left: float, count: int, r
 
 
 def _covariance(
-    problem: Problem,
-    z: Samples,
-    error: dict[Quantity, float],
-    discrepancy: dict[Quantity, float],
+    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> Samples:
     """Inverse of the information of means and prior."""
     jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))

@@ -99,9 +99,6 @@ class Problem:
     def draws(self, z: Samples) -> dict[str, Samples]:
         """Parameters at coordinates.
 
-        Args:
-            z: coordinates, (draws, free numbers).
-
         Returns:
             Parameter to (draws, robots), or (draws, 1) where all robots share it.
         """
@@ -175,14 +172,7 @@ class Problem:
         return {name: values[0] for name, values in self.predicted(z[None]).items()}
 
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:
-        """B_eff of every robot at motor rates, N m s/rad, (draws, robots).
-
-        Args:
-            z: coordinates, (draws, free numbers).
-            motor_rate: omega_m, rad/s.
-            reading: reading of the friction.
-            scaled: factors on `viscosity`, `torque_constant`, `back_emf_constant` of the robots, (draws, 1).
-        """
+        """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
         seen = self.experiment
         own = {name: factor * self._own(name) for name, factor in (scaled or {}).items()}
         with np.errstate(invalid="ignore"):
@@ -221,18 +211,7 @@ def posed(
     prepare: bool = False,
     answer: str = HELD,
 ) -> Problem:
-    """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers.
-
-    Args:
-        experiment: the observations.
-        model: name of the hydrodynamic model.
-        free: names of the free parameters.
-        progress: told what is being computed.
-        assumed: parameter to its stated uncertainty, half of a relative 95 % interval. Where the motor's rate is
-            compared, such a parameter is free too, with that for its prior.
-        prepare: for `tube`, make the robots' tables that are not there.
-        answer: `held`, or `trial`: what is compared with the observations.
-    """
+    """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers."""
     stated = dict(assumed or {})
     free = _with_assumed(free, stated)
     chosen = find_swimmer_model(model)

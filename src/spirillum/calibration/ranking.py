@@ -312,9 +312,8 @@ def _cautions(ranked: Sequence[ModelRank]) -> list[Note]:
         bad = int(np.count_nonzero(item.pareto > _PARETO))
         if bad:
             words = (
-                f"{item.model}: {bad} of {item.pareto.size} robots cannot be left out by importance sampling "
-                "(Pareto k above "
-                f"{_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
+                f"{item.model}: {bad} of {item.pareto.size} robots cannot be left out by importance sampling (Pareto k "
+                f"above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
             )
             said.append(Note("intervals-incomplete", words))
         unusable = (note for note in item.fit.warnings if note.code == "posterior-unusable")
@@ -324,9 +323,8 @@ def _cautions(ranked: Sequence[ModelRank]) -> list[Note]:
     count = ranked[0].fit.experiment.size
     if count < _FEWEST_ROBOTS:
         words = (
-            f"only {counted(count, 'robot')}: standard errors of the log density are chance below "
-            f"{_FEWEST_ROBOTS}, and not "
-            "given; measure more tails"
+            f"only {counted(count, 'robot')}: standard errors of the log density are chance below {_FEWEST_ROBOTS}, "
+            "and not given; measure more tails"
         )
         said.append(Note("intervals-incomplete", words))
     elif count < _MANY_ROBOTS:

@@ -25,7 +25,7 @@ _NAMING = ("measure", "setup", "virtual-experiment")
 """Commands whose arguments name files and folders."""
 _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "
-    "drive that prescribes the rate, --set drive.kind=rate --set drive.rate=1.2Hz",
+    "drive that prescribes the rate, --set drive.kind=rate --set drive.rate=1.2Hz"
 }
 """Sentences for options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)

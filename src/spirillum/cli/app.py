@@ -108,8 +108,7 @@ def compare_models(
     *,
     output: Picture = None,
     plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Plot why models differ, effect by effect: .png, .pdf or .svg."),
+        Path | None, typer.Option(metavar="FILE", help="Plot why models differ, effect by effect: .png, .pdf or .svg.")
     ] = None,
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     all_of_it: All = False,
@@ -163,8 +162,7 @@ def study(
     context: typer.Context,
     source: Annotated[Path | None, typer.Argument(help="A study file, or a paper's name; else biorob2012.")] = None,
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study."),
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study.")
     ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
     cluster: Annotated[
@@ -222,9 +220,7 @@ def schema(
     typer.echo(as_json(schema_of(name)))
 
 
-def citation(
-    model: Annotated[str | None, typer.Argument(help="A model, for its references too.")] = None,
-) -> None:
+def citation(model: Annotated[str | None, typer.Argument(help="A model, for its references too.")] = None) -> None:
     """Print what to cite: the software, its paper, and a model's references.
 
     Example: `spirillum citation sbt`

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 _Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
-    list[str],
-    typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel."),
+    list[str], typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel.")
 ]
 
 

@@ -55,9 +55,7 @@ RULES: dict[str, tuple[Rule, ...]] = {
             "without a plane (-o FILE), to which it belongs; allowed: both or neither",
         ),
         Rule(
-            "no volume",
-            ("volume_resolution",),
-            "without --volume FILE, to which it belongs; allowed: both or neither",
+            "no volume", ("volume_resolution",), "without --volume FILE, to which it belongs; allowed: both or neither"
         ),
         Rule(
             "run",
@@ -91,14 +89,7 @@ RULES: dict[str, tuple[Rule, ...]] = {
 
 
 def check_rules(command: str, states: Collection[str], given: Callable[..., list[str]], **words: object) -> None:
-    """Refuse options that conflict with the request.
-
-    Args:
-        command: its name.
-        states: of the request.
-        given: tells which of some parameters were typed, as options.
-        words: of the request, for the sentence.
-    """
+    """Refuse options that conflict with the request."""
     for rule in RULES[command]:
         if rule.state in states and (found := given(*rule.options)):
             raise InputError(f"{', '.join(found)} {rule.conflict.format(**words)}")
@@ -109,10 +100,6 @@ _V = TypeVar("_V")
 
 def given_options(context: typer.Context, *parameters: str) -> list[str]:
     """Options that were typed, also those with the value that they have otherwise.
-
-    Args:
-        context: of the command.
-        parameters: names of the command's parameters that are asked about.
 
     Returns:
         The options as they are typed, such as ``--volume-resolution``, in the order of `parameters`.
@@ -126,13 +113,7 @@ def given_options(context: typer.Context, *parameters: str) -> list[str]:
 
 
 def refuse_conflicts(context: typer.Context, *states: str, **words: object) -> None:
-    """Refuse typed options that conflict with the request, by the rules of the command.
-
-    Args:
-        context: of the command.
-        states: that hold for the request.
-        words: of the request, for the sentence.
-    """
+    """Refuse typed options that conflict with the request, by the rules of the command."""
     check_rules(str(context.info_name), states, partial(given_options, context), **words)
 
 

@@ -64,12 +64,7 @@ def measure(
 
         if videos and len(videos) > 1:
             raise InputError(f"--feasibility with {len(videos)} videos; allowed: none, or one that shows the ruler")
-        found = verdict(
-            setup,
-            **expected,
-            video=videos[0] if videos else None,
-            overrides=overrides,
-        )
+        found = verdict(setup, **expected, video=videos[0] if videos else None, overrides=overrides)
         renderer.show(found.to_dict(), json=json)
         if not found.feasible:
             raise typer.Exit(1)
@@ -104,8 +99,7 @@ def track(
     request: Request,
     *,
     source: Annotated[
-        str,
-        typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...)."),
+        str, typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...).")
     ],
     setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
     settings: Settings = None,
@@ -327,8 +321,7 @@ def new_observations(
 
 @observations_app.command("check")
 def check_observations(
-    file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")],
-    json: Json = False,
+    file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")], json: Json = False
 ) -> None:
     """Check an observations file and count what is in it.
 

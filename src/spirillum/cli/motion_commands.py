@@ -206,8 +206,7 @@ def magnetic_sweep(
 
 
 @from_function(
-    "spirillum.dynamics.settling:settle",
-    without={**NO_START, "placement.tail_drop": "no rigid tail moves with it"},
+    "spirillum.dynamics.settling:settle", without={**NO_START, "placement.tail_drop": "no rigid tail moves with it"}
 )
 def settle(request: Request, *, output: Picture = None, json: Json = False) -> None:
     """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.

@@ -64,13 +64,7 @@ class ProgressLines:
         self._first = self._done = 0
 
     def __call__(self, what: str, done: int, total: int | None) -> None:
-        """Take note of progress.
-
-        Args:
-            what: the stage.
-            done: steps of it that are done.
-            total: of how many; None or 0: not known.
-        """
+        """Take note of progress."""
         if what.startswith(self._announcements):
             self._write(what)
             return

@@ -18,8 +18,7 @@ robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot f
 def robot_new(
     path: Annotated[Path, typer.Argument(help="Robot file to write.")],
     preset: Annotated[
-        str,
-        typer.Option("--from", autocompletion=complete_presets, help="Preset or validation robot to start from."),
+        str, typer.Option("--from", autocompletion=complete_presets, help="Preset or validation robot to start from.")
     ] = "biorob2012-wide",
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it is there.")] = False,
 ) -> None:
@@ -69,8 +68,7 @@ def prepare(
         typer.Argument(metavar="[ROBOT]...", autocompletion=complete_robots, help="Presets' names or TOML files."),
     ] = None,
     study: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
+        str | None, typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study.")
     ] = None,
     stage: Annotated[
         str | None,

@@ -353,10 +353,7 @@ def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
         "seed": job.seed,
     }
     return record(run, plant).assign_attrs(
-        control=json.dumps(settings, sort_keys=True),
-        task=job.task.kind,
-        controller=job.controller,
-        seed=job.seed,
+        control=json.dumps(settings, sort_keys=True), task=job.task.kind, controller=job.controller, seed=job.seed
     )
 
 

@@ -104,18 +104,7 @@ class KeepCourse(_Watching):
         flow: FlowPulse | None = None,
         carried: float = 0.0,
     ) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            speed: predicted while the drive is on, m/s, with its sign.
-            duty: of the drive while it is on.
-            set_speed: speed of the course, m/s, without sign.
-            leash: l / (T v): so near to the robot the course is held; infinite: it is not.
-            knowing: whether it gets the true values.
-            flow: for one that knows: the pulse.
-            carried: way of the robot over the way of the mean flow.
-        """
+        """Begin."""
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._flow, self._carried = self._way * set_speed, flow, carried
         self._leash, self._course, self._until = leash * _CATCH_UP * set_speed, 0.0, 0.0
@@ -138,16 +127,7 @@ class SaveBattery(_Watching):
     def __init__(
         self, lab: Lab, speed: float, duty: float, set_speed: float, band: float, *, knowing: bool = False
     ) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            speed: predicted while the drive is on, m/s, with its sign.
-            duty: of the drive while it is on.
-            set_speed: mean speed of the course, m/s, without sign.
-            band: half width of the relay, m.
-            knowing: whether it gets the true values.
-        """
+        """Begin."""
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._band = set_speed, band
         self._on = True
@@ -166,13 +146,7 @@ class Steady(Controller):
     blind = True
 
     def __init__(self, duty: float, *, share: float = 1.0, cycle: float = 5.0) -> None:
-        """Begin.
-
-        Args:
-            duty: while it is on.
-            share: of each cycle in which it is on.
-            cycle: s.
-        """
+        """Begin."""
         self._duty, self._share, self._cycle = duty, share, cycle
 
     def decide(self, news: Message) -> float:

@@ -149,9 +149,6 @@ class Lab(Section):
         Args:
             value: a lab, its tables by name, a TOML file with them, or None: the defaults. A number is a quantity in SI
                 in tables, and none in a file.
-
-        Raises:
-            InputError: for an unknown table or field, or a wrong value.
         """
         if isinstance(value, cls):
             return value
@@ -183,9 +180,6 @@ class Lab(Section):
         Args:
             path: TOML file; None: the defaults.
             changes: values by dotted name, as ``{"camera.latency": "50 ms"}``; quantities with their unit.
-
-        Raises:
-            InputError: for a file that cannot be read, an unknown table or field, a wrong value, or one without unit.
         """
         tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
         for name, value in changes.items():

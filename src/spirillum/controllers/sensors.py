@@ -137,14 +137,7 @@ class SampledErrors:
 
 
 def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> SampledErrors:
-    """Draw the robot and the flow of a run.
-
-    Args:
-        unknown: what is unknown of the robot.
-        pulse: what is known of the flow.
-        seed: of the run.
-        duration: of the run, s.
-    """
+    """Draw the robot and the flow of a run."""
     stream = _stream(seed, "unknown")
     factors = np.exp(np.log([unknown.friction_factor, unknown.gap_factor]) * stream.uniform(-1.0, 1.0, 2))
     sizes = np.array([unknown.voltage_error, unknown.viscosity_error])
@@ -215,11 +208,7 @@ class Senses:
         return ""
 
     def deliver(self, command: Command) -> Command:
-        """The command as the robot takes it.
-
-        Raises:
-            InputError: if what carries commands is gone.
-        """
+        """The command as the robot takes it."""
         return command
 
     def close(self) -> None:

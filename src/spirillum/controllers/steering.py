@@ -58,12 +58,7 @@ _SLIPS, _SLOWER = 0.9, 0.8
 
 
 def pushed_for(orbit: complex, time: float) -> complex:
-    """Time for which a constant push counts on an orbit: the integral of exp(m s) over a time, s.
-
-    Args:
-        orbit: m, 1/s.
-        time: s.
-    """
+    """Time for which a constant push counts on an orbit: the integral of exp(m s) over a time, s."""
     return time if abs(orbit * time) < 1e-6 else complex((np.exp(orbit * time) - 1.0) / orbit)
 
 

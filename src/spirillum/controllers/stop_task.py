@@ -84,13 +84,7 @@ class Timed(Controller):
     blind = True
 
     def __init__(self, lab: Lab, on: float, duty: float) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            on: for how long the drive has to be on, s.
-            duty: of the drive while it is on.
-        """
+        """Begin."""
         self._off_at, self._duty = on - 0.5 * lab.remote.period, duty
 
     def decide(self, news: Message) -> float:
@@ -108,16 +102,7 @@ class KnowingStop(Controller):
     knowing = True
 
     def __init__(self, lab: Lab, duty: float, goal: float, way: float, flow: FlowPulse | None, carried: float) -> None:
-        """Begin.
-
-        Args:
-            lab: its remote.
-            duty: of the drive while it is on.
-            goal: where to stop, m.
-            way: 1 or -1, along which the robot swims.
-            flow: the pulse of flow.
-            carried: way of the robot over the way of the mean flow.
-        """
+        """Begin."""
         self._delay, self._duty, self._goal, self._way = lab.remote.delay, duty, goal, way
         self._flow, self._carried = flow, carried
 

@@ -176,17 +176,7 @@ def run_job(
     pace: Callable[[float], None] | None = None,
     progress: Progress | None = None,
 ) -> LoopRun:
-    """The loop of a run.
-
-    Args:
-        job: the run.
-        plant: its robot; it is moved.
-        drawn: what was drawn for it.
-        learner: learns beside the controller.
-        senses: camera, meter and remote in place of the modelled ones.
-        pace: told the time of each decision before it is taken, s; it may wait.
-        progress: told what is being computed, how much is done, and of how much.
-    """
+    """The loop of a run."""
     lab, controller = job.brief.lab, job.task.controller(job.controller, job.brief, drawn.pulse)
     if learner is not None:
         controller = Learning(controller, learner)
@@ -285,12 +275,7 @@ class Scores:
 
 
 def scored(task: Task, outcomes: Sequence[Outcome]) -> Scores:
-    """Sum up runs.
-
-    Args:
-        task: by which the runs are judged.
-        outcomes: runs of several controllers; the task's own among them.
-    """
+    """Sum up runs."""
     ordered = sorted(outcomes, key=lambda one: (list(CONTROLLERS).index(one.controller), one.seed))
     by_controller: dict[str, dict[int, Outcome]] = {}
     for outcome in ordered:

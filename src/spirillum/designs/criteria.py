@@ -43,15 +43,7 @@ class Judged(Options):
     """Make the tables that trials of the best three designs lack: 4 to 12 minutes of one core each."""
 
     def check_read(self, *, known: bool, conditions: bool) -> None:
-        """Refuse what was given and nothing reads; a seed serves the search in any case.
-
-        Args:
-            known: everything is known, so that there are no draws to judge by.
-            conditions: designs have to keep some.
-
-        Raises:
-            InputError: naming it.
-        """
+        """Refuse what was given and nothing reads; a seed serves the search in any case."""
         given = [
             name
             for name in type(self).model_fields
@@ -166,14 +158,7 @@ class Manufacturability(Options):
     """Least distance between the tail on the tube's axis and the glass; None: one wire diameter."""
 
     def check(self, designs: RobotBatch) -> None:
-        """Refuse a clearance that no design leaves, before any of them is swum.
-
-        Args:
-            designs: some of them, with the widest channel, the thinnest wire and the smallest amplitude of all.
-
-        Raises:
-            InputError: if there is none.
-        """
+        """Refuse a clearance that no design leaves, before any of them is swum."""
         room = 0.5 * float(designs.channel_diameter.max() - designs.wire_diameter.min())
         amplitude = float(designs.amplitude.min())
         most = room - amplitude

@@ -266,10 +266,6 @@ def _share(flags: Flags, sets: int) -> tuple[float, float, float]:
 
     From sets that fill the ranges evenly, by Student's t over their means, for such sets are surer than as many
     independent draws (Owen 1997). From independent draws, and where all sets agree, by Clopper and Pearson 1934.
-
-    Args:
-        flags: what happens in each draw.
-        sets: number of sets, 1 for independent draws.
     """
     from scipy.stats import binomtest, t
 

@@ -271,13 +271,7 @@ def profile_of(searched: Evaluation, best: Samples, number: int) -> ObjectivePro
     if not variable.is_whole:
         low, high = (_edge(searched, best, number, along, side) for side in ((first, -1), (last, 1)))
     return ObjectiveProfile(
-        variable.path,
-        variable.unit,
-        values,
-        found,
-        low,
-        high,
-        _binds(searched, shares, found, own),
+        variable.path, variable.unit, values, found, low, high, _binds(searched, shares, found, own)
     )
 
 

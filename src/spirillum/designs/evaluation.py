@@ -92,14 +92,7 @@ def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int)
 def unknowns_of(
     robot: Robot, unknown: Mapping[str, str | Sequence[object]] | None, posterior: str | Path | None, model: str
 ) -> Unknowns:
-    """What is not known of a robot.
-
-    Args:
-        robot: the robot.
-        unknown: dotted field to its range.
-        posterior: file of a calibration's posterior.
-        model: the model that will be asked, or `auto`: that of the posterior.
-    """
+    """What is not known of a robot."""
     if posterior is not None:
         if unknown:
             raise InputError("unknown together with a posterior; allowed: one of them")

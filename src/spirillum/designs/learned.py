@@ -239,17 +239,7 @@ def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
 
 
 def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
-    """The named model, or with `auto` the most complete one that applies to the robot.
-
-    Args:
-        asked: name of a model, or `auto`.
-        robot: the robot as it is given.
-        space: the designs.
-        unknowns: what is not known; a posterior's model answers for it.
-
-    Raises:
-        InputError: for a robot in a channel around whose designs the flow cannot be learned.
-    """
+    """The named model, or with `auto` the most complete one that applies to the robot."""
     choice = choose_model(asked, robot, fit=unknowns.fit)
     if asked != AUTO or unknowns.posterior is not None:
         return choice
@@ -292,14 +282,6 @@ def learned_best(
     blank: Evaluation, unknowns: Unknowns, name: str, seed: int, tell: Tell, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
     """The best design by a model that solves for the flow.
-
-    Args:
-        blank: designs under their draws, with any model.
-        unknowns: what is not known.
-        name: of the model.
-        seed: of the search.
-        tell: told what is being done.
-        solve: solves for some designs; None: the model does.
 
     Returns:
         Designs with the learned model, all that the last search has swum, the best of them, and how well it is known.

@@ -85,17 +85,7 @@ def best_design(
     start: Samples | None = None,
     tell: Tell | None = None,
 ) -> Found:
-    """Minimise the cost of one objective.
-
-    Args:
-        evaluation: designs under their draws.
-        archive: takes all designs that are swum.
-        seed: of the search.
-        objective: number of the objective.
-        above: another objective whose cost may not exceed a bound: its number, and the bound.
-        start: designs to begin with, (designs, variables); None: Sobol' points.
-        tell: told what is being done.
-    """
+    """Minimise the cost of one objective."""
     from scipy.optimize import Bounds, differential_evolution, minimize
 
     size, say = evaluation.space.size, tell or (lambda _what, _done, _total: None)
@@ -265,13 +255,7 @@ def confirmed(
     make_tables: bool,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[ConfirmedDesign, ...]:
-    """Return the trials of designs, or the reasons why there are none.
-
-    Args:
-        designs: place in the ranges and robot of each.
-        make_tables: make tables that are not there, which takes minutes each.
-        progress: told what is being computed, how much is done, and of how much.
-    """
+    """Return the trials of designs, or the reasons why there are none."""
     if make_tables:
         prepare_all([robot for _, robot in designs], stage="yaw", progress=progress)
     found = []

@@ -105,13 +105,7 @@ def drawn_numbers(
 
 
 def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> Samples:
-    """Numbers of robots with the values of a posterior's draws, (count, len(PARAMETERS)), evenly among the draws.
-
-    Args:
-        axial: the robot, computed by the model that was fitted.
-        posterior: file of a calibration's posterior.
-        count: how many, at most as many as the posterior has draws.
-    """
+    """Numbers of robots with the values of a posterior's draws, (count, len(PARAMETERS)), evenly among the draws."""
     steady = axial.prediction
     known = read_posterior(posterior, steady.model.name)
     if known.places_robots:

@@ -239,14 +239,7 @@ def axial_robot(
 
 
 def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
-    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6); the latter 0 without a flow.
-
-    Args:
-        steady: a prediction whose model, calibration, friction model and pose the robots share.
-        batch: the robots, or one for all.
-        effective: effective friction of each, N m s/rad, (n,).
-        viscosity: factor of each; in Stokes flow all resistances, and the wrench of a flow, are in proportion to it.
-    """
+    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6); the latter 0 without a flow."""
     place = steady.batch.placement
     batch = batch.placed(place if place.flow is None else place.model_copy(update={"flow": 1.0}))
     s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)

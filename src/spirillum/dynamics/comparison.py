@@ -70,11 +70,6 @@ def effects_of(robot: Robot, answers: Mapping[str, Prediction], friction: str) -
     Each step keeps all before it: body and wire resolved, each alone; the coupling; the flow between the parts; the
     walls, held at the robot's pose; the pose of the trial, that is the lubrication film there; its yaw; contact, dry
     friction and motion in time. Steps that the robot does not have, or that cannot be computed, are left out.
-
-    Args:
-        robot: the robot, with a drive.
-        answers: by model; `sbt` and `slender` have to be among them.
-        friction: friction model of all steps.
     """
     return tuple(_steps(robot, answers, friction))
 

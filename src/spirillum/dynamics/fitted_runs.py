@@ -163,20 +163,9 @@ _LEAST_SHARE = 0.95
 
 
 def intervals_of_free_motion(
-    found: FreeMotion,
-    posterior: PosteriorFile,
-    *,
-    posterior_for: PosteriorFor,
-    progress: Progress | None = None,
+    found: FreeMotion, posterior: PosteriorFile, *, posterior_for: PosteriorFor, progress: Progress | None = None
 ) -> Intervals:
-    """95 % intervals of a steady free motion, the model's discrepancy included.
-
-    Args:
-        found: the free motion of the posterior's middle.
-        posterior: its draws.
-        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
-        progress: told how many draws are done, and of how many.
-    """
+    """95 % intervals of a steady free motion, the model's discrepancy included."""
     lying, robot = found.run.lying, found.prediction.robot
     if lying.state != "steady":
         raise InputError(

@@ -239,9 +239,8 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > _FEW_TURNS * run.turn.time:
         words = (
-            f"the steady motion is approached with a time constant of {slow:.3g} s, which a trial of some turns "
-            "does not "
-            "reach; `simulate` follows it"
+            f"the steady motion is approached with a time constant of {slow:.3g} s, which a trial of some turns does "
+            "not reach; `simulate` follows it"
         )
         found.append(Note("unsteady", words, ("duration",)))
     return found

@@ -362,18 +362,7 @@ def two_links(
     weight: bool,
     roughness: float | None,
 ) -> TwoLinks:
-    """Everything that a robot's rates follow from.
-
-    Args:
-        robot: the robot.
-        batch: that robot as a batch of one.
-        model: a model that knows all entries of R.
-        friction: reading of the friction.
-        effective: its B_eff, or B of the wall, N m s/rad.
-        calibrated: apply the robot's calibration factors.
-        weight: with weight and buoyancy, if the robot's masses are known.
-        roughness: of the wall's films, m; None: the default of `films_of`.
-    """
+    """Everything that a robot's rates follow from."""
     resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
     heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(batch)

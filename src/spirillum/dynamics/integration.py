@@ -130,14 +130,6 @@ def integrate(
 
     The run ends early where nose or tail reach the end of the tube, where a range of the robot's table is left, or when
     it is interrupted; a spent battery drives no longer.
-
-    Args:
-        robot: the robot.
-        start: state at the first sample, (19,), or the checkpoint of a run that ended there.
-        time: increasing sample times, s.
-        switches: every switching, the first not after the first sample.
-        reach: what ends the run, or its drive.
-        progress: told what is being computed, how much is done, and of how much.
     """
     end = float(time[-1])
     going_on = isinstance(start, Checkpoint)

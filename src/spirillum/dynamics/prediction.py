@@ -154,9 +154,5 @@ def predict(  # noqa: PLR0913 - the options of the command
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(fit.posterior, answer.robot, whose),
-        warnings=(
-            *answer.warnings,
-            FITTED_HELD,
-            *fit.run_warnings(answer.robot, answer.model, answer.friction),
-        ),
+        warnings=(*answer.warnings, FITTED_HELD, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
     )

@@ -41,16 +41,7 @@ def dataset_of(
     more: Mapping[str, Samples],
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
-    """The run of a free robot.
-
-    Args:
-        prediction: the robot with model, friction and calibration.
-        links: what acts on its two links.
-        run: its motion.
-        on: times at constant duty in which its drive is on; their ends are among the run's samples.
-        more: further quantities at the samples by name, each (n,).
-        attrs: attributes of the run, see `free_attributes`.
-    """
+    """The run of a free robot."""
     import xarray as xr
 
     rotation = _rotations(run.states)

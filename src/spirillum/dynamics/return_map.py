@@ -207,11 +207,6 @@ def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint 
     """The fixed point to which the motion from a state leads, if it is found.
 
     It is looked for with longer steps in time than those of a run, and settled with these.
-
-    Args:
-        turns: the map.
-        state: where to begin, (19,).
-        heavy: whether the azimuth counts, too.
     """
     free = np.arange(0 if heavy else 1, 4)
     place = _Place(replace(turns, tolerance=SEARCHING), state)

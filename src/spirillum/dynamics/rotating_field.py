@@ -99,12 +99,7 @@ class TurningField:
         return np.array([level * np.cos(self.yaw), level * np.sin(self.yaw), np.sin(self.pitch)])
 
     def changed(self, asked: Field, time: float) -> TurningField:
-        """The field from a time on; its angle does not jump.
-
-        Args:
-            asked: what changes.
-            time: s.
-        """
+        """The field from a time on; its angle does not jump."""
         given = asked.model_dump(exclude_none=True)
         rate = given.get("rotation_rate", self.rotation_rate)
         return replace(self, **given, phase=self.phase + (self.rotation_rate - rate) * time)
@@ -406,11 +401,7 @@ def _dataset(
         values = np.broadcast_to(getattr(closed, name), rates.shape)
         meaning = f"{name.replace('_', ' ')} of the held robot, closed form"
         data[f"held_{name}"] = ("field_rate", values, attributes(name, meaning=meaning, source="m B sin(lag)"))
-    data["step_out_rate"] = (
-        (),
-        held.step_out_rate,
-        attributes("step_out_rate"),
-    )
+    data["step_out_rate"] = ((), held.step_out_rate, attributes("step_out_rate"))
     return xr.Dataset(
         data,
         coords={"field_rate": ("field_rate", rates, attributes("field_rate"))},

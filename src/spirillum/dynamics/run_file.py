@@ -81,12 +81,7 @@ def robot_of(dataset: xr.Dataset) -> Robot:
 
 
 def robot_of_settings(table: Any, whose: str) -> Robot:
-    """A robot from its settings in a dataset, SI numbers, checked like a robot file.
-
-    Args:
-        table: the settings.
-        whose: the dataset, for messages: ``the run's``.
-    """
+    """A robot from its settings in a dataset, SI numbers, checked like a robot file."""
     if not isinstance(table, dict):
         raise InputError(f"{whose} attribute 'settings' is no table; allowed: one with a robot")
     robot = problems_in(Robot, _with_units(Robot, table))

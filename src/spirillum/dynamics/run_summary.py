@@ -210,11 +210,7 @@ def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> 
 
 
 def run_averages(
-    time: Samples,
-    integrals: Mapping[str, tuple[Samples, str]],
-    stretches: Sequence[DutyInterval],
-    *,
-    by_turn: bool,
+    time: Samples, integrals: Mapping[str, tuple[Samples, str]], stretches: Sequence[DutyInterval], *, by_turn: bool
 ) -> dict[str, tuple[Any, ...]]:
     """Averages as scalars of a dataset.
 
@@ -303,21 +299,14 @@ def vertical_drift(run: xr.Dataset) -> list[Note]:
     upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
     pitch = float(np.degrees(late["pitch"].values[-1]))
     words = (
-        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of "
-        "the run, "
-        f"pitched by {pitch:.3g} deg at the end: velocities are those along x"
+        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the "
+        f"run, pitched by {pitch:.3g} deg at the end: velocities are those along x"
     )
     return [Note("velocity-along-x", words, ("mean_forward_velocity",))]
 
 
 def end_state(run: xr.Dataset, notes: Iterable[Note], slow: float) -> str:
-    """Return the key of `END_STATES` for a run in a tube.
-
-    Args:
-        run: the run.
-        notes: its notes.
-        slow: sliding speed below which dry friction is not resolved, m/s.
-    """
+    """Return the key of `END_STATES` for a run in a tube."""
     events = str(run.attrs["events"])
     if END_OF_CHANNEL in events:
         return "reaches-end"

@@ -188,9 +188,8 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
     axis = TurningField(rotation_rate=0.0, strength=0.0, yaw=yaw, pitch=pitch).axis
     speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
     words = (
-        f"the field's axis is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg): "
-        "velocities are "
-        f"those along x; along that axis it swims at {speed:.4g} mm/s"
+        f"the field's axis is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg): velocities "
+        f"are those along x; along that axis it swims at {speed:.4g} mm/s"
     )
     return [Note("velocity-along-x", words, ("field.yaw", "field.pitch"))]
 
@@ -254,12 +253,7 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> N
 
 
 def _check_held(
-    placement: Placement,
-    roughness: str | float | None,
-    contact: FittedContact,
-    source: str,
-    *,
-    weight: bool,
+    placement: Placement, roughness: str | float | None, contact: FittedContact, source: str, *, weight: bool
 ) -> None:
     """Refuse what only a free run knows."""
     if contact.friction_coefficient:

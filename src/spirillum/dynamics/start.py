@@ -25,14 +25,7 @@ from spirillum.units import show
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its seat, (19,).
-
-    Args:
-        robot: the robot.
-        placement: its `gap` or `eccentricity`, and `pitch`; what is left open is level, and where the gap is open the
-            robot lies at a gap of `GAP_SHARE` of its radius, or in the middle.
-        lying: whether a robot whose gap is open lies low.
-    """
+    """The state of a robot at rest in its seat, (19,)."""
     _check(robot, placement)
     state = np.zeros(STATES)
     state[PHASE] = start_phase(robot)

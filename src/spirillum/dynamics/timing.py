@@ -55,14 +55,7 @@ def _listed(given: Any) -> list[Any] | None:
 
 
 def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float, end: float) -> list[Switch]:
-    """Every switching within a run, the first at 0.
-
-    Args:
-        on: times at which the motor has its own duty; None: throughout.
-        table: duty file instead.
-        duty: the drive's own duty.
-        end: length of the run, s.
-    """
+    """Every switching within a run, the first at 0."""
     if table is not None:
         if on is not None:
             raise InputError(f"on and duty = {str(table)[:80]} are given together; allowed: one of them")

@@ -57,12 +57,7 @@ _MOST_TURNS = 2000
 
 
 def why_not_released(held: Prediction, *, fitted: bool) -> str:
-    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one.
-
-    Args:
-        held: the answer.
-        fitted: whether draws of a posterior are behind it.
-    """
+    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
     if held.robot.channel is None:
         return "the robot has no channel in which it could be released"
     if held.model.name != WALLED:
@@ -120,11 +115,7 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
 
 
 def steady_of(follow: Callable[[], Prediction]) -> ReleasedMotion:
-    """Return the steady motion of a released robot.
-
-    Args:
-        follow: predicts its free motion in the tube.
-    """
+    """Return the steady motion of a released robot."""
     try:
         motion = follow()
     except InputError as error:
@@ -264,14 +255,7 @@ def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> 
 def samples_of(
     robot: Robot, weight: float, unknowns: Sequence[TrialUnknown], shares: Samples | None = None
 ) -> list[TrialSample]:
-    """Return the runs over the unknowns of a robot with that weight in the fluid, N.
-
-    Args:
-        robot: the robot.
-        weight: its weight in the fluid, N.
-        unknowns: what is open.
-        shares: of the distributions, (runs, unknowns), 0 to 1; None: the space-filling sample that serves all robots.
-    """
+    """Return the runs over the unknowns of a robot with that weight in the fluid, N."""
     points = _shares(unknowns) if shares is None else shares
     values = {one.name: one.at(column) for one, column in zip(unknowns, points.T, strict=True)}
     found = []
@@ -305,15 +289,7 @@ def with_interval(
     run: Callable[[TrialSample], ReleasedMotion],
     progress: Callable[[str, int, int], None] | None = None,
 ) -> ReleasedMotion:
-    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
-
-    Args:
-        nominal: the trial at nominal unknowns.
-        samples: the runs, as `samples_of` gives them.
-        unknowns: what they differ in.
-        run: makes one of them.
-        progress: told how many runs are done, and of how many.
-    """
+    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes."""
     if nominal.reason or not unknowns:
         return nominal
     runs: list[ReleasedMotion] = []
@@ -401,12 +377,7 @@ class TrialRequest:
     progress: Callable[[str, int, int], None] | None
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
-        """Return the held answer with what gives its released motions, or with the reason why there are none.
-
-        Args:
-            held: the answer.
-            wanted: whether they are wanted.
-        """
+        """Return the held answer with what gives its released motions, or with the reason why there are none."""
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         reason = why_not_released(held, fitted=self.fit.posterior is not None)

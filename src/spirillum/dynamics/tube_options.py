@@ -66,13 +66,7 @@ class InTube(Options):
 
 
 def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:
-    """Roughness and settings of a run, with fitted values in place of those that are not given.
-
-    Args:
-        contact: roughness and dry friction of a calibration or of a draw.
-        roughness: height of the asperities that is asked for, m; None: it is not.
-        asked: settings that are asked for.
-    """
+    """Roughness and settings of a run, with fitted values in place of those that are not given."""
     if asked.friction_coefficient is None and contact.friction_coefficient is not None:
         asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
     return contact.roughness if roughness is None else roughness, asked

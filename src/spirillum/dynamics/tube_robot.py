@@ -119,15 +119,7 @@ _RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
 
 
 def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn: float, weight: bool) -> TubeRobot:
-    """Everything that a robot's rates in its tube follow from.
-
-    Args:
-        steady: the robot with friction and drive.
-        table: the robot's table.
-        around: tube ends, flow, roughness and dry friction.
-        turn: time of a turn of the tail at its steady rate, s.
-        weight: with weight and buoyancy, if the robot's masses are known.
-    """
+    """Everything that a robot's rates in its tube follow from."""
     robot, effective = steady.robot, steady.effective_friction
     if robot.channel is None:
         raise InputError("the robot has no channel; allowed: a robot with a [channel]")

@@ -63,15 +63,6 @@ def tube_run(
     negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while
     it waited is among the events. A flow over time has the value of its first row until then.
 
-    Args:
-        steady: the robot with friction and drive.
-        robot: what its rates in the tube follow from.
-        start: where it is laid down; or a run of the same timetable that ended early, which is continued after its
-            last sample, as if it had not ended.
-        times: length, samples and switching of the whole run.
-        wait: how long it waits with its drive off, s.
-        progress: told what is being computed, how much is done, and of how much.
-
     Returns:
         Dataset over `time`, as of a free run, with `offset`, `azimuth` (unwrapped), `wall_pitch`, `wall_yaw`,
         `wall_gap` (of the body), `tail_gap`, contact forces and energy, mean flow and its work. The attribute

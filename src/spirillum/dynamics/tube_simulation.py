@@ -41,15 +41,7 @@ if TYPE_CHECKING:
 def earlier_run(
     path: str | Path, steady: Prediction, table: TubeTable, links: TubeRobot, switches: Sequence[Switch]
 ) -> xr.Dataset:
-    """The run in a file that another one continues.
-
-    Args:
-        path: the file.
-        steady: the robot as it is now, with friction and drive.
-        table: its table.
-        links: what its rates in the tube follow from now.
-        switches: every switching of the remote, the first at 0.
-    """
+    """The run in a file that another one continues."""
     found = open_run(path)
     name, own, other = steady.robot.name, table.key, str(found.attrs.get("table", ""))
     if other != own:
@@ -157,20 +149,7 @@ def run_in_tube(
     progress: Progress | None,
     tolerance: float = TubeRobot.tolerance,
 ) -> xr.Dataset:
-    """A run with six degrees of freedom in the robot's tube.
-
-    Args:
-        steady: the robot with friction and drive, by the model `tube`.
-        table: the robot's table.
-        times: length, sampling and remote.
-        placed: where it is laid down, ends, and a constant flow.
-        asked: azimuth, waiting time, dry friction, and a flow over time.
-        roughness: height of the asperities, m; None: 1e-4 of the body's radius.
-        field: axis about which the field of a robot with a magnet turns.
-        weight: let weight and buoyancy act, if the masses are known.
-        progress: told what is being computed, how much is done, and of how much.
-        tolerance: error of a time step over the sizes of the state's components.
-    """
+    """A run with six degrees of freedom in the robot's tube."""
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
@@ -209,24 +188,9 @@ def run_in_tube(
 
 
 def links_in_tube(
-    steady: Prediction,
-    table: TubeTable,
-    placed: Placement,
-    asked: InTube,
-    roughness: float | None,
-    *,
-    weight: bool,
+    steady: Prediction, table: TubeTable, placed: Placement, asked: InTube, roughness: float | None, *, weight: bool
 ) -> tuple[TubeRobot, StartPlace]:
-    """Coefficients of a robot's rates in its tube, and its initial pose.
-
-    Args:
-        steady: the steady prediction of the robot.
-        table: of the robot in its tube.
-        placed: where it is laid down, as far as that is given.
-        asked: of the motion in the tube: friction, contact, azimuth.
-        roughness: height of the asperities of the wall, m; None: the usual one.
-        weight: whether it has a weight.
-    """
+    """Coefficients of a robot's rates in its tube, and its initial pose."""
     turn = 2.0 * np.pi / turning_rate(steady)
     around = _around(steady.robot, placed, asked, roughness)
     links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
@@ -357,8 +321,7 @@ def held_against_check(
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
         words = (
             f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "
-            "checked "
-            f"up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
+            f"checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
         )
         said.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
     least = least_checked_gap(table)

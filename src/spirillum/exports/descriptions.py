@@ -125,14 +125,7 @@ def _link_masses(link: Link) -> dict[str, Any]:
 
 
 def urdf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
-    """The description; lengths in m, the origin of both links on the motor axis at the body's mid-length.
-
-    Args:
-        robot: a checked robot whose masses are known.
-        meshes: the mesh files.
-        folder: where they lie, relative to the description.
-        phase: phase of the tail at joint angle zero, rad.
-    """
+    """The description; lengths in m, the origin of both links on the motor axis at the body's mid-length."""
     root = ET.Element("robot", name=robot.name)
     root.append(
         ET.Comment(
@@ -212,14 +205,7 @@ def check_triangles(meshes: Iterable[MeshFile]) -> None:
 
 
 def mjcf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
-    """The model; lengths in m, the origin of both bodies on the motor axis at the robot body's mid-length.
-
-    Args:
-        robot: a checked robot whose masses are known.
-        meshes: the mesh files.
-        folder: where they lie, relative to the model.
-        phase: phase of the tail at joint angle zero, rad.
-    """
+    """The model; lengths in m, the origin of both bodies on the motor axis at the robot body's mid-length."""
     files = list(meshes)
     check_triangles(files)
     root = ET.Element("mujoco", model=robot.name)

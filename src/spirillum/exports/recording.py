@@ -145,13 +145,7 @@ def triangles(vertices: Samples, faces: np.ndarray, colours: Samples) -> list[Js
 
 
 def cylinder(diameter: float, length: float, middle: float) -> list[Json]:
-    """A glass tube along x.
-
-    Args:
-        diameter: m.
-        length: m.
-        middle: x of its middle, m.
-    """
+    """A glass tube along x."""
     upright = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])  # its axis is z at first
     return [
         {

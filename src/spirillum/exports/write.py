@@ -142,14 +142,7 @@ def check_masses(robot: Robot, target: Path) -> None:
 
 
 def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: float) -> dict[str, ExportFile]:
-    """Files by name relative to the target's folder, the target first; an STL file is `printable_solid`.
-
-    Args:
-        robot: a checked robot.
-        target: its ending is the format.
-        pieces: surfaces of the robot; at phase 0 but for `.vtp`.
-        phase: phase of the tail, rad.
-    """
+    """Files by name relative to the target's folder, the target first; an STL file is `printable_solid`."""
     holds = f"{KINDS_OF_FILES[target.suffix]}, in m"
     if target.suffix == ".glb":
         return {target.name: ExportFile(glb_bytes(robot.name, pieces, phase), holds)}
@@ -167,13 +160,7 @@ def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: 
 def printable_solid(
     robot: Robot, pieces: Sequence[RobotMesh], unit: str | None
 ) -> tuple[ExportFile, dict[str, Any], list[Note]]:
-    """An STL file of the whole robot, the numbers of its solid, and what to be careful about.
-
-    Args:
-        robot: a checked robot.
-        pieces: its surfaces.
-        unit: of the file, a key of `STL_UNITS`; None: mm, or um where the file would not be watertight in mm.
-    """
+    """An STL file of the whole robot, the numbers of its solid, and what to be careful about."""
     body = united(pieces)
     files = {name: _stl_of(robot, body, name) for name in ([unit] if unit else ["mm", "um"])}
     chosen = next((name for name, data in files.items() if is_watertight_file(data)), next(iter(files)))

@@ -340,10 +340,7 @@ def plane_around(
 
 
 def box_around(
-    robot: Robot,
-    extent: str | float | None = None,
-    resolution: int = VOLUME_RESOLUTION,
-    seat: Seat | None = None,
+    robot: Robot, extent: str | float | None = None, resolution: int = VOLUME_RESOLUTION, seat: Seat | None = None
 ) -> PointGrid:
     """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     return volume_grid(robot, _margin(extent), resolution, seat)

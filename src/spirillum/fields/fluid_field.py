@@ -35,11 +35,7 @@ class FluidField(ABC):
 
     @abstractmethod
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
-        """Velocity, (n, 3), and pressure, (n,), together.
-
-        Raises:
-            InputError: if a point lies inside a solid or outside the tube, or is not finite.
-        """
+        """Velocity, (n, 3), and pressure, (n,), together."""
 
     @abstractmethod
     def wrench(self) -> Samples:
@@ -54,9 +50,6 @@ class FluidField(ABC):
 
         Args:
             points: (n, 3), m.
-
-        Raises:
-            InputError: if one of them lies inside a solid or outside the tube.
         """
         return self.fields(points)[0]
 
@@ -65,18 +58,11 @@ class FluidField(ABC):
 
         Args:
             points: (n, 3), m.
-
-        Raises:
-            InputError: if one of them lies inside a solid or outside the tube.
         """
         return self.fields(points)[1]
 
     def in_fluid(self, points: Samples) -> Samples:
-        """Return the points (n, 3) if they are all in the fluid.
-
-        Raises:
-            InputError: if one of them does not, or as `checked_points`.
-        """
+        """Return the points (n, 3) if they are all in the fluid."""
         places = checked_points(points)
         names = self.part_at(places)
         if np.any(names != ""):
@@ -102,14 +88,7 @@ def checked_points(points: Samples) -> Samples:
 def name_parts(
     names: np.ndarray, points: Samples, wires: Iterable[Wire], solids: Iterable[tuple[str, Outline]]
 ) -> np.ndarray:
-    """Enter the name of each part at the points inside it; returns `names`.
-
-    Args:
-        names: (n,), changed in place.
-        points: (n, 3) in axes whose x runs along the robot and in which the wires are given, m.
-        wires: all of them the tail.
-        solids: names and outlines of the solids of revolution.
-    """
+    """Enter the name of each part at the points inside it; returns `names`."""
     x, rho = points[:, 0], np.hypot(points[:, 1], points[:, 2])
     for wire in wires:
         names[wire.distance(points) < wire.radius] = "tail"

@@ -58,16 +58,7 @@ class PointGrid:
 def plane_grid(
     robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: Seat | None = None
 ) -> PointGrid:
-    """A grid on one of `PLANES`.
-
-    Args:
-        robot: what it surrounds.
-        plane: name of the plane.
-        offset: place on the axis across it, m.
-        margin: how far it reaches beyond the robot, m; None: a default.
-        resolution: points along the longer side.
-        seat: the robot's place in a tube, beyond whose glass there is no grid.
-    """
+    """A grid on one of `PLANES`."""
     box, across = _box(robot, margin, seat), PLANES[plane]
     if seat is not None and across != "x":
         low, high = _glass(box["x"], seat, seat.radius)[across]
@@ -81,14 +72,7 @@ def plane_grid(
 
 
 def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> PointGrid:
-    """A grid in a box around the robot.
-
-    Args:
-        robot: what it surrounds.
-        margin: how far it reaches beyond the robot, m; None: a default.
-        resolution: points along the longest side.
-        seat: the robot's place in a tube, beyond whose glass there is no grid.
-    """
+    """A grid in a box around the robot."""
     return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
 
 
@@ -109,13 +93,7 @@ def _box(robot: Robot, margin: float | None, seat: Seat | None) -> dict[str, tup
 
 
 def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -> dict[str, tuple[float, float]]:
-    """The box, cut off a little outside of a tube's wall.
-
-    Args:
-        box: both ends along each axis, m.
-        seat: the tube.
-        whole: show all of a tube that is not much wider than the box.
-    """
+    """The box, cut off a little outside of a tube's wall."""
     reach = (1.0 + _GLASS) * seat.radius
     glass = _glass(box["x"], seat, reach)
     if whole and reach < _WIDEST * box["y"][1]:
@@ -171,16 +149,7 @@ def dataset_on(
     progress: Progress | None,
     seat: Seat | None = None,
 ) -> xr.Dataset:
-    """The flow on a grid, NaN inside solids; an axis with one point becomes a scalar.
-
-    Args:
-        grid: the points.
-        inside: tells of points (n, 3) whether they lie inside a solid.
-        fields: velocity (n, 3) and pressure (n,) at points in the fluid.
-        frame: the velocity's frame, for its description.
-        progress: told how many points are done.
-        seat: the robot's place in a tube, in whose glass points lie too.
-    """
+    """The flow on a grid, NaN inside solids; an axis with one point becomes a scalar."""
     import xarray as xr
 
     values = np.full((grid.size, 4), np.nan)

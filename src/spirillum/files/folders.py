@@ -20,13 +20,6 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
     """A folder for results, made if it is not there and locked while the block runs.
 
     A folder that was made here and stays empty is removed again. Leftovers of killed runs are removed.
-
-    Args:
-        path: the folder.
-        claim: arguments of `claim_folder` by name; None: the folder may be shared with other files.
-
-    Raises:
-        InputError: if it is a file, cannot be made, another run is writing there, or it cannot be claimed.
     """
     folder = checked_path(path, "a folder for the results (-o DIR)")
     if folder.exists() and not folder.is_dir():
@@ -55,18 +48,7 @@ def _missing(folder: Path) -> list[Path]:
 def claim_folder(
     folder: Path, mark: str, content: Mapping[str, Any], what: str, results: Collection[str] | None = None
 ) -> None:
-    """Mark a folder as that of one request's results: a rerun resumes there, another request is refused.
-
-    Args:
-        folder: the folder, new, empty, or marked before.
-        mark: name of the file in it that marks it.
-        content: what the mark says: `fingerprint`, a hash of the question, and perhaps its `title`.
-        what: what the results are of, for the sentence of an error.
-        results: names that may not stand in a folder without the mark; None: any.
-
-    Raises:
-        InputError: if it holds results of another question or of unknown origin, or cannot be written to.
-    """
+    """Mark a folder as that of one request's results: a rerun resumes there, another request is refused."""
     if (folder / mark).exists() or (folder / mark).is_symlink():
         try:
             found = read_json(folder / mark, f"the mark of a {what}")

@@ -61,15 +61,7 @@ def is_text(name: str) -> bool:
 
 
 def checked_path(path: str | os.PathLike[str], what: str) -> Path:
-    """A path that results may name and libraries may open.
-
-    Args:
-        path: as the user gave it.
-        what: what it should be, for the sentence of an error.
-
-    Raises:
-        InputError: if it is empty, holds a null byte, is longer than a file system allows, or is not text in UTF-8.
-    """
+    """A path that results may name and libraries may open."""
     name = os.fspath(path)
     if not name:
         raise InputError(f"an empty name of a file; allowed: {what}")
@@ -90,10 +82,6 @@ def file_name(name: str, taken: Collection[str] = ()) -> str:
     """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count.
 
     Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
-
-    Args:
-        name: any text.
-        taken: names that are taken; a number is added to one of them.
     """
     safe = _NOT_IN_NAMES.sub("-", name).lstrip(".-")[:_LONGEST_NAME].rstrip(".") or "unnamed"
     if _DEVICES.fullmatch(safe):

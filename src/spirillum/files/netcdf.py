@@ -59,10 +59,6 @@ def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.Fi
     """A new NetCDF-4 file, written whole or not at all when the block ends.
 
     It is made in memory: HDF5 takes the whole process down where it finds no space on a disk.
-
-    Args:
-        path: the file.
-        replace: what it may replace, see `atomic_write`.
     """
     import h5netcdf
 
@@ -96,14 +92,6 @@ def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> I
 
     Refused are pipes and folders, files or arrays that are too large, also those whose values were never stored, links
     into other files, and compressed pieces that are larger than they declare.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        largest: of the file, and of all its arrays together, bytes.
-
-    Raises:
-        InputError: if it is no such file, is damaged, or too large; also where the block meets damage.
     """
     with opened(path, what, largest) as stream:
         if stream.read(len(_BEGINS)) != _BEGINS:
@@ -127,17 +115,7 @@ def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> I
 
 
 def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, group: str | None = None) -> xr.Dataset:
-    """A dataset from its file, loaded whole.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        largest: of the file, and of all its arrays together, bytes.
-        group: the group that holds it.
-
-    Raises:
-        InputError: if it is no such file, is damaged, or too large.
-    """
+    """A dataset from its file, loaded whole."""
     with open_netcdf(path, what, largest) as file:
         return group_of(file, group)
 

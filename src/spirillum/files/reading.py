@@ -102,16 +102,7 @@ _DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_LEVELS}}}")
 
 
 def opened(path: str | Path, what: str, largest: int) -> BinaryIO:
-    """A user's file opened for reading: a regular file, whose kind is looked at once it is open.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        largest: largest size, bytes.
-
-    Raises:
-        InputError: if it is missing, a folder, a pipe or a device, unreadable, or too large.
-    """
+    """A user's file opened for reading: a regular file, whose kind is looked at once it is open."""
     path = checked_path(path, what)
     try:
         stream = open(path, "rb", opener=_at_once)  # noqa: SIM115 - the caller closes it
@@ -145,11 +136,7 @@ def _refused(path: Path, error: OSError, what: str) -> InputError:
 
 
 def checked_file(path: str | Path, what: str, largest: int) -> Path:
-    """A user's file that a library is to open by its name.
-
-    Raises:
-        InputError: if it is not there, no regular file, closed to you, or too large.
-    """
+    """A user's file that a library is to open by its name."""
     with opened(path, what, largest) as stream:
         try:
             stream.read(1)
@@ -159,11 +146,7 @@ def checked_file(path: str | Path, what: str, largest: int) -> Path:
 
 
 def read_bytes(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> bytes:
-    """All of a user's file, at most `largest` bytes even if it grows while it is read.
-
-    Raises:
-        InputError: if it is not there, no regular file, closed to you, or too large.
-    """
+    """All of a user's file, at most `largest` bytes even if it grows while it is read."""
     with opened(path, what, largest) as stream:
         try:
             found = stream.read(largest + 1)
@@ -175,16 +158,7 @@ def read_bytes(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> byte
 
 
 def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
-    """Text of a user's file.
-
-    Args:
-        path: the file.
-        what: what it should be, for the sentence of an error.
-        largest: largest size, bytes.
-
-    Raises:
-        InputError: if it cannot be read, is too large or empty, or not UTF-8 text.
-    """
+    """Text of a user's file."""
     try:
         text = read_bytes(path, what, largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -197,11 +171,7 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
 
 
 def read_json(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> Any:
-    """What a JSON file holds.
-
-    Raises:
-        InputError: if it cannot be read, is too large, not JSON, or nested too deeply.
-    """
+    """What a JSON file holds."""
     text = read_text(path, what, largest)
     with suppress(ValueError, RecursionError):
         return json.loads(text)
@@ -209,11 +179,7 @@ def read_json(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> Any:
 
 
 def parse_toml(text: str, source: str, what: str) -> dict[str, Any]:
-    """Tables of a TOML text.
-
-    Raises:
-        InputError: if it is not TOML; the sentence names source and line.
-    """
+    """Tables of a TOML text."""
     if _DEEP_KEY.search(_QUOTED.sub("q", text)):  # the library's memory grows with the square of a key's parts
         raise InputError(f"{source} holds a key of more than {MOST_LEVELS} parts between dots; allowed: {what}")
     try:
@@ -239,11 +205,7 @@ def _with_controls(value: Any) -> Iterator[str]:
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
-    """Tables of a user's TOML file.
-
-    Raises:
-        InputError: if it cannot be read, is too large, or not TOML; the sentence names file and line.
-    """
+    """Tables of a user's TOML file."""
     return parse_toml(read_text(path, what), str(path), what)
 
 
@@ -253,14 +215,6 @@ def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
     Commas, semicolons or tabs separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines
     that start with `#` are comments. They are left out, and so are rows of separators alone, the line `sep=` and empty
     columns at the end, as spreadsheets write.
-
-    Args:
-        text: what stands in the file.
-        path: the file, for the sentence of an error.
-        what: what it should be.
-
-    Raises:
-        InputError: if it is not CSV, or has too many rows or cells.
     """
     _check_extent(text, path, what)
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,;\t\ufeff")]

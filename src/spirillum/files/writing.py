@@ -43,12 +43,7 @@ _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 
 def written_by_us(path: Path, begins: bytes = b"") -> bool:
-    """Whether a file is one of this program's, or empty.
-
-    Args:
-        path: a regular file.
-        begins: what a file of this kind begins with, where it has no room for the mark; none: the mark only.
-    """
+    """Whether a file is one of this program's, or empty."""
     with path.open("rb") as stream:
         head = stream.read(_HEAD)
         stream.seek(max(stream.seek(0, os.SEEK_END) - _TAIL, 0))
@@ -81,9 +76,6 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
         path: where a file is to be written.
         replace: what it may replace.
         begins: what a file of this kind begins with, see `written_by_us`.
-
-    Raises:
-        InputError: if something is there that is no regular file, is an input, or may not be replaced.
     """
     checked_path(path, _ANYTHING)
     try:
@@ -142,11 +134,6 @@ def atomic_write_all(
     paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
 ) -> Iterator[dict[Path, Path]]:
     """Give temporary paths of files that belong together; all are made before the first is renamed.
-
-    Args:
-        paths: the files in the order in which they take their places; perhaps with what they begin with.
-        replace: what they may replace.
-        sync: wait until the disk has them.
 
     Raises:
         InputError: if a folder cannot be written to, or something is there that may not be replaced.
@@ -210,9 +197,6 @@ def holds_own_only(folder: Path) -> bool:
 def atomic_folder(path: Path) -> Iterator[Path]:
     """Give a temporary folder; when the block ends without an error it replaces `path`, with all its content.
 
-    Args:
-        path: a new folder, or one that holds files of this program only, which go.
-
     Raises:
         InputError: if the folder above cannot be written to, or something has come to stand there meanwhile.
         OSError: if there is no space.
@@ -266,11 +250,7 @@ def synced(folder: Path) -> None:
 
 
 def netcdf_target(path: str | Path) -> Path:
-    """The path of a NetCDF file to write, checked before any work is done.
-
-    Raises:
-        InputError: if it does not end in `.nc`, may not be replaced, or its folder is not there or closed to you.
-    """
+    """The path of a NetCDF file to write, checked before any work is done."""
     return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
 
 
@@ -279,18 +259,7 @@ _FEW = 4
 
 
 def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:
-    """The path of a file to write, checked before any work is done.
-
-    Args:
-        path: the file.
-        kinds: allowed endings, and what each of them is.
-        example: a name that would do.
-        replace: what it may replace.
-
-    Raises:
-        InputError: if it has another ending, is no regular file, or one that this program has not written, or its
-            folder is not there or closed to you.
-    """
+    """The path of a file to write, checked before any work is done."""
     path = Path(path)
     if path.suffix not in kinds:
         endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
@@ -309,42 +278,18 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, r
 
 
 def write_text(path: Path, text: str, *, replace: Replace = "own", begins: str = "") -> None:
-    """Write a text file whole or not at all.
-
-    Args:
-        path: the file.
-        text: what it holds.
-        replace: what it may replace.
-        begins: what a file of this kind begins with, see `written_by_us`.
-    """
+    """Write a text file whole or not at all."""
     with atomic_write(path, replace=replace, begins=begins.encode()) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def new_file(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Write a text file that a user edits and would not lose: whole, and not over one that is there.
-
-    Args:
-        path: the file.
-        text: what it holds.
-        overwrite: replace a file that is there.
-
-    Raises:
-        InputError: if the file is there or cannot be written.
-    """
+    """Write a text file that a user edits and would not lose: whole, and not over one that is there."""
     write_text(path, text, replace="any" if overwrite else "none")
 
 
 def output_folder(path: Path, within: Path | None = None) -> Path:
-    """Create the folder for results.
-
-    Args:
-        path: the folder.
-        within: the folder of results that it is part of: a link there could lead out of it.
-
-    Raises:
-        InputError: if it is a file, cannot be created, or is a link out of the folder of results.
-    """
+    """Create the folder for results."""
     checked_path(path, "a folder for results (-o DIR)")
     if within is not None and path.is_symlink():
         raise InputError(f"{path} is a link; allowed: a folder of its own in {within}")

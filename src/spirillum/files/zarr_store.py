@@ -45,11 +45,7 @@ class Stored(NamedTuple):
 
 
 def store_target(path: str | Path) -> Path:
-    """The folder of a store, by its name.
-
-    Raises:
-        InputError: if it does not end in `.zarr`, or is a file.
-    """
+    """The folder of a store, by its name."""
     folder = checked_path(path, "a Zarr store, for example study.zarr")
     if folder.suffix != ".zarr":
         raise InputError(f"store = {str(path)[:200]!r}; allowed: a name that ends in .zarr, for example study.zarr")
@@ -60,11 +56,6 @@ def store_files(
     variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], attributes: Mapping[str, Any]
 ) -> dict[str, bytes]:
     """Files of a store without its regions: its metadata, and the variables that are written whole.
-
-    Args:
-        variables: name to variable.
-        values: those that are written whole now, such as coordinates.
-        attributes: of the whole.
 
     Returns:
         Paths within the store with what stands there; the one that says what is in it comes last.
@@ -91,11 +82,6 @@ def region_files(
     variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], places: Mapping[str, Place]
 ) -> dict[str, bytes]:
     """Files of one region of some variables, in their order.
-
-    Args:
-        variables: name to variable, of the whole store.
-        values: what stands in the region.
-        places: where the region lies.
 
     Raises:
         ValueError: if a region is not one whole chunk.
@@ -168,10 +154,6 @@ def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
 def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
     """Write files that belong together into a claimed folder: all are on the disk before the first is renamed.
 
-    Args:
-        folder: the folder, claimed and locked by this process.
-        pieces: paths within it with what stands there, in the order in which they take their places.
-
     Raises:
         InputError: where a folder in it is a link or cannot be written to, or a file is a folder.
         OSError: if there is no space.
@@ -205,11 +187,7 @@ def _make_folder(folder: Path, inner: Path) -> None:
 
 
 def opened_store(folder: Path) -> xr.Dataset:
-    """A store as a dataset, whose values are read on access.
-
-    Raises:
-        InputError: if it cannot be read.
-    """
+    """A store as a dataset, whose values are read on access."""
     import xarray as xr
 
     try:

@@ -237,12 +237,7 @@ _OPEN = 1e3
 
 
 def nearest_channel(robot: Robot, channels: Sequence[float]) -> int:
-    """Index of the channel that is nearest to a robot's own; an open robot is nearest to the widest.
-
-    Args:
-        robot: the robot.
-        channels: diameters, m.
-    """
+    """Index of the channel that is nearest to a robot's own; an open robot is nearest to the widest."""
     own = robot.channel.diameter if robot.channel else _OPEN
     return int(np.argmin([abs(np.log(own / diameter)) for diameter in channels]))
 

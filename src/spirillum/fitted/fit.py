@@ -161,9 +161,8 @@ class Fit:
         if not (self.friction and self.reading and other):
             return []
         words = (
-            f"B_eff was inferred with friction '{self.reading}' and is another torque with '{other[0]}': rates "
-            "and speeds "
-            f"do not follow from the observations; use '{self.reading}'"
+            f"B_eff was inferred with friction '{self.reading}' and is another torque with '{other[0]}': rates and "
+            f"speeds do not follow from the observations; use '{self.reading}'"
         )
         return [Note("friction-other-fit", words, ("friction.effective",))]
 
@@ -180,14 +179,7 @@ class Fit:
         return [Note("friction-other-fit", words, ("friction.effective",))]
 
     def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[Note]:
-        """All notes beside a steady motion.
-
-        Args:
-            robot: the robot.
-            model: the hydrodynamic model.
-            reading: reading of the friction.
-            rate: prescribed tail rate; None: the robot's own drive, whose friction then matters.
-        """
+        """All notes beside a steady motion."""
         acts = friction_acts(reading, rate)
         idle = self.idle_warnings([robot], [model], friction=acts)
         if rate is None:
@@ -255,14 +247,7 @@ def read_fit(
     *models: str,
     calibrated: bool = True,
 ) -> Fit:
-    """Read a calibration file or a posterior, once for a request.
-
-    Args:
-        calibration: calibration file, or the fit that was read from it; None without one.
-        posterior: file of a posterior, which replaces every other calibration; None without one.
-        models: models of which the posterior may be; none: of any.
-        calibrated: whether the robot's calibration factors are applied.
-    """
+    """Read a calibration file or a posterior, once for a request."""
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
@@ -319,14 +304,7 @@ def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
 def check_not_replaced(
     fields: Iterable[str], robot: Robot, calibration: str | Path | None, posterior: str | Path | None
 ) -> None:
-    """Refuse set fields of a robot whose values a calibration file or a posterior replaces.
-
-    Args:
-        fields: dotted names of the fields that were set.
-        robot: the robot with them.
-        calibration: calibration file; None without one.
-        posterior: file of a posterior; None without one.
-    """
+    """Refuse set fields of a robot whose values a calibration file or a posterior replaces."""
     asked = tuple(fields)
     for paths in ((calibration, None), (None, posterior)):
         if asked and any(paths):

@@ -99,26 +99,14 @@ class PosteriorFile:
         return float(np.median(rates)) if rates else None
 
     def acts_on(self, robot: Robot, *, walls: bool, friction: bool) -> bool:
-        """Whether a fitted number acts on a robot's motion; the model's discrepancy, which widens intervals, aside.
-
-        Args:
-            robot: the robot; a gap, pitch or B_eff of another channel than its own does not.
-            walls: whether the model computes the walls, so that a fitted place matters.
-            friction: whether B_eff acts on the answer.
-        """
+        """Whether a fitted number acts on a robot's motion; the model's discrepancy, which widens intervals, aside."""
         of_lying = {*_PLACE, *FittedContact.model_fields}
         lies = walls and (bool(self._of_place(robot, self.middle)) or "friction_coefficient" in self.draws)
         rubs = friction and friction_of_tails(robot, self.frictions) != (None, ())
         return lies or rubs or not of_lying.issuperset(self.draws)
 
     def placed(self, robot: Robot, placement: Placement, draw: int | None = None) -> Placement:
-        """A placement with the fitted gap and pitch where it leaves them open; level if only the gap was fitted.
-
-        Args:
-            robot: the robot; a gap or pitch is that of its own channel, a roughness decides the gap in every channel.
-            placement: what is asked for.
-            draw: number of a draw; None: the middle.
-        """
+        """A placement with the fitted gap and pitch where it leaves them open; level if only the gap was fitted."""
         if placement.eccentricity is not None:
             return placement
         middle = {name: float(value) for name, value in self._of_place(robot, self._at_draw(draw)).items()}
@@ -171,13 +159,7 @@ class PosteriorFile:
         return calibrated_robot(robot, file)
 
     def drawn(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
-        """The robot with the values of some draws in place of its own, evenly spaced among them.
-
-        Args:
-            robot: the robot.
-            count: number of draws.
-            rng: source of chance, for B_eff of a tail.
-        """
+        """The robot with the values of some draws in place of its own, evenly spaced among them."""
         draws = self.of(robot, rng)
         return [self._at({name: float(values[n]) for name, values in draws.items()}, robot) for n in self.places(count)]
 

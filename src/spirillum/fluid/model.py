@@ -52,12 +52,7 @@ class ResistanceModel(ABC):
         return self.known_error
 
     def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
-        """Neglected effects for a robot, and their cost.
-
-        Args:
-            batch: one robot.
-            fitted_by: file of a calibration or a posterior whose values act on it; empty without one.
-        """
+        """Neglected effects for a robot, and their cost."""
         return self.stated_error(batch.options)
 
     @abstractmethod
@@ -69,11 +64,7 @@ class ResistanceModel(ABC):
         return [] if part in ("body", "coupling") else self.domain(batch)
 
     def check_part(self, batch: RobotBatch, part: str) -> None:
-        """Refuse a part that the model does not know or the robot does not have.
-
-        Raises:
-            InputError: if it is one.
-        """
+        """Refuse a part that the model does not know or the robot does not have."""
         if part not in self.parts:
             raise InputError(f"part = {part!r} with model '{self.name}'; allowed: {', '.join(self.parts)}")
         if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):

@@ -69,20 +69,7 @@ def h264_writer(
     threads: int = 0,
     encoders: Sequence[str] = ENCODERS,
 ) -> Iterator[H264Writer]:
-    """A writer of an MP4 file; the file is complete when the block ends.
-
-    Args:
-        path: the file.
-        size: width and height, even numbers.
-        rate: frames a second.
-        tags: metadata of the file, such as title and comment.
-        quality: options of libx264; other encoders have their own defaults.
-        instead: what can be had without an encoder, for the sentence of an error.
-        extra: the extra that installs PyAV, for the sentence of an error.
-        tick: time base of the stamps, s; None: the duration of a frame.
-        threads: of the encoder; their number changes the bytes of the file. 0: the encoder's choice.
-        encoders: those that will do, the best first.
-    """
+    """A writer of an MP4 file; the file is complete when the block ends."""
     av = import_optional("av", "a film", extra)
     av.logging.set_level(None)
     name = next((name for name in encoders if _is_there(av, name)), None)

@@ -120,16 +120,7 @@ class TableRow:
         blank: Collection[str] = ("", "nan"),
         allowed: str = "a number, or empty",
     ) -> float:
-        """A cell as a number; NaN where it is blank.
-
-        Args:
-            column: its place or name.
-            name: the column's name in the sentence of an error.
-            low: smallest number.
-            high: largest number.
-            blank: texts, in lower case, of a cell that holds nothing.
-            allowed: what the sentence says is allowed.
-        """
+        """A cell as a number; NaN where it is blank."""
         text = self.text(column)
         if text.lower() in blank:
             return math.nan

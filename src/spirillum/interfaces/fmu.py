@@ -169,11 +169,7 @@ _ELECTRICAL = ("motor_torque", "motor_current", "battery_voltage", "electrical_p
 
 
 def free_model(plant: Plant) -> FmuModel:
-    """The FMU of a robot released in its tube.
-
-    Raises:
-        InputError: for a robot without a tube.
-    """
+    """The FMU of a robot released in its tube."""
     links, reach, first = plant.links, plant.reach, plant.state
     if not isinstance(links, TubeRobot):
         raise InputError(

@@ -12,16 +12,7 @@ import numpy as np
 from spirillum.argument_validation import as_number
 from spirillum.arrays import Samples
 from spirillum.display import DisplayMixin
-from spirillum.dynamics.axial_robot import (
-    INPUTS,
-    STATES,
-    AxialRobot,
-    axial_robot,
-    motion,
-    outputs,
-    rates,
-    slopes,
-)
+from spirillum.dynamics.axial_robot import INPUTS, STATES, AxialRobot, axial_robot, motion, outputs, rates, slopes
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, clipped
 from spirillum.kernels import motor as kernel

@@ -71,12 +71,7 @@ class Receiver:
         return self._duty if now - self._last_command <= self.watchdog else 0.0
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Take bytes as they come, and give the answer.
-
-        Args:
-            data: any piece of the stream.
-            now: time, s.
-        """
+        """Take bytes as they come, and give the answer."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         if len(self._rest) > LONGEST_LINE:
             self._rest = self._rest[-LONGEST_LINE:]  # cannot become a valid line again

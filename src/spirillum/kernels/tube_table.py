@@ -61,14 +61,7 @@ def film_is_whole(film: Samples, radius: float) -> bool:
 
 @native()
 def clearance(
-    head: Float64[Array, "..."],
-    x: float,
-    half: float,
-    ring: float,
-    rounded: float,
-    e: float,
-    lift: float,
-    side: float,
+    head: Float64[Array, "..."], x: float, half: float, ring: float, rounded: float, e: float, lift: float, side: float
 ) -> float:
     """Depth by which a ring, or a spheroid, may sink until it touches the wall, m.
 

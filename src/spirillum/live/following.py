@@ -73,15 +73,7 @@ class RecentDetections:
 def motion_flags(
     readings: RecentDetections, robot: Robot, period: float, hand: int, readable: float
 ) -> tuple[Flag, ...]:
-    """Flags on the motion in the last seconds.
-
-    Args:
-        readings: of the last seconds.
-        robot: the robot.
-        period: of the stripes, rad.
-        hand: handedness by perspective, as of `TailWave.handedness`.
-        readable: share of a turn in which something of the stripes faces the camera.
-    """
+    """Flags on the motion in the last seconds."""
     if len(readings.rows) < 4:
         return ()
     time, x, body, tail, roll, roll_error, phase, phase_error = readings.columns()
@@ -148,24 +140,9 @@ class Following:
     """A robot that is known, and what was seen of it."""
 
     def __init__(
-        self,
-        video: Video,
-        setup: Setup,
-        robot: Robot,
-        learnt: InitialDetection,
-        outline: OutlineCheck,
-        window: float,
+        self, video: Video, setup: Setup, robot: Robot, learnt: InitialDetection, outline: OutlineCheck, window: float
     ) -> None:
-        """Begin.
-
-        Args:
-            video: the source, for its name and the size of its pictures.
-            setup: its setup.
-            robot: the robot.
-            learnt: camera, scale, and the robot as it looks.
-            outline: what cover and background leave open of its outline.
-            window: time over which rates are taken, s.
-        """
+        """Begin."""
         self.video, self.setup, self.robot, self.learnt, self.outline = video, setup, robot, learnt, outline
         ruled = setup.markers.spacing is not None
         self.follower = FrameTracker(learnt.known, learnt.still, ahead=False)

@@ -66,11 +66,7 @@ class Observation(DisplayMixin):
 
     def to_dict(self) -> dict[str, Any]:
         """The observation as data, SI with rates in rad/s."""
-        content: dict[str, Any] = {
-            "frame": self.frame,
-            "time": quantity(self.time, "s"),
-            "state": self.state,
-        }
+        content: dict[str, Any] = {"frame": self.frame, "time": quantity(self.time, "s"), "state": self.state}
         if self.reason:
             content["reason"] = self.reason
         if self.state != "learning":
@@ -142,10 +138,7 @@ class Tracked(DisplayMixin):
             "frames_tracked": self.tracked,
             "frames_dropped": self.dropped,
             "learnt_at": quantity(self.learnt, "s"),
-            "latency": {
-                "median": quantity(self.latency(0.5), "s"),
-                "percentile_95": quantity(self.latency(0.95), "s"),
-            },
+            "latency": {"median": quantity(self.latency(0.5), "s"), "percentile_95": quantity(self.latency(0.95), "s")},
         }
         if self.trial is not None:
             content |= {name: self.trial.quantities[name].to_dict() for name in RATE_NAMES}

@@ -231,9 +231,8 @@ class _Log:
         self._clocks = None
         if abs(theirs - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
             words = (
-                f"{self.source.name}: {theirs:.1f} s by the frames' times were {ours:.1f} s by this computer's "
-                "clock: all "
-                "rates are wrong by that factor; check the frame rate"
+                f"{self.source.name}: {theirs:.1f} s by the frames' times were {ours:.1f} s by this computer's clock: "
+                "all rates are wrong by that factor; check the frame rate"
             )
             self._clocks = Note("clock-in-doubt", words, ("camera.frames_per_second",))
 

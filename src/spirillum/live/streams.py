@@ -28,13 +28,7 @@ Kind = Literal["film", "camera", "stream"]
 _ALLOWED = "a film, a folder of images, camera:0 (or another number or name), or rtsp://, http://, tcp://, udp://..."
 _DEVICES = {"linux": ("v4l2", "/dev/video{}"), "darwin": ("avfoundation", "{}"), "win32": ("dshow", "video={}")}
 """Format and name of a camera on each system, as FFmpeg calls them."""
-_PROTOCOLS = {
-    "rtsp": "rtsp,rtp,udp,tcp",
-    "http": "http,tcp",
-    "https": "https,tls,tcp",
-    "tcp": "tcp",
-    "udp": "udp",
-}
+_PROTOCOLS = {"rtsp": "rtsp,rtp,udp,tcp", "http": "http,tcp", "https": "https,tls,tcp", "tcp": "tcp", "udp": "udp"}
 """What a stream may use: its own protocol, no files and no playlists."""
 _FORMATS = "rtsp,mpegts,mpjpeg,mjpeg,matroska,webm,mov,mp4,h264,hevc,flv"
 _FASTEST = 1e4
@@ -180,13 +174,7 @@ def _shown(source: Source, stream: Any, frame: Any) -> Callable[[Any], np.ndarra
 
 
 def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | None) -> tuple[int, int]:
-    """The size of the pictures.
-
-    Args:
-        name: of the source.
-        size: of a picture, width and height.
-        expected: size that was requested, or of the pictures before; None: any.
-    """
+    """The size of the pictures."""
     if size == expected:
         return size
     if expected is not None:

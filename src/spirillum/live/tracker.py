@@ -196,13 +196,7 @@ def _checked_outline(learnt: InitialDetection, samples: list[Frame], setup: Setu
 
 
 def seconds(name: str, value: str | float, most: float = 600.0) -> float:
-    """A time from a user.
-
-    Args:
-        name: of the option.
-        value: with its unit, or a float in s.
-        most: the longest one, s.
-    """
+    """A time from a user."""
     found = parse_option(name, value, KINDS["time"])
     if not 0.1 <= found <= most:
         raise InputError(f"{name} = {found:g} s; allowed: 0.1 s to {most:g} s")

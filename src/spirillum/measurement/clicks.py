@@ -32,12 +32,6 @@ def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, 
     """Spacing of a ruler's lines, m, from two of its marks and the length between them.
 
     The detected lines between the clicks are counted, so that a click need not be exact.
-
-    Args:
-        lines: the ruler's lines in the picture.
-        one: pixel (u, v) of a mark.
-        other: pixel of another one.
-        length: length between the marks, m.
     """
     labels = np.unique(lines.strip)
     away = [
@@ -102,12 +96,7 @@ def length_per_pixel_between(
 
 
 def nose_side(nose: tuple[float, float], rear: tuple[float, float]) -> str:
-    """`right`, `left`, `up` or `down`: where in the picture the nose points, to an eighth of a turn.
-
-    Args:
-        nose: pixel (u, v) of the nose.
-        rear: pixel of the body's rear end.
-    """
+    """`right`, `left`, `up` or `down`: where in the picture the nose points, to an eighth of a turn."""
     along, down = nose[0] - rear[0], nose[1] - rear[1]
     if max(abs(along), abs(down)) < _SHORTEST:
         raise InputError(f"nose and rear are {max(abs(along), abs(down)):.0f} pixels apart; allowed: {_SHORTEST:.0f}")

@@ -55,14 +55,6 @@ def read_track(
     trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a line
     with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts, coords) and
     the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
-
-    Args:
-        path: the table.
-        setup: the setup.
-        video: name of the video.
-        ruled: turns pixels into lengths.
-        time_of: takes numbers of frames to times, s.
-        frame_of: takes times, s, to the numbers of the frames that were taken then; NaN where there is none.
     """
     path = Path(path)
     first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()

@@ -175,12 +175,7 @@ def _unwrapped(angle: Samples) -> Samples:
 
 
 def check_times(marks: Marks, duration: float | None) -> None:
-    """Refuse readings after the end of a video.
-
-    Args:
-        marks: the readings.
-        duration: duration of the video, s; None where unknown.
-    """
+    """Refuse readings after the end of a video."""
     if duration is None:
         return
     for place in np.flatnonzero(marks.time > duration * _LATER):
@@ -226,15 +221,7 @@ def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
 def track_of_marks(
     marks: Marks, setup: Setup, video: str, ruled: Ruled | None, time_of: Callable[[Samples], Samples] | None
 ) -> Track:
-    """A track of manual readings alone.
-
-    Args:
-        marks: the readings.
-        setup: the setup.
-        video: name of the video.
-        ruled: maps pixels to lengths; None where no reading is in pixels.
-        time_of: maps frame numbers to times, s; None where unknown.
-    """
+    """A track of manual readings alone."""
     time = marks.time.copy()
     missing = ~np.isfinite(time)
     if missing.any():
@@ -294,11 +281,6 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
     """A track in which manual readings replace the automatic ones.
 
     To angles the multiple of 2 pi is added that brings them nearest to the track.
-
-    Args:
-        track: the automatic track.
-        marks: the readings.
-        ruled: maps pixels to lengths.
     """
     index = _frames_of(track, marks)
     frames = "1 frame carries a reading" if index.size == 1 else f"{index.size} frames carry readings"
@@ -374,14 +356,7 @@ class Untracked:
 
 
 def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Untracked:
-    """Scale and times of a video.
-
-    Args:
-        path: the video or folder.
-        setup: the setup.
-        folder: folder of the setup file.
-        needed: whether pixels are to be turned into lengths.
-    """
+    """Scale and times of a video."""
     from spirillum.vision.track.assembly import scale_of
 
     rate = setup.camera.frames_per_second

@@ -237,18 +237,7 @@ def check_request(
     end: str | float | None = None,
     overrides: Mapping[str, Any] | None = None,
 ) -> MeasurementRequest:
-    """Check what is to be measured, before any video is opened.
-
-    Args:
-        videos: videos or folders of images, each once.
-        setup: the setup file.
-        marks: table of readings by hand.
-        track: table of trackpy, DeepLabCut or Tracker with the positions of one video, in pixels.
-        tracking: look for the robot in the videos.
-        start: time in the video from which on to measure, s, instead of the setup's.
-        end: time until which to measure, s.
-        overrides: dotted fields of the robot, as for `spirillum.load`.
-    """
+    """Check what is to be measured, before any video is opened."""
     given = [videos] if isinstance(videos, (str, Path)) else list(videos)
     words = [*(("video", video) for video in given), ("marks", marks), ("track", track)]
     for what, word in words:

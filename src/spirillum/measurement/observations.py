@@ -174,14 +174,7 @@ def _check_trial(row: TableRow) -> None:
 
 
 def _number(row: TableRow, name: str, factor: float, least: float | None = None) -> float:
-    """One cell in SI; NaN where it is empty and may be.
-
-    Args:
-        row: the row.
-        name: the column.
-        factor: its unit in SI.
-        least: smallest value in the column's unit; a key column, which has a positive one, may not be empty.
-    """
+    """One cell in SI; NaN where it is empty and may be."""
     low = -_LARGEST_NUMBER if least is None else least
     wanted = f"a number up to {_LARGEST_NUMBER:g}" + (", or empty" if least is None else f" of at least {least:g}")
     blank = () if low > 0.0 else ("",)

@@ -373,9 +373,8 @@ def _warnings(
         apart = lines.distance * found.optics.length_per_pixel
         if not _SPACING[0] < spacing / apart < _SPACING[1]:
             words = (
-                f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are "
-                f"{1e3 * apart:.2g} mm apart; "
-                "check the spacing, or the robot file"
+                f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are {1e3 * apart:.2g} "
+                "mm apart; check the spacing, or the robot file"
             )
             yield Note("setup-incomplete", words, ("markers.spacing",))
     frames = [frame.small(found.reduction) for frame in found.frames]

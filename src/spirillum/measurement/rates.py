@@ -404,9 +404,7 @@ def _solved(blocks: _Blocks, numbers: Sequence[int], noises: Sequence[_Noise]) -
         left = values - np.einsum("kmc,kc->km", solved, beta)
         misfit = np.maximum(np.einsum("km,km->k", blocks.y - beta @ design.T, left), 1e-300)
         one = _Solved(
-            np.full(sound.size, -np.inf),
-            np.zeros((sound.size, columns)),
-            np.tile(np.eye(columns), (sound.size, 1, 1)),
+            np.full(sound.size, -np.inf), np.zeros((sound.size, columns)), np.tile(np.eye(columns), (sound.size, 1, 1))
         )
         one.likelihood[sound] = -half_log + 0.5 * np.linalg.slogdet(inverse)[1] - 0.5 * free * np.log(misfit)
         one.beta[sound], one.covariance[sound] = beta, inverse * (misfit / free)[:, None, None]

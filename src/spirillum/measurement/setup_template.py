@@ -194,12 +194,7 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
 
 
 def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, Any]:
-    """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, what a video shows.
-
-    Args:
-        path: the setup file.
-        film: a video that was taken with it; None: none is looked at.
-    """
+    """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, what a video shows."""
     setup, robot = load_setup(path)
     fields = {
         name: value if unit is None else quantity(value, unit.replace("**", "^"))

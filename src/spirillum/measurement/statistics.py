@@ -45,12 +45,7 @@ def student_t(at: Samples, free: float) -> Samples:
 
 
 def mean_with_interval(values: Sequence[float], level: float = 0.95) -> Mean:
-    """Mean and Student-t interval of independent trials.
-
-    Args:
-        values: one value a trial; NaN (not measured) is left out.
-        level: confidence level.
-    """
+    """Mean and Student-t interval of independent trials."""
     measured = np.asarray(values, dtype=float)
     measured = measured[~np.isnan(measured)]
     count = measured.size

@@ -144,14 +144,7 @@ class Trial:
 
 
 def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None = None) -> Trial:
-    """Measure one track.
-
-    Args:
-        track: the track.
-        robot: the robot, for its stripes.
-        name: name of the trial.
-        read: mask of the frames corrected by hand, (n,); ignored for a track of manual readings alone.
-    """
+    """Measure one track."""
     by_hand = any(flag.name == BY_HAND for flag in track.flags)
     if by_hand:
         read = np.ones(track.time.size, dtype=bool)

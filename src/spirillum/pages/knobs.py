@@ -27,13 +27,7 @@ def robot_tables(source: Any) -> dict[str, Any]:
 
 
 def text_of(command: Mapping[str, Any], name: str, unset: str | None = None) -> str:
-    """A text of a command or a message.
-
-    Args:
-        command: what a browser has sent.
-        name: of the text.
-        unset: what stands for a text that is missing; None: it may not be.
-    """
+    """A text of a command or a message."""
     value = command.get(name, unset)
     if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
         raise InputError(f"{name} = {clipped(value, 40)}; allowed: text")

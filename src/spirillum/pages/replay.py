@@ -62,12 +62,7 @@ def replay_of_upload(content: bytes) -> dict[str, Any]:
 
 
 def replay_of_lane(lane: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
-    """Replay of a robot of the page up to now.
-
-    Args:
-        lane: the robot.
-        run: its recording's data.
-    """
+    """Replay of a robot of the page up to now."""
     return {
         "robot": lane.robot.name,
         "model": lane.built.model if lane.built else "",

@@ -142,11 +142,7 @@ _LABELS = {
 
 
 def quantity_list(rows: Mapping[str, Any] | None = None) -> dict[str, dict[str, Any]]:
-    """Label, unit, factor from SI, and meaning of all that is shown, from the registry.
-
-    Args:
-        rows: values of a prediction, by whose size the units go: a bacterium's speed is read in um/s.
-    """
+    """Label, unit, factor from SI, and meaning of all that is shown, from the registry."""
     found = {}
     for name in dict.fromkeys((*TABLE, *SERIES)):
         item = QUANTITIES[name]

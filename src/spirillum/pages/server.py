@@ -32,17 +32,7 @@ _MOST_CLIENTS = 32
 _MOST_REFUSALS = 20
 _EACH_SECOND, _AT_ONCE = 80.0, 160.0
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-_OWN = (
-    "page.css",
-    "main.js",
-    "knobs.js",
-    "numbers.js",
-    "measure.js",
-    "study.js",
-    "pointing.js",
-    "icon.svg",
-    *MODULES,
-)
+_OWN = ("page.css", "main.js", "knobs.js", "numbers.js", "measure.js", "study.js", "pointing.js", "icon.svg", *MODULES)
 """Files of the page; no others are served."""
 _MISSING = "the key is missing: open the address that `spirillum page` has printed"
 

@@ -229,11 +229,7 @@ def has_table(case: Case, point: CasePoint) -> bool:
 
 
 def values_at(
-    case: Case,
-    point: CasePoint,
-    names: Iterable[str],
-    trial: CaseTrial | None = None,
-    progress: Progress | None = None,
+    case: Case, point: CasePoint, names: Iterable[str], trial: CaseTrial | None = None, progress: Progress | None = None
 ) -> dict[str, CaseValue]:
     """Return quantities of a point by name; with a trial without stated errors."""
     found = _own_values(case, point, names, trial, progress)

@@ -285,14 +285,7 @@ def _key(trial: CaseTrial | None) -> tuple[str, str]:
     return ("", "") if trial is None else (trial.assumption, trial.value)
 
 
-def _row(
-    name: str,
-    case: Case,
-    point: CasePoint,
-    quantity: str,
-    values: _Values,
-    recorded: float,
-) -> ValidationRow:
+def _row(name: str, case: Case, point: CasePoint, quantity: str, values: _Values, recorded: float) -> ValidationRow:
     computed = (point.label, "", "") in values
     ours = values[point.label, "", ""][quantity] if computed else CaseValue(recorded, None)
     effects = tuple(

@@ -46,12 +46,6 @@ def write_measurement_report(
 ) -> list[str]:
     """Write `figures/` (PNG and SVG) and `report.html`, each whole or not at all.
 
-    Args:
-        measurement: what was measured.
-        folder: existing folder.
-        thumbnails: JPEG of an annotated frame by the trial's name.
-        tell: called with what is being done, steps done and steps in all.
-
     Returns:
         Names of the files, as seen from the folder.
     """

@@ -34,14 +34,7 @@ class EmbeddedPicture:
 def draw_pictures(
     pictures: Mapping[str, Picture], folder: Path, tell: Callable[[str, int], None], *, largest_svg: int = 0
 ) -> list[EmbeddedPicture]:
-    """Write `figures/` (PNG and SVG), each file whole or not at all.
-
-    Args:
-        pictures: figures by the names of their files.
-        folder: existing folder of the report.
-        tell: called with the name of the next figure and the number of figures drawn.
-        largest_svg: a vector picture up to this size is embedded as it is, bytes; others as pixels.
-    """
+    """Write `figures/` (PNG and SVG), each file whole or not at all."""
     from spirillum.view.figures.style import save
 
     figures = output_folder(folder / "figures", folder)

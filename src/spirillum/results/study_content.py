@@ -185,9 +185,6 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         """The study over `wavelength` and `amplitude`, and `channel_diameter` if it varies, in place of `robot`.
 
         A study of a grid has these dimensions already. The robots' names become the variable `robot_name`.
-
-        Raises:
-            InputError: if the robots are not all combinations of these sizes.
         """
         if "robot" not in self.dims:
             return self

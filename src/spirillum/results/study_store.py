@@ -15,15 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.files import (
-    is_whole,
-    opened_store,
-    read_json,
-    results_folder,
-    store_files,
-    store_target,
-    write_pieces,
-)
+from spirillum.files import is_whole, opened_store, read_json, results_folder, store_files, store_target, write_pieces
 from spirillum.notes import note_attributes, notes_in
 from spirillum.optional_dependencies import import_optional
 from spirillum.studies.dataset import Caution, described, summed

@@ -32,9 +32,6 @@ class Options(Section):
         Args:
             value: options, their fields by name (quantities with their unit, or floats in SI), or None: the defaults.
                 A field that is None is as if left out.
-
-        Raises:
-            InputError: for an unknown field, a wrong value, or fields that exclude each other.
         """
         if isinstance(value, cls):
             return value
@@ -46,9 +43,6 @@ class Options(Section):
 
         Args:
             value: fields by name, or None: the defaults.
-
-        Raises:
-            InputError: as `of`, and for a quantity without unit.
         """
         return cls._read(value, written=True)
 

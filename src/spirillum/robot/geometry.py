@@ -75,11 +75,7 @@ ProfilePoints = tuple[tuple[float, float], ...]
 Shape = Literal["capsule", "sphere", "spheroid", "cylinder", "profile", "none"]
 End = Literal["hemisphere", "flat", "fillet"]
 
-EndOrNone = Annotated[
-    End | None,
-    UNSET,
-    WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]}),
-]
+EndOrNone = Annotated[End | None, UNSET, WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]})]
 
 _DEFAULT_END: dict[str, End] = {"capsule": "hemisphere", "cylinder": "flat"}
 
@@ -434,12 +430,7 @@ def shortest_body(diameter: Values, fillet: Values, front: End | None, rear: End
 
 
 def body_volume(
-    shape: Shape,
-    diameter: Values,
-    length: Values,
-    fillet: Values,
-    front: End | None,
-    rear: End | None,
+    shape: Shape, diameter: Values, length: Values, fillet: Values, front: End | None, rear: End | None
 ) -> Values:
     """Volume of the body, m^3."""
     radius = 0.5 * diameter

@@ -168,11 +168,6 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
 
     A table has its own: with an accuracy, a tolerance or a number of phases, whatever their values, `tube` solves for
     the flow.
-
-    Args:
-        robot: a checked robot.
-        resolution: fields of `Resolution` that replace the robot's own.
-        models: the models that will be asked; none: any.
     """
     options = robot.model
     given = Resolution.of(resolution).model_dump(exclude_none=True)
@@ -340,9 +335,8 @@ def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
     if weight is None or weight.value > 0:
         return ()
     words = (
-        f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on "
-        "the floor; "
-        "check body.mass"
+        f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on the "
+        "floor; check body.mass"
     )
     return (Note("robot-file-doubtful", words, ("body.mass", "tail.density", "fluid.density")),)
 
@@ -363,9 +357,8 @@ def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[Note, ...]
     if density <= _DENSEST:
         return ()
     words = (
-        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the "
-        "densest metal "
-        f"has {_DENSEST:.4g}; check its unit"
+        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense; the densest "
+        f"metal has {_DENSEST:.4g}; check its unit"
     )
     return (Note("robot-file-doubtful", words, ("body.mass",)),)
 
@@ -386,12 +379,7 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> 
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
         derived = problems.derived()  # once: it integrates the solids
-        doubts = (
-            *_floating(derived),
-            *_displaced(problems),
-            *_too_dense(problems, derived),
-            *_too_smooth(problems),
-        )
+        doubts = (*_floating(derived), *_displaced(problems), *_too_dense(problems, derived), *_too_smooth(problems))
         problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)

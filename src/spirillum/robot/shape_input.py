@@ -34,11 +34,7 @@ _TURNED = 0.5
 
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:
-    """Points of a file, one a row; a first row of words names the columns.
-
-    Raises:
-        InputError: if the file cannot be read, or a row is not as many finite numbers as there are columns.
-    """
+    """Points of a file, one a row; a first row of words names the columns."""
     what = f"{field}: a CSV file of points ({', '.join(columns)}) in mm"
     rows = csv_rows(read_text(path, what), path, what)
     if rows and not any(map(_is_written_number, rows[0][1])):

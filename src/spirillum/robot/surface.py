@@ -50,13 +50,7 @@ class OutlinePoints(NamedTuple):
 
 
 def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> OutlinePoints:
-    """Points along an outline: on an arc in proportion to its angle, on a line only its ends.
-
-    Args:
-        outline: of the solid.
-        around: number of points on a full circle.
-        cuts: places x where there has to be a point, m; those off the outline are left out.
-    """
+    """Points along an outline: on an arc in proportion to its angle, on a line only its ends."""
     x: list[Samples] = []
     rho: list[Samples] = []
     flat: list[bool] = []
@@ -101,13 +95,7 @@ def _with_cut(t: Samples, cut: float) -> Samples:
 
 
 def revolved(profile: OutlinePoints, around: int, start: float = 0.0) -> Surface:
-    """The surface of a solid of revolution about the x axis.
-
-    Args:
-        profile: its outline.
-        around: number of sectors around.
-        start: angle of the first sector's first edge about +x, counted from +z, rad.
-    """
+    """The surface of a solid of revolution about the x axis."""
     around = max(around, _LEAST_AROUND)
     angle = start + 2.0 * np.pi * np.arange(around) / around
     x, rho = profile.x[1:-1, None], profile.rho[1:-1, None]
@@ -118,16 +106,7 @@ def revolved(profile: OutlinePoints, around: int, start: float = 0.0) -> Surface
 
 
 def rod(start: Samples, end: Samples, radius: float, around: int, *, round_start: bool, round_end: bool) -> Surface:
-    """A round rod from one point to another, its ends flat, or balls about those points.
-
-    Args:
-        start: centre of the first end, m, (3,).
-        end: centre of the last end, m, (3,).
-        radius: m.
-        around: number of sides.
-        round_start: whether the first end is a ball.
-        round_end: whether the last end is a ball.
-    """
+    """A round rod from one point to another, its ends flat, or balls about those points."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     ball = 0.5 * np.pi * (np.arange(1, max(2, around // 4)) / max(2, around // 4))
@@ -157,12 +136,6 @@ def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Sur
 
     The cross-sections follow a rotation-minimizing frame, computed by double reflection
     (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27:2, 2008).
-
-    Args:
-        points: along the centreline, m, (k, 3).
-        tangents: unit tangents there, (k, 3).
-        radius: m.
-        around: number of sides.
     """
     around = max(around, _LEAST_AROUND)
     least = np.argmin(np.abs(tangents), axis=1)

@@ -294,11 +294,7 @@ class RobotTables(Section):
         return self.body.shape != "none"
 
     def check_body(self, what: str) -> None:
-        """Refuse a bare tail for what takes a body.
-
-        Raises:
-            InputError: if there is none.
-        """
+        """Refuse a bare tail for what takes a body."""
         if not self.has_body:
             raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: a robot with a body")
 

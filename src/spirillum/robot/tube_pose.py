@@ -74,14 +74,7 @@ class Seat:
 
     @classmethod
     def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> Seat:
-        """Return the pose of a placement; by default level, at the gap of `gap_of`.
-
-        Args:
-            placement: what is asked for.
-            body: outline of the body.
-            body_diameter: D_b.
-            radius: R of the tube.
-        """
+        """Return the pose of a placement; by default level, at the gap of `gap_of`."""
         if placement.eccentricity is not None:
             return cls(radius, placement.eccentricity * (radius - 0.5 * body_diameter), 0.0, placement.tail_drop)
         gap = gap_of(placement, body_diameter, radius)
@@ -95,14 +88,6 @@ class Seat:
 
         For a level body of largest radius a, e = R - a - gap. The offset is NaN where the gap is larger than
         `largest_gap`, as it is once the nose comes nearer to the top.
-
-        Args:
-            body: outline of the body.
-            radius: R of the tube.
-            gap: smallest distance between body and wall.
-            pitch: nose-up pitch alpha.
-            tail_drop: distance by which the tail's axis is lowered.
-            yaw: psi, nose to +y.
         """
         return cls(radius, _offset(body, radius, gap, pitch, yaw), pitch, tail_drop, yaw)
 
@@ -112,11 +97,7 @@ class Seat:
         return self.pitch == 0 and self.yaw == 0
 
     def clearance(self, outline: Outline) -> float:
-        """Smallest distance between a solid of revolution and the wall, m; negative where it cuts into it.
-
-        Args:
-            outline: outline of body or coupling in the robot's frame.
-        """
+        """Smallest distance between a solid of revolution and the wall, m; negative where it cuts into it."""
         ends, arcs = _rings(outline)
         reach = float(self._farthest(*ends)[0].max(initial=0.0))
         for arc, whole in arcs:
@@ -134,10 +115,6 @@ class Seat:
         """Smallest distance between the wire's surface and the wall over a whole turn of the tail.
 
         The wire is what a ball of its radius sweeps along the centreline, so that its ends are round.
-
-        Args:
-            points: (n, 3) centreline at phase 0 in the robot's frame, both ends included.
-            wire_radius: radius of the wire.
         """
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         distance, theta = self._farthest(x, np.hypot(y, z), self.tail_drop)
@@ -321,18 +298,6 @@ def contact_pitch(
     The nose is raised from level, or lowered, until the wire at any phase, or the coupling, comes to the clearance, or
     until the nose leaves the body no seat with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
     NaN where a level robot does not fit.
-
-    Args:
-        body: outline of the body.
-        points: (n, 3) centreline of the wire at phase 0 in the robot's frame.
-        wire_radius: radius of the wire.
-        radius: radius R of the tube.
-        gap: smallest distance between body and wall.
-        coupling: outline of the coupling's solid, where there is one; it stays on the robot's axis.
-        tail_drop: distance by which the tail's axis is lowered.
-        clearance: smallest distance allowed between the wire's surface, or the coupling, and the wall.
-        yaw: psi, nose to +y.
-        nose_down: lower the nose instead of raising it.
     """
     sign = -1.0 if nose_down else 1.0
 

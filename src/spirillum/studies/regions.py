@@ -111,11 +111,7 @@ def cut(
     else:
         small = study.model_copy(update={"robots": (study.robots or [])[parts[0]]})
     own = replace(
-        loaded,
-        study=small,
-        robots=loaded.robots[parts[0]],
-        placements=loaded.placements[parts[0]],
-        question={},
+        loaded, study=small, robots=loaded.robots[parts[0]], placements=loaded.placements[parts[0]], question={}
     )
     return own, None if observed is None else observed_at(observed, layout.indices(region))
 
@@ -255,13 +251,7 @@ class Pace:
     """The time that a study takes as a whole, from when its regions are done."""
 
     def __init__(self, robots: int, workers: int, clock: Callable[[], float] = monotonic) -> None:
-        """The study begins.
-
-        Args:
-            robots: number of robots to compute.
-            workers: number of processes.
-            clock: time, s.
-        """
+        """The study begins."""
         self._robots, self._workers, self._clock = robots, workers, clock
         self._start = self._from = clock()
         self._regions = self._done = self._before = 0

@@ -354,9 +354,8 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
     found = []
     if far:
         words = (
-            f"{len(far)} of {len(answers)} robots yaw further than their tables were checked for: settled speeds "
-            "have no "
-            f"error estimate; the first: {far[0].robot.with_tail}"
+            f"{len(far)} of {len(answers)} robots yaw further than their tables were checked for: settled speeds have "
+            f"no error estimate; the first: {far[0].robot.with_tail}"
         )
         found.append(Note("table-not-checked", words, ("settled_forward_velocity",)))
     if near:

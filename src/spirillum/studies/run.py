@@ -41,13 +41,7 @@ if TYPE_CHECKING:
 
 
 def kept(task: StudyTask, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
-    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task.
-
-    Args:
-        task: what was asked.
-        folder: where answers are kept; None: nowhere.
-        leading: sizes of the first axes of all its arrays.
-    """
+    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
     if folder is None or not (folder / task.file_name).is_file():
         return None
     try:

@@ -149,10 +149,7 @@ class Study(Section):
             "assumed_motor_rates": self.assumed_motor_rates,
         }
         if self.grid is not None:
-            lists |= {
-                "grid.wavelengths": tuple(self.grid.wavelengths),
-                "grid.amplitudes": tuple(self.grid.amplitudes),
-            }
+            lists |= {"grid.wavelengths": tuple(self.grid.wavelengths), "grid.amplitudes": tuple(self.grid.amplitudes)}
         problems += [
             f"{name} holds a value twice; allowed: each once"
             for name, items in lists.items()

@@ -99,14 +99,7 @@ def joined(axial: Axial) -> AxialWhole:
 def with_body_factors(
     r: Samples, factors: tuple[Values, Values], isolated: tuple[Values, Values], entries: tuple[int, int] = (0, 1)
 ) -> Samples:
-    """R with calibration factors on the body's drag: a factor f adds (f - 1) times the isolated body's drag.
-
-    Args:
-        r: R, (..., k, k).
-        factors: on D_x and on E_x.
-        isolated: D_x, N s/m, and E_x, N m s, of the isolated body.
-        entries: places of U and Omega on the diagonal of R.
-    """
+    """R with calibration factors on the body's drag: a factor f adds (f - 1) times the isolated body's drag."""
     more = [(factor - 1.0) * drag for factor, drag in zip(factors, isolated, strict=True)]
     shape = np.broadcast_shapes(r.shape[:-2], *(extra.shape for extra in more))
     r = np.array(np.broadcast_to(r, (*shape, *r.shape[-2:])))
@@ -156,10 +149,6 @@ def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
 
 def body_per_tail(s: TorqueBalance, t: FrictionTorques | None = None) -> tuple[Values, Values]:
     """Kinematics (15), from the sum of both torque rows, in which the joint torque cancels.
-
-    Args:
-        s: the torque balance.
-        t: friction; None: none.
 
     Returns:
         Omega/omega, and the rate Omega that an imposed flow adds, rad/s. NaN where reading `paper` has a B_eff

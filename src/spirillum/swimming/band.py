@@ -155,12 +155,7 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: flo
 
 
 def steepest_pitch(batch: RobotBatch, gap: float) -> float:
-    """Steepest pitch, nose up, that a gap and the tail allow, rad; 0 where even a level robot has no room.
-
-    Args:
-        batch: one robot in a tube.
-        gap: of its body, m.
-    """
+    """Steepest pitch, nose up, that a gap and the tail allow, rad; 0 where even a level robot has no room."""
     g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
     known = batch.placement
     return _steepest(g._replace(wavelength=1.0, hand=1.0), radius, gap, known.tail_drop, known.yaw)

@@ -28,10 +28,7 @@ NO_WEIGHT = Note(
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
     """What has to hold for the answer to be accurate; each broken one is a warning."""
-    return [
-        *model.cautions(batch),
-        *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number),
-    ]
+    return [*model.cautions(batch), *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number)]
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[Note]:
@@ -100,15 +97,7 @@ CONSTANT_TORQUE = Note(
 def drive_warnings(
     robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
 ) -> list[Note]:
-    """Warnings about friction, rate and drive of an answer.
-
-    Args:
-        robot: the robot.
-        model: the hydrodynamic model.
-        reading: reading of the friction.
-        result: the answer.
-        rate: prescribed tail rate, rad/s; None: the robot's own drive.
-    """
+    """Warnings about friction, rate and drive of an answer."""
     motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
     step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
     if np.isfinite(step_out) and not follows:

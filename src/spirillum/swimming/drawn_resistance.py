@@ -87,15 +87,7 @@ class AxialTable:
         coefficients: bool = False,
         tell: Callable[[int, int], None] | None = None,
     ) -> AxialTable:
-        """Compute the resistances.
-
-        Args:
-            batch: the robots.
-            model: the hydrodynamic model.
-            wires: diameters from `chebyshev_points`, where the wire is drawn, m.
-            coefficients: whether RFT's coefficients are drawn.
-            tell: told how many wires are done, and of how many.
-        """
+        """Compute the resistances."""
         found = []
         values = [None] if wires is None else wires.tolist()
         for done, wire in enumerate(values):
@@ -191,12 +183,7 @@ class TubeResistance:
         return found * self._viscosities(draws)[..., None, None]
 
     def load(self, draws: Draws, flow: float) -> Samples:
-        """Force and torques of an imposed mean flow on the robot at rest, (draws, robots, 3); as `whole`.
-
-        Args:
-            draws: the draws.
-            flow: mean velocity, m/s.
-        """
+        """Force and torques of an imposed mean flow on the robot at rest, (draws, robots, 3); as `whole`."""
         found: Samples = flow * self._full(draws)[..., :-1, -1] * self._viscosities(draws)[..., None]
         return found
 
@@ -243,19 +230,9 @@ def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -
 
 
 def drawn_discrepancy(
-    posterior: PosteriorFile,
-    predicted: Mapping[str, Samples],
-    rng: np.random.Generator,
-    robot: Robot | None = None,
+    posterior: PosteriorFile, predicted: Mapping[str, Samples], rng: np.random.Generator, robot: Robot | None = None
 ) -> dict[str, Samples]:
-    """Factors on advance, turning and motor rate, (draws,) each; 1 for a quantity that was not compared.
-
-    Args:
-        posterior: its draws.
-        predicted: advance U/omega, turning Omega/omega and motor_rate omega_m of every draw, (draws,).
-        rng: source of chance.
-        robot: a robot that was measured; None: any other.
-    """
+    """Factors on advance, turning and motor rate, (draws,) each; 1 for a quantity that was not compared."""
     size = next(iter(predicted.values())).size
     found = {}
     for name in ("advance", "turning", "motor_rate"):

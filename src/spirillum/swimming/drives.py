@@ -152,11 +152,7 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
 
 
 def at_rate(
-    batch: RobotBatch,
-    s: TorqueBalance,
-    tail_rate: PerRobot,
-    motor_rate: PerRobot,
-    friction: FrictionReading,
+    batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot, motor_rate: PerRobot, friction: FrictionReading
 ) -> DriveState:
     """Motion at prescribed rates; with a DC-motor the friction follows from (17) and (18)."""
     effective, rotor = _joint_friction(batch, friction)

@@ -116,22 +116,11 @@ class KnownResistance(SwimmerModel):
 
 
 def swim_on_floor(
-    batch: RobotBatch,
-    model: SwimmerModel,
-    robots: Sequence[Robot],
-    coefficient: Values | float | None,
-    **asked: Any,
+    batch: RobotBatch, model: SwimmerModel, robots: Sequence[Robot], coefficient: Values | float | None, **asked: Any
 ) -> Swimming:
     """Steady swimming with dry friction under the robots' whole weight; without a coefficient, or free, that of `swim`.
 
     The dissipated power holds what dry friction takes.
-
-    Args:
-        batch: the robots.
-        model: a hydrodynamic model.
-        robots: the same, or one for all.
-        coefficient: mu_c, one for each robot or for all; None or 0: no dry friction.
-        asked: what else `swim` is asked.
     """
     mu = np.zeros(1) if coefficient is None else np.atleast_1d(np.asarray(coefficient, dtype=float))
     free = swim(batch, model, **asked)

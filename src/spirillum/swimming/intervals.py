@@ -95,18 +95,7 @@ def intervals_over(
     friction: str,
     posterior_for: PosteriorFor,
 ) -> Intervals:
-    """Limits of 95 % intervals over the motions of draws, with the model's discrepancy.
-
-    Args:
-        swum: the motion of every draw.
-        batch: the robot of every draw.
-        posterior: the draws.
-        robot: the robot.
-        rng: source of chance.
-        own_drive: whether the robot's drive turns its tail, at no prescribed rate.
-        friction: reading of the friction.
-        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
-    """
+    """Limits of 95 % intervals over the motions of draws, with the model's discrepancy."""
     predicted = {
         "advance": swum.advance_per_radian,
         "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
@@ -158,14 +147,7 @@ def _known(column: Samples) -> bool:
 
 
 def drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
-    """A robot for each draw.
-
-    Args:
-        robot: the robot.
-        model: name of the model that was fitted.
-        draws: parameter to (draws,).
-        size: number of draws.
-    """
+    """A robot for each draw."""
     one = np.ones(size)
     columns: dict[str, np.ndarray] = {}
     own = robot.friction.effective
@@ -231,13 +213,7 @@ def _table(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples]) -> A
 
 
 def _with_discrepancy(
-    swum: Swimming,
-    batch: RobotBatch,
-    off: Mapping[str, Samples],
-    *,
-    own_drive: bool,
-    friction: str,
-    observed: bool,
+    swum: Swimming, batch: RobotBatch, off: Mapping[str, Samples], *, own_drive: bool, friction: str, observed: bool
 ) -> dict[str, Samples]:
     """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
     values = {item.name: getattr(swum, item.name) for item in STEADY}
@@ -297,13 +273,7 @@ def _current_at(motor: Electrics, slip: Samples) -> Samples:
 
 
 def _torques_and_powers(
-    swum: Swimming,
-    values: dict[str, Samples],
-    batch: RobotBatch,
-    pace: Samples,
-    *,
-    own_drive: bool,
-    friction: str,
+    swum: Swimming, values: dict[str, Samples], batch: RobotBatch, pace: Samples, *, own_drive: bool, friction: str
 ) -> dict[str, Samples]:
     """Torques are linear in the rates, the current follows from (17), B_eff at a prescribed rate from (18)."""
     tail, body, slip = (values[f"{name}_rotation_rate"] for name in ("tail", "body", "motor"))

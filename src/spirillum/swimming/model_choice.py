@@ -40,24 +40,8 @@ class ModelChoice:
     """Whether it is the model of a calibration or a posterior."""
 
 
-def choose_model(
-    asked: str,
-    robot: Robot,
-    *,
-    placement: Placement | None = None,
-    fit: Fit = NO_FIT,
-) -> ModelChoice:
-    """The named model, or with `auto` that of a fit, else the one with the walls of the robot's channel.
-
-    Args:
-        asked: name of a model, or `auto`.
-        robot: the robot.
-        placement: where it lies in its channel, which only a model with walls can answer for.
-        fit: fitted values that are used.
-
-    Raises:
-        InputError: for an unknown model, a fit of several models, or a robot that does not fit into its channel.
-    """
+def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None, fit: Fit = NO_FIT) -> ModelChoice:
+    """The named model, or with `auto` that of a fit, else the one with the walls of the robot's channel."""
     if asked != AUTO:
         return ModelChoice(find_swimmer_model(asked, AUTO).name)
     fitted = _fitted_choice(fit)

@@ -67,17 +67,7 @@ def other_models(
     motion: Motion,
     flow: float | None,
 ) -> OtherModels | None:
-    """Predictions of models that leave out effects which the answering one includes; None where none is comparable.
-
-    Args:
-        robot: the robot, with the resolution of the answer.
-        model: the model that has answered.
-        speed: its forward velocity, m/s.
-        tail_rate: lab rate of the tail that was asked for, rad/s; None: the robot's drive.
-        friction: reading of the friction.
-        motion: lateral motion and tilt held, or free.
-        flow: imposed mean flow, m/s, of which models without walls know nothing; None without one.
-    """
+    """Predictions of models that leave out effects which the answering one includes; None where none is comparable."""
     if model.closed_form or flow is not None or not math.isfinite(speed) or speed == 0:
         return None
     simpler = [

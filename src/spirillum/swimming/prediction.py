@@ -28,12 +28,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import Band, band_of
-from spirillum.swimming.cautions import (
-    accuracy_limits,
-    calibration_warnings,
-    drive_warnings,
-    no_band_warnings,
-)
+from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, drive_warnings, no_band_warnings
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
@@ -298,10 +293,7 @@ def predict(
     result = scenario.swim(batch)
     if not result.valid[0]:
         raise InputError(scenario.why_not(result))
-    warnings = [
-        *ready.warnings,
-        *_case_warnings(scenario, result),
-    ]
+    warnings = [*ready.warnings, *_case_warnings(scenario, result)]
     error = scenario.error_estimate(result, checks)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, scenario.swim, tell) if with_band else None
@@ -360,13 +352,7 @@ def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
 
 
 def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: PosteriorFor) -> str:
-    """Whose intervals they are, in half a sentence; empty without a posterior.
-
-    Args:
-        posterior: the posterior; None without one.
-        robot: the robot.
-        whose: whose discrepancy the intervals hold.
-    """
+    """Whose intervals they are, in half a sentence; empty without a posterior."""
     if posterior is None:
         return ""
     if whose == "measured":

@@ -28,12 +28,7 @@ _BODY, _TAIL, _FLOW = "reynolds-number", "tail-reynolds-number", "flow-reynolds-
 
 
 def body_reynolds(batch: RobotBatch, speed: Samples | float) -> Samples:
-    """Return rho |U| D_b/mu, the Reynolds number on the body's diameter.
-
-    Args:
-        batch: the robots.
-        speed: U, m/s.
-    """
+    """Return rho |U| D_b/mu, the Reynolds number on the body's diameter."""
     return batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity
 
 

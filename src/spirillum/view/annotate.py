@@ -67,12 +67,7 @@ class Annotator:
     """Overlay of tracking results on frames of one robot."""
 
     def __init__(self, robot: Robot, period: float = 2.0 * math.pi) -> None:
-        """Prepare the outline and the wire.
-
-        Args:
-            robot: the robot.
-            period: of its stripes: by whole multiples of it the body's angle is not known, rad.
-        """
+        """Prepare the outline and the wire."""
         from spirillum.robot.mesh import tail_line
 
         self._cv2 = import_optional("cv2", "an annotated video", "video")
@@ -244,16 +239,7 @@ def annotated_film(
     period: float = 2.0 * math.pi,
     waiting: int = 8,
 ) -> Iterator[Callable[[int, np.ndarray, AnnotatedFrame], None]]:
-    """Video of annotated frames at their true times, rendered and encoded in a separate thread.
-
-    Args:
-        path: the file, `.mp4`.
-        robot: the robot.
-        words: title and comment of the film.
-        thumbnail: takes a frame as JPEG, when the film is complete.
-        period: of the robot's stripes: by whole multiples of it the body's angle is not known, rad.
-        waiting: most frames that wait to be drawn.
-    """
+    """Video of annotated frames at their true times, rendered and encoded in a separate thread."""
     annotator = Annotator(robot, period)
     kept: list[np.ndarray] = []
 

@@ -57,9 +57,6 @@ class Degradation(Options):
         Args:
             value: `clean`, `degraded`, a `Degradation`, its fields by name, or None: a clean video. Among the fields
                 `preset` names the degradation whose fields the others replace.
-
-        Raises:
-            InputError: for an unknown name or field, or a value out of range.
         """
         given = {"preset": value} if isinstance(value, str) else value
         if isinstance(given, Mapping) and given.get("preset") is not None:
@@ -72,11 +69,7 @@ class Degradation(Options):
         return super().of(given)
 
     def uncompressed(self) -> Self:
-        """The degradation of frames that are written as PNG files, without compression.
-
-        Raises:
-            InputError: if it has a compression of its own, which no preset has.
-        """
+        """The degradation of frames that are written as PNG files, without compression."""
         if self.crf and self.crf not in {self.of(name).crf for name in _PRESETS}:
             raise InputError(
                 f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which are lossless; "
@@ -160,12 +153,7 @@ NAMES = (*_USUAL, *_DISTURBANCES)
 def with_troubles(
     value: str | Troubles | Mapping[str, Any] | None, degradation: str | Degradation | Mapping[str, Any] | None
 ) -> tuple[Troubles, Degradation]:
-    """Artifacts from a caller's value, and the degradation with those among them that disturb the picture.
-
-    Args:
-        value: names of troubles with commas between them, at their usual size, `Troubles`, its fields by name, or None.
-        degradation: what the caller gave; its own fields stay, those of a preset give way.
-    """
+    """Artifacts from a caller's value, and the degradation with those among them that disturb the picture."""
     stated = Degradation.of(degradation)
     chosen: dict[str, Any] = {}
     disturbed: dict[str, Any] = {}
@@ -184,12 +172,6 @@ def with_troubles(
 
 def counted_frames(troubles: Troubles, kept: np.ndarray, fps: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Remaining frames after further ones were lost, and the numbers from which the video computes their times.
-
-    Args:
-        troubles: of the film.
-        kept: numbers of the frames as recorded, (n,); the first and the last stay.
-        fps: frames a second.
-        seed: of the random numbers.
 
     Returns:
         Numbers as recorded, and numbers by which the film counts its times.

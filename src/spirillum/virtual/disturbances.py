@@ -33,16 +33,7 @@ class Disturbances:
     def of_robot(
         cls, degradation: Degradation, seed: int, lens: VirtualLens, duration: float, robot: Robot, tank: Tank
     ) -> Self:
-        """Those of a video of a robot in its tank, with bubbles above the robot and below the oil's surface.
-
-        Args:
-            degradation: how much of each.
-            seed: of the random numbers.
-            lens: the camera.
-            duration: of the video, s.
-            robot: the robot.
-            tank: where it swims.
-        """
+        """Those of a video of a robot in its tank, with bubbles above the robot and below the oil's surface."""
         length, diameter = robot.body.length, robot.body.diameter
         top = min(tank.tube_height + 0.8 * (tank.tube or 1.5 * diameter), 0.95 * lens.surface)
         return cls(degradation, seed, lens, duration, (length, diameter), top)
@@ -56,16 +47,7 @@ class Disturbances:
         body: tuple[float, float],
         top: float,
     ) -> None:
-        """Draw the random numbers.
-
-        Args:
-            degradation: how much of each.
-            seed: of the random numbers.
-            lens: the camera.
-            duration: of the video, s.
-            body: length and diameter of the body, m.
-            top: height at which bubbles drift, m.
-        """
+        """Draw the random numbers."""
         self._degradation, self._seed, self._lens, self._body = degradation, seed, lens, body
         rng = np.random.default_rng([seed, _LAMP])
         self._linear = bool(rng.integers(2))

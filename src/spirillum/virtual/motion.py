@@ -50,12 +50,6 @@ def steady_rates(
 ) -> tuple[dict[str, float], str, tuple[Note, ...], str]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
-    Args:
-        robot: a checked robot.
-        motion: the model and the prescribed rates.
-        default_model: where `motion` names none; `auto` is what `predict` answers with.
-        placement: where the robot lies, for a model with walls; None: at the reference place.
-
     Returns:
         The rates by name, what they are from, warnings, and why the model was taken.
     """
@@ -159,14 +153,7 @@ def motion_of_trial(
 
 
 def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> TrialMotion:
-    """The motion of a run.
-
-    Args:
-        robot: a checked robot.
-        run: a run of `spirillum.simulate`.
-        trial: duration; the pose is the run's.
-        camera: where the camera stands.
-    """
+    """The motion of a run."""
     from spirillum.dynamics.run_file import robot_of
 
     own = robot_of(run)
@@ -200,13 +187,7 @@ def _clearance(robot: Robot) -> float:
 
 
 def _resting_place(robot: Robot, asked: float | None, lateral: float) -> Samples:
-    """(3,) middle of the body in the channel's axes, low in the tube at a gap and a horizontal offset, m.
-
-    Args:
-        robot: a checked robot.
-        asked: the gap; None: that of the reference place of models with walls.
-        lateral: the offset.
-    """
+    """(3,) middle of the body in the channel's axes, low in the tube at a gap and a horizontal offset, m."""
     if robot.channel is None:
         return np.array([0.0, lateral, 0.0])
     room = _clearance(robot)

@@ -293,12 +293,7 @@ _LOOKS = 1001
 
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:
-    """The lens of a camera.
-
-    Args:
-        camera: its options.
-        tilt: angles of the optical axis to the vertical about x, then about y, rad.
-    """
+    """The lens of a camera."""
     return replace(_ideal_lens(camera), tilt=tilt, distortion=(camera.distortion, 0.0))
 
 
@@ -332,14 +327,7 @@ def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
 
 
 def framed(trajectory: TrialTrajectory, robot: Robot, lens: VirtualLens, start: float | None) -> TrialTrajectory:
-    """The trajectory from a first x, or centred in the picture.
-
-    Args:
-        trajectory: of the robot.
-        robot: a checked robot.
-        lens: the camera.
-        start: x of the body's mid-length at the first frame, m; None: centred.
-    """
+    """The trajectory from a first x, or centred in the picture."""
     _check_beside_axis(trajectory, robot, lens)
     x = trajectory.position[:, 0]
     low, high = _visible(lens, float(trajectory.position[:, 2].mean()))

@@ -47,15 +47,7 @@ class Cover:
     """The glass before a robot's seal: its surface to draw, and what is seen through it."""
 
     def __init__(self, robot: Robot, index: float, still: Backdrop, lamps: Lamps, side: float) -> None:
-        """Prepare.
-
-        Args:
-            robot: a checked robot with a seal.
-            index: refractive index of the oil.
-            still: the scene behind it.
-            lamps: that light it.
-            side: -1 where the camera is rotated by half a turn, else 1.
-        """
+        """Prepare."""
         from scipy.ndimage import gaussian_filter
 
         body = next(piece for piece in robot_mesh(robot) if piece.name == "body")
@@ -200,15 +192,7 @@ class Painter:
     def __init__(
         self, robot: Robot, tank: Tank, lens: VirtualLens, edges: Samples | None = None, *, covered: bool = False
     ) -> None:
-        """Prepare.
-
-        Args:
-            robot: a checked robot.
-            tank: the still parts.
-            lens: the camera.
-            edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
-            covered: whether the body before its seal is a cover of glass.
-        """
+        """Prepare."""
         self.robot, self.tank, self.lens = robot, tank, lens
         self.body, self.rotor = solids_of(robot, edges=edges, covered=covered)
         self.still = backdrop(tank, lens)
@@ -366,15 +350,7 @@ class FrameEncoder:
         exposure: float,
         view: ViewArtifacts | None = None,
     ) -> None:
-        """Prepare.
-
-        Args:
-            painter: draws robot and tank.
-            disturbances: of the pictures.
-            trajectory: of the robot.
-            exposure: of a frame, s.
-            view: what lies between robot and picture; None: nothing, and the camera stands still.
-        """
+        """Prepare."""
         self._view = view
         self._painter, self._disturbances, self._trajectory = painter, disturbances, trajectory
         self._exposure = exposure

@@ -55,12 +55,7 @@ def covered_body(robot: Robot, body: RobotMesh) -> list[RobotMesh]:
 
 
 def part_of(piece: RobotMesh, chosen: np.ndarray) -> RobotMesh:
-    """Some triangles of a piece.
-
-    Args:
-        piece: of a robot's mesh.
-        chosen: whether each triangle belongs to them, (m,).
-    """
+    """Some triangles of a piece."""
     used, faces = np.unique(piece.faces[chosen], return_inverse=True)
     return RobotMesh(
         piece.name,
@@ -162,14 +157,7 @@ class RenderedSolid:
 def solids_of(
     robot: Robot, fineness: float = 1.0, edges: Samples | None = None, *, covered: bool = False
 ) -> tuple[RenderedSolid, RenderedSolid]:
-    """Body and rotor of a robot, the rotor with its tail at phase 0.
-
-    Args:
-        robot: a checked robot.
-        fineness: of `spirillum.robot.mesh.robot_mesh`.
-        edges: of the stripes, see `spirillum.virtual.artifacts.stripe_edges`; None: even ones.
-        covered: whether a glass cover, which is not one of them, stands before the seal.
-    """
+    """Body and rotor of a robot, the rotor with its tail at phase 0."""
     robot.check_body("the virtual camera")
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
     if edges is not None:
@@ -182,11 +170,7 @@ def solids_of(
 
 
 def joined(pieces: list[RobotMesh]) -> RenderedSolid:
-    """One solid of pieces that move together.
-
-    Args:
-        pieces: of a robot's mesh.
-    """
+    """One solid of pieces that move together."""
     vertices, faces, colours, gloss, normals, kind, count = [], [], [], [], [], [], 0
     for piece in pieces:
         points, triangles, origin = _shortened(np.asarray(piece.vertices), np.asarray(piece.faces))

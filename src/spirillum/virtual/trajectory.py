@@ -176,14 +176,7 @@ def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: flo
 
 
 def trajectory_of(poses: Poses, view: str, *, leftwards: bool, axis: float) -> TrialTrajectory:
-    """TrialTrajectory of a robot's poses in the lab, from the time 0 on.
-
-    Args:
-        poses: of the robot.
-        view: `top` or `side`.
-        leftwards: whether the nose points to the left in the picture.
-        axis: height of the channel's axis in the camera's frame, m.
-    """
+    """TrialTrajectory of a robot's poses in the lab, from the time 0 on."""
     from spirillum.dynamics.run_file import rotation_matrix
 
     turn = lab_to_camera(view, leftwards=leftwards)

@@ -42,17 +42,7 @@ def setup_text(
     timed: bool,
     glass: bool = False,
 ) -> str:
-    """A setup file.
-
-    Args:
-        robot_file: preset or robot file beside it.
-        camera: view, direction and frame rate.
-        lens: heights and refractive index.
-        spacing: of the ruler's lines, m.
-        axis: stated height of the robot's axis and its standard uncertainty, m.
-        timed: whether the video has times of its own; the pictures of a folder have none.
-        glass: whether the body's cover is of glass.
-    """
+    """A setup file."""
     height, uncertainty = axis
     lines = [
         f"# {SYNTHETIC}; {MARK}",
@@ -92,14 +82,7 @@ def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
 def truth_dataset(
     trajectory: TrialTrajectory, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]
 ) -> xr.Dataset:
-    """The truth on every frame of the video.
-
-    Args:
-        trajectory: of the robot.
-        times: of the frames that are in the video, s, (n,).
-        numbers: of those frames, counted as recorded, (n,).
-        attributes: of the dataset.
-    """
+    """The truth on every frame of the video."""
     import xarray as xr
 
     series = trajectory.series(times)
@@ -122,12 +105,7 @@ def truth_dataset(
 
 
 def names_beside(path: Path, setup: Path | None = None) -> dict[str, Path]:
-    """Paths of the files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`.
-
-    Args:
-        path: the video or the folder.
-        setup: another setup file; the robot's file is then beside that.
-    """
+    """Paths of the files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`."""
     stem = path.stem if path.suffix else path.name
     ends = {"setup": "setup.toml", "json": "truth.json", "nc": "truth.nc", "robot": "robot.toml"}
     found = {name: path.parent / f"{stem}.{end}" for name, end in ends.items()}

@@ -146,10 +146,9 @@ def setup_check(answer: Answer) -> Blocks:
         ruler = f"{video['markers']} lines of the ruler" if video["markers"] else "no ruler"
         stripes = "its stripes fit" if video["stripes_fit"] else "its stripes do not fit"
         yield (
-            f"{video['name']}: robot on {video['frames_with_robot']} of {video['frames']} frames looked at, "
-            f"{size:.3f} times as large as its file says; {stripes}, tail read on "
-            f"{100 * video['tail_readable']:.0f} %; "
-            f"{ruler}, {1e3 * pixel:.4g} mm a pixel"
+            f"{video['name']}: robot on {video['frames_with_robot']} of {video['frames']} frames looked at, {size:.3f} "
+            f"times as large as its file says; {stripes}, tail read on {100 * video['tail_readable']:.0f} %; {ruler}, "
+            f"{1e3 * pixel:.4g} mm a pixel"
         )
 
 

@@ -87,12 +87,7 @@ def brennen_winet(batch: RobotBatch) -> LocalCoefficients:
     return LocalCoefficients(2.0 * np.pi * mu / log, 4.0 * np.pi * mu / log, 4.0 * np.pi * mu / (log - 1.0))
 
 
-_SETS = {
-    "printed": printed,
-    "gray-hancock": gray_hancock,
-    "lighthill": lighthill,
-    "brennen-winet": brennen_winet,
-}
+_SETS = {"printed": printed, "gray-hancock": gray_hancock, "lighthill": lighthill, "brennen-winet": brennen_winet}
 
 
 def local_coefficients(batch: RobotBatch) -> LocalCoefficients:

@@ -20,12 +20,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import two_parts_axial
 from spirillum.fluid.closed.perrin import body_axial
-from spirillum.fluid.closed.thin_wire import (
-    EXACT_EPS_CONSTANT,
-    PRINTED_EPS_CONSTANT,
-    cutoff,
-    thin_wire_cautions,
-)
+from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT, cutoff, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import (
     CHECKED,

@@ -62,13 +62,7 @@ def _kept(key: str, stage: StageName) -> Path | None:
 
 
 def find_table(geometry: RobotGeometry, radius: float, least: StageName = "straight") -> TubeTable | None:
-    """Return the finest table of a robot in a tube, of itself or of its mirror image; None without one.
-
-    Args:
-        geometry: of the robot.
-        radius: of the tube, m.
-        least: coarsest stage that will do.
-    """
+    """Return the finest table of a robot in a tube, of itself or of its mirror image; None without one."""
     key, image_key = key_of(geometry, radius), key_of(geometry._replace(hand=-geometry.hand), radius)
     stages = tuple(STAGES)
     for stage in reversed(stages[stages.index(least) :]):

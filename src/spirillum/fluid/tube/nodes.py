@@ -77,11 +77,7 @@ class Places:
 
     @cached_property
     def rings(self) -> Samples:
-        """See `rings_of`.
-
-        Raises:
-            InputError: for a robot without a table.
-        """
+        """See `rings_of`."""
         if self.geometry.shape == "none":
             said = "a bare tail (body = 'none') has no table in its tube"
             raise InputError(f"{said}; allowed: single poses, model.tube.form = 'direct'")

@@ -12,14 +12,7 @@ OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of
 
 
 def progress_message(places: int, workers: int, kept: int, seconds: tuple[float, float] = (10.0, 17.0)) -> str:
-    """Return the announcement of a table that is made: from how many places, and about how long it takes.
-
-    Args:
-        places: number of places to solve for.
-        workers: number of processes.
-        kept: number of places that are kept from before.
-        seconds: that a place takes one process of a fast and of a slow machine.
-    """
+    """Return the announcement of a table that is made: from how many places, and about how long it takes."""
     remaining = places - kept
     least, most = (max(round(remaining * each / max(workers, 1) / 60.0), 1) for each in seconds)
     minutes = f"about {least} min" if least == most else f"{least} to {most} min"

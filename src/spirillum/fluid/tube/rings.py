@@ -53,13 +53,7 @@ class Rings(ABC):
 
     @abstractmethod
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
-        """Take what the wall reflects of the solids' tractions from their single layer's matrices.
-
-        Args:
-            waves: those that matter between the solids.
-            systems: families of unknowns that the wall couples.
-            matrices: one for each system, (unknowns, unknowns), changed in place.
-        """
+        """Take what the wall reflects of the solids' tractions from their single layer's matrices."""
 
     @abstractmethod
     def sent(
@@ -82,11 +76,6 @@ class Rings(ABC):
         """Velocities on some unknowns from waves at points, with the wall's single layer, for each k and system.
 
         (unknowns, 2, parities, orders, 3), to be multiplied with `point_waves`; without the minus sign.
-
-        Args:
-            waves: those that matter between points and solids.
-            systems: the unknowns.
-            away: smallest distance of the points from the wall, m.
         """
 
 
@@ -133,13 +122,7 @@ class LevelRings(Rings):
     """
 
     def __init__(self, panels: Panels, offset: float, modes: int) -> None:
-        """Rings of solids.
-
-        Args:
-            panels: of the solids.
-            offset: m.
-            modes: Fourier modes about the second axis.
-        """
+        """Rings of solids."""
         self.panels, self.offset, self.modes = panels, offset, modes
         self.reference = float(np.max(panels.rho))
 

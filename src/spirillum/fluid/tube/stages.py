@@ -52,12 +52,7 @@ class Stage:
     """Polynomials in yaw of the film."""
 
     def fineness(self, gap: float, *, level: bool) -> Fineness:
-        """Return the resolution of a node.
-
-        Args:
-            gap: of the level robot at this t, over the body's radius.
-            level: whether the robot has neither pitch nor yaw.
-        """
+        """Return the resolution of a node."""
         return self.resolutions[gap < _NEAR, level]
 
 
@@ -104,11 +99,7 @@ STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW,
 
 
 def stage_of(name: str) -> StageName:
-    """Return the name of a stage that a user gives.
-
-    Raises:
-        InputError: for a name of none.
-    """
+    """Return the name of a stage that a user gives."""
     for known in STAGES:
         if name == known:
             return known

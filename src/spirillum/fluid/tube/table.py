@@ -254,12 +254,7 @@ class TubeTable:
         return replace(self, geometry=geometry, packed=tube_table.mirror_image(self.packed))
 
     def write(self, path: Path, film: str | None = None) -> None:
-        """Write it, whole or not at all, its numbers rounded to some 1e-5.
-
-        Args:
-            path: file.
-            film: name of a file beside it that has its film, which tails share; None: in the same file.
-        """
+        """Write it, whole or not at all, its numbers rounded to some 1e-5."""
         head = {
             "format": _FORMAT,
             "geometry": self.geometry._asdict(),
@@ -282,11 +277,7 @@ class TubeTable:
 
     @classmethod
     def read(cls, path: Path) -> TubeTable:
-        """Read a table.
-
-        Raises:
-            InputError: if the file is none.
-        """
+        """Read a table."""
         found = _read(path)
         if found is None:
             raise InputError(f"{path} is no table of this version of spirillum; allowed: one of `spirillum prepare`")

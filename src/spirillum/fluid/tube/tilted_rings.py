@@ -70,14 +70,7 @@ class TiltedRings(Rings):
     """
 
     def __init__(self, panels: Panels, seat: Seat, counts: np.ndarray, precision: type[np.floating]) -> None:
-        """Rings of solids.
-
-        Args:
-            panels: of the solids.
-            seat: where their axis runs in the tube.
-            counts: Fourier modes about it that each node bears.
-            precision: of the wall's part of their single layer.
-        """
+        """Rings of solids."""
         self.panels, self.seat, self.counts, self.precision = panels, seat, counts, precision
 
     def _tiers(self, systems: Sequence[System], bearing: np.ndarray | None = None) -> list[_Tier]:

@@ -143,14 +143,7 @@ def _answer(question: _Question) -> Samples:
 
 
 def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> Samples:
-    """R, load and drag of a whole robot, (13, 13): viscosity 1, no net flux, twists about the origin in body axes.
-
-    Args:
-        geometry: of the robot.
-        seat: where it is; inside the model's domain.
-        fineness: how finely the flow is resolved.
-        phase: of the tail, rad.
-    """
+    """R, load and drag of a whole robot, (13, 13): viscosity 1, no net flux, twists about the origin in body axes."""
     return _answer(_Question(geometry, "robot", seat, fineness, phase))
 
 
@@ -185,13 +178,7 @@ def check_solvable(geometry: RobotGeometry, seat: Seat, fineness: Fineness) -> N
 
 
 def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
-    """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux.
-
-    Args:
-        batch: robots inside the domain of the model.
-        index: which.
-        phase: of the tail, rad.
-    """
+    """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux."""
     fineness = Tube().fineness(batch, index)
     return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
 

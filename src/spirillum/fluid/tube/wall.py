@@ -65,14 +65,7 @@ class WallWaves:
         return min(int(np.ceil(self.radius * np.sqrt(steepest**2 - k**2)) + 3.0), self.orders[number])
 
     def bands(self, number: int, distances: Samples, other: float, orders: int) -> Iterator[WaveBand]:
-        """Which of some things the waves of one k reach: the steeper the wave, the fewer of them.
-
-        Args:
-            number: of the node in k.
-            distances: of the things from the wall, (n,), m.
-            other: smallest distance from the wall of what is at the other end of the waves, m.
-            orders: number of all orders.
-        """
+        """Which of some things the waves of one k reach: the steeper the wave, the fewer of them."""
         steepest = _FURTHER * self.cut / np.maximum(distances + other, _AT_WALL * self.radius)
         k = float(self.k[number])
         around = self.radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))

@@ -67,13 +67,7 @@ class UnitTwistSolution:
 def solve(
     solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
 ) -> UnitTwistSolution:
-    """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin.
-
-    Args:
-        solids: solids of revolution about the x axis, and the part (0 body, 1 rotor) with which each moves.
-        wires: wires, and the part with which each moves.
-        resolution: how finely.
-    """
+    """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin."""
     with one_thread():
         return _solve(solids, wires, resolution)
 
@@ -221,22 +215,9 @@ class _Images:
 
     @classmethod
     def of(
-        cls,
-        panels: Panels,
-        parts: np.ndarray,
-        wires: tuple[Wire, ...],
-        system: WireSystem,
-        resolution: Discretisation,
+        cls, panels: Panels, parts: np.ndarray, wires: tuple[Wire, ...], system: WireSystem, resolution: Discretisation
     ) -> _Images:
-        """Solve mode by mode.
-
-        Args:
-            panels: of all solids.
-            parts: the part (0 body, 1 rotor) with which each solid moves.
-            wires: wires.
-            system: their equations.
-            resolution: how finely.
-        """
+        """Solve mode by mode."""
         sources = Sources.of(wires, system)
         motion = surface_motion(panels, parts)
         size = len(system.mobility)

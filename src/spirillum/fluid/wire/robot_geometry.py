@@ -109,11 +109,7 @@ class RobotGeometry(NamedTuple):
         return self.form.starts * float(station_count(length, np.array([0.5 * self.wire_diameter]))[0])
 
     def swept(self, count: int) -> Samples:
-        """Points of a wire's centreline turned to angle 0 about the axis, (n, 3), m: what it sweeps in a turn.
-
-        Args:
-            count: points of a helix; a centre line through points has bends of its own, and takes more.
-        """
+        """Points of a wire's centreline turned to angle 0 about the axis, (n, 3), m: what it sweeps in a turn."""
         xi = np.linspace(0.0, self.tail_length, count)
         root = -0.5 * self.body_length - self.coupling_length
         if self.form.curve:
@@ -132,14 +128,7 @@ class RobotGeometry(NamedTuple):
         return tuple(replace(one, points=one.points @ q.T, tangents=one.tangents @ q.T) for q in self.form.rotations)
 
     def wire(self, spacing: float = 1.0) -> Wire:
-        """One wire of the tail at phase 0.
-
-        Args:
-            spacing: of the stations, relative to the standard one.
-
-        Raises:
-            InputError: for more stations than fit into memory; models refuse far fewer, see their domains.
-        """
+        """One wire of the tail at phase 0."""
         return _wire(self, spacing)
 
 

@@ -125,13 +125,7 @@ class Panels:
 
 
 def panels_of(outlines: Sequence[Outline], longest: Callable[[int, Samples, Samples], Samples], order: int) -> Panels:
-    """Cut outlines into panels.
-
-    Args:
-        outlines: one for each solid.
-        longest: longest panel allowed at points (x, rho) of a solid, m.
-        order: nodes of a panel.
-    """
+    """Cut outlines into panels."""
     x, rho, solid = [], [], []
     for index, outline in enumerate(outlines):
         sharp = (False, *outline.corners, False)

@@ -142,12 +142,7 @@ class FrenetFrames(NamedTuple):
 
 
 def frenet_frames(robot: Robot, xi: Samples) -> FrenetFrames:
-    """Frenet-Serret frames of the wire of eq. (10), its tail at phase 0.
-
-    Args:
-        robot: a loaded robot.
-        xi: (n,) axial distances from the root, m.
-    """
+    """Frenet-Serret frames of the wire of eq. (10), its tail at phase 0."""
     step = 1e-5 * robot.tail.length
     ahead, behind = (
         centreline_of(robot, np.clip(xi + sign * step, 0.0, robot.tail.length)).tangent for sign in (1.0, -1.0)

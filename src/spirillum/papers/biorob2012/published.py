@@ -55,10 +55,6 @@ def published_beside(found: Prediction, beside: Prediction | None) -> list[dict[
 
     The paper's data points are lost. It states by how much the robot is slower in the narrow channel than in the wide
     one, with two of its tails.
-
-    Args:
-        found: the prediction, with its released motions.
-        beside: what `other_tube` returns for it.
     """
     if beside is None:
         return []

@@ -24,18 +24,9 @@ _SAMPLES = 24
 def released_motion(robot: Robot, run: Mapping[str, Any], progress: Progress | None = None) -> dict[str, float]:
     """Return what was published of a run, per turn of the swimmer.
 
-    Args:
-        robot: the swimmer in its tube.
-        run: `eccentricity` of the start; number of `turns`; between which of them the growth (`growth`) and all else
-            (`read`) is read; `roughness` that carries the swimmer, m; `wait` before the field turns, s.
-        progress: told what is being computed, how much is done, and of how much.
-
     Returns:
         `growth` of the logarithm of the distance from the axis; `orbit`, turns about the axis in the sense of the own
         rotation; mean `radius`, m; mean `tilt`, rad; `advance`, m.
-
-    Raises:
-        InputError: if the run ends early.
     """
     found = simulate(
         robot,

@@ -170,7 +170,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             notes=[
                 "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
                 f"no limit there. The model's discrepancy is held at {held}; "
-                "the table's intervals let it vary, and are wider where it may be larger.",
+                "the table's intervals let it vary, and are wider where it may be larger."
             ],
         )
         every = list(sheet.panels.flat)

@@ -165,11 +165,7 @@ def _field_rate(robot: Robot) -> float:
 
 
 def robot_figure(robot: Robot) -> Figure:
-    """Side view of a robot in its channel, to scale: computed geometry with its dimensions.
-
-    Args:
-        robot: a loaded robot. Its nose is on the right, its body lies on the channel's floor; the view is along +y.
-    """
+    """Side view of a robot in its channel, to scale: computed geometry with its dimensions."""
     with styled():
         scene = DrawingLayout.of(robot)
         height = PAGE * (scene.top - scene.bottom) / (scene.right - scene.left)

@@ -118,14 +118,7 @@ def silhouette(robot: Robot, position: Samples, attitude: Samples) -> Samples:
 
 
 def draw_cross_section(axes: Axes, dataset: xr.Dataset, robot: Robot, path: Samples) -> None:
-    """Draw the tube as seen from its front end, y to the right and z up, so that positive azimuth is anticlockwise.
-
-    Args:
-        axes: an empty panel.
-        dataset: a run in a tube, with `attitude`.
-        robot: its robot, with a channel.
-        path: (n, 3) places of the body's mid-length, m.
-    """
+    """Draw the tube as seen from its front end, y to the right and z up, so that positive azimuth is anticlockwise."""
     assert robot.channel is not None  # noqa: S101 - the caller's promise
     radius = 0.5 * robot.channel.diameter
     lengths = UnitPrefix.of(np.array([radius]), "m")

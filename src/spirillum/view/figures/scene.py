@@ -70,16 +70,7 @@ def crests(robot: Robot, phase: float, unit: float) -> Values:
 
 
 def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: float, points: float) -> None:
-    """Plot the tail's wires in true thickness, seen along +y: hidden parts are darker.
-
-    Args:
-        axes: where to draw, in `unit`.
-        robot: the robot.
-        colours: shadow, middle, highlight.
-        phase: phase of the tail, rad.
-        unit: length of one drawing unit, m.
-        points: typographic points in one drawing unit.
-    """
+    """Plot the tail's wires in true thickness, seen along +y: hidden parts are darker."""
     paths = wire_lines(robot, phase, unit)
     thickness, amplitude = robot.tail.wire_diameter / unit, robot.tail.amplitude / unit
     pieces = np.concatenate([np.stack([path[:-1, [0, 2]], path[1:, [0, 2]]], axis=1) for path in paths])

@@ -28,15 +28,7 @@ _MOST_CELLS = 400_000
 
 
 def draw_section(
-    axes: Axes,
-    robot: Robot,
-    plane: str,
-    offset: float,
-    *,
-    phase: float,
-    unit: float,
-    points: float,
-    drop: float = 0.0,
+    axes: Axes, robot: Robot, plane: str, offset: float, *, phase: float, unit: float, points: float, drop: float = 0.0
 ) -> None:
     """Plot the robot on the plane of the panel's axes.
 

@@ -328,10 +328,7 @@ def _draw_robots(
     upright = _TICK_LETTER * longest * len(names) < width
     if not upright and 0.3 * len(names) < width:  # room for two lines
         names = [name.replace(", ", ",\n", 1) for name in names]
-    legend = [
-        *model_handles(shown, own_drive=not shown.observed),
-        *([] if shown.observed else settled_handles(shown)),
-    ]
+    legend = [*model_handles(shown, own_drive=not shown.observed), *([] if shown.observed else settled_handles(shown))]
     sheet = Sheet(
         title,
         shown.source_line,

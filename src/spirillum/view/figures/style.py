@@ -68,11 +68,7 @@ PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}
 """Line that represents an area in a legend."""
 DPI = 200
 """Of PNG files."""
-_NO_DATE: dict[str, dict[str, Any]] = {
-    "png": {"Software": MARK},
-    "pdf": {"CreationDate": None},
-    "svg": {"Date": None},
-}
+_NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
 _WITHOUT_PREFIX = ("rad/s", "rad", "1", "%")

@@ -60,13 +60,7 @@ class CrossSection:
         self._font = ImageFont.truetype(font_manager.findfont("DejaVu Sans"), max(int(0.085 * self._side), 6) * _FINE)
 
     def write(self, image: np.ndarray, time: float, pose: RobotPose) -> None:
-        """Draw into a frame.
-
-        Args:
-            image: the frame.
-            time: of the run, s.
-            pose: the robot then.
-        """
+        """Draw into a frame."""
         from PIL import Image, ImageDraw
 
         square = Image.fromarray(image[self._box]).resize((self._side * _FINE,) * 2)

@@ -54,15 +54,7 @@ def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples
 
 
 def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: float) -> Any:
-    """Add the shadow of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it.
-
-    Args:
-        plotter: the scene's plotter.
-        pyvista: the library.
-        robot: a robot in a channel.
-        unit: length of one unit of the scene, m.
-        height: z of the motor axis in the tube's axes, m.
-    """
+    """Add the shadow of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it."""
     if robot.channel is None:
         raise ValueError("a robot without a channel has no floor to shade")
     radius = 0.5 * robot.channel.diameter
@@ -149,16 +141,7 @@ _ACROSS_GRID: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
 
 
 def add_grid(plotter: Any, pyvista: Any, view: View, low: Samples, high: Samples, step: float) -> None:
-    """Add a grid below the robot, or behind it where it is seen from the side.
-
-    Args:
-        plotter: the scene's plotter.
-        pyvista: the library.
-        view: the view.
-        low: (3,) smallest coordinates of what is to be seen in front of it.
-        high: (3,) largest ones.
-        step: distance of its lines.
-    """
+    """Add a grid below the robot, or behind it where it is seen from the side."""
     if view not in _ACROSS_GRID:
         return
     across = _ACROSS_GRID[view]

@@ -66,10 +66,6 @@ class SceneCamera:
     def pixels(self, points: Samples, size: tuple[int, int]) -> Samples:
         """Pixels at which points are seen.
 
-        Args:
-            points: (n, 3) in the lab, m.
-            size: width and height of the picture.
-
         Returns:
             (n, 2) pixels to the right of and below the upper left corner.
         """
@@ -101,14 +97,7 @@ def checked_view(view: str) -> View:
 
 
 def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins | None = None) -> SceneCamera:
-    """The camera of a view that has all points within the margins, as near as they allow.
-
-    Args:
-        view: the view.
-        points: (n, 3) points to show, m.
-        size: width and height of the picture.
-        margins: room around them.
-    """
+    """The camera of a view that has all points within the margins, as near as they allow."""
     sight, up = (np.array(vector) for vector in _LINE_OF_SIGHT[view])
     sight = sight / np.linalg.norm(sight)
     up = up - (up @ sight) * sight
@@ -220,16 +209,7 @@ def _marks(pyvista: Any, radius: float, width: float, places: dict[float, float]
 
 
 def add_glass(plotter: Any, pyvista: Any, radius: float, start: float, end: float, step: float) -> None:
-    """Add the tube to a scene, behind everything translucent that follows.
-
-    Args:
-        plotter: the scene's plotter.
-        pyvista: the library.
-        radius: inner radius.
-        start: x of its rear end.
-        end: x of its front end.
-        step: distance of the ruler's marks.
-    """
+    """Add the tube to a scene, behind everything translucent that follows."""
     outer, line = radius * (1.0 + WALL), 0.008 * radius
     flat = {"lighting": False, "show_scalar_bar": False}
     shell = {"scalars": "colour", "rgb": True, **flat}

@@ -140,14 +140,7 @@ def show(
 def glass_around(
     solids: DrawnRobot, rearmost: float, foremost: float, middle: float | None = None
 ) -> tuple[float, float] | None:
-    """Ends of the piece of channel around a robot, x in m; None without a channel, or where it has left it.
-
-    Args:
-        solids: the robot's pieces.
-        rearmost: smallest x of the body's mid-length that is shown.
-        foremost: largest one.
-        middle: x of the channel's middle: its own ends are then not passed. None: where they are is not known.
-    """
+    """Ends of the piece of channel around a robot, x in m; None without a channel, or where it has left it."""
     if solids.robot.channel is None:
         return None
     x = np.concatenate([piece.vertices[:, 0] for piece in solids.pieces])

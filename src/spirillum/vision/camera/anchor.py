@@ -88,12 +88,7 @@ class Anchor:
         return PictureRegistration(*pose.tolist())
 
     def steadied(self, image: np.ndarray, pose: PictureRegistration) -> np.ndarray:
-        """A picture moved to where the anchor is; beyond its borders they go on as they are.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-            pose: how it lies against the anchor.
-        """
+        """A picture moved to where the anchor is; beyond its borders they go on as they are."""
         cv2 = import_optional("cv2", "measuring a video", "video")
         size = (image.shape[1], image.shape[0])
         flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP

@@ -105,15 +105,7 @@ def ruler_of(
 def sight_of(
     video: Video, setup: Setup, still: Samples, folder: Path | None, frames: Sequence[Frame] = ()
 ) -> CalibratedCamera:
-    """The calibrated camera of a video.
-
-    Args:
-        video: the video, for its name and the size of its pictures.
-        setup: its setup.
-        still: its static background, (h, w, 3), or reduced by a whole factor.
-        folder: folder of the setup file, to which the checkerboard's folder is relative.
-        frames: of the video, where the background was reduced.
-    """
+    """The calibrated camera of a video."""
     factor = video.size[0] // still.shape[1]
     board = setup.camera.checkerboard
     lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size, video.display)

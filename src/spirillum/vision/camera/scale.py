@@ -46,14 +46,7 @@ class Lens(NamedTuple):
 
 
 def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
-    """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion.
-
-    Args:
-        board: the checkerboard; its `images` is a folder relative to that of the setup file.
-        folder: folder of the setup file.
-        size: width and height of the video and of the calibration pictures as shown, pixels.
-        display: how the video's pictures are shown; so are pictures that have the size of the stored ones.
-    """
+    """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion."""
     cv2 = import_optional("cv2", "a checkerboard", "video")
     images = folder / board.images
     if not images.is_dir():
@@ -168,12 +161,6 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
 
     The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
     of the setup, by the implicit derivative of the fit.
-
-    Args:
-        setup: the setup.
-        size: width and height of the picture, pixels.
-        lines: detected lines of the ruler.
-        lens: lens calibrated with a checkerboard.
     """
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101 - the setup has seen to it

@@ -42,12 +42,7 @@ from spirillum.vision.track.visibility import cut_off, gaps_of, sight_flags
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
-__all__ = [
-    "FrameDetection",
-    "Watcher",
-    "follow",
-    "scale_of",
-]
+__all__ = ["FrameDetection", "Watcher", "follow", "scale_of"]
 
 
 @dataclass(frozen=True)
@@ -97,12 +92,6 @@ def swayed_by(still: Steadied, motion: RobotMotion, setup: Setup, sight: Calibra
 
     A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which is
     nearer than the background, by more: what is not known is the difference, for as much as the camera has drifted.
-
-    Args:
-        still: how the camera swayed.
-        motion: the robot's motion in the pictures that were moved.
-        setup: the setup, for the height of the background.
-        sight: the calibrated camera.
     """
     optics, right, down = sight.optics, still.poses[:, 0], still.poses[:, 1]
     behind = 0.0 if setup.markers.height is None else setup.markers.height
@@ -380,16 +369,7 @@ def follow(
     progress: Callable[[int, int | None], None] | None = None,
     on_frame: Watcher | None = None,
 ) -> Track:
-    """Follow a robot through a video.
-
-    Args:
-        video: the video, or a folder of images.
-        setup: camera, tank, markers and robot of the experiment.
-        robot: the robot in front of the camera.
-        folder: folder of the setup file, to which the checkerboard's folder is relative; unset: the working directory.
-        progress: called with the number of frames done and of all frames, None where unknown.
-        on_frame: called with each frame's number, its picture (8-bit RGB) and its observation.
-    """
+    """Follow a robot through a video."""
     video = opened(video, setup)
     frames = samples_of(video, setup.start, setup.end)
     still = steadied(video.frames(setup.start, setup.end)) if sways(frames) else None

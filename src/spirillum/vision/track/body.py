@@ -218,12 +218,7 @@ class BodyFinder:
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
     def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
-        """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides.
-
-        Args:
-            images: 8-bit RGB, (h, w, 3) each.
-            poses: of the body on each of them.
-        """
+        """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides."""
         assert self.seal is not None  # noqa: S101 - asked by those who know
         found = []
         for image, pose in zip(images, poses, strict=True):

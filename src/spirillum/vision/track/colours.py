@@ -95,10 +95,6 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
     The initial colours are the named ones under a lamp that reproduces the samples' mean; they are the prior of classes
     with few samples. Glare is white and has a class of its own, so that it does not shift the colour of a stripe.
 
-    Args:
-        samples: colours of pixels of the stripes, (m, 3).
-        names: distinct names of colours.
-
     Returns:
         The classes' colours in the picture, (classes, 3), the named colours under the same lamp, and the colour of
         glare, (1, 3), or (0, 3) where a stripe is white itself.

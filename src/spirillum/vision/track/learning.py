@@ -279,16 +279,7 @@ class InitialDetection(NamedTuple):
 def learnt_from(
     video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None, *, by_seal: bool = True
 ) -> InitialDetection:
-    """Learn from some frames.
-
-    Args:
-        video: the video, for its name and the size of its pictures.
-        frames: frames spread over it.
-        setup: its setup.
-        robot: the robot in front of the camera.
-        folder: folder of the setup file, to which the checkerboard's folder is relative.
-        by_seal: whether the robot is looked for by its coloured seal first, else by its outline alone.
-    """
+    """Learn from some frames."""
     factor = reduction(video.size)
     still = background(frames, factor)
     sight = sight_of(video, setup, still, folder, frames)

@@ -67,13 +67,7 @@ Appearance = Literal["opaque", "glass", "unknown"]
 
 
 def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> Appearance:
-    """Return whether the cover before the seal looks opaque or like glass, `unknown` where it is not clear.
-
-    Args:
-        robot: the robot.
-        optics: a camera that shows it as large as it looks.
-        samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body on each.
-    """
+    """Return whether the cover before the seal looks opaque or like glass, `unknown` where it is not clear."""
     half, radius = 0.5 * robot.body.length, 0.5 * robot.body.diameter
     rear = -half + (robot.seal.length if robot.seal is not None else 0.0)
     along = np.linspace(rear + 0.15 * radius, half - 0.15 * radius, APPEARANCE.places)
@@ -169,15 +163,7 @@ class OutlineCheck(NamedTuple):
 def check_outline(
     frames: Sequence[Frame], poses: Sequence[BodyPose], body: BodyFinder, appearance: Appearance, *, alone: bool
 ) -> OutlineCheck:
-    """Look whether the outline may follow glass, its contents, or a grid.
-
-    Args:
-        frames: frames spread over the video, by their order in it; they may be reduced by a whole factor.
-        poses: of the body on each of them, as it was followed.
-        body: the body, which has learnt.
-        appearance: of its cover as the setup says.
-        alone: whether the outline alone tells the pose.
-    """
+    """Look whether the outline may follow glass, its contents, or a grid."""
     if len(frames) < LONE_OUTLINE.fewest:
         return OutlineCheck()
     factor = body.optics.size[0] // frames[0].image.shape[1]

@@ -69,12 +69,7 @@ def _steps(time: Samples, values: Samples, period: float, frame: float) -> Sampl
 
 
 def near_their_mean(steps: Samples, period: float) -> Samples:
-    """Steps of an angle, each the whole periods nearer to their circular mean; those of a position as they are.
-
-    Args:
-        steps: from one frame to the next, (m,).
-        period: of the angle; infinite for a position.
-    """
+    """Steps of an angle, each the whole periods nearer to their circular mean; those of a position as they are."""
     if not np.isfinite(period):
         return steps
     middle = float(np.angle(np.mean(np.exp(2j * np.pi * steps / period)))) * period / (2.0 * np.pi)

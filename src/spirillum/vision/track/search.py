@@ -138,12 +138,7 @@ def _apart(scores: Samples, poses: Samples, far: float) -> list[PoseCandidate]:
 
 
 def searched_at(width: float, most: int) -> int:
-    """Factor by which pictures are reduced in which a body is looked for, so that it is not too narrow there.
-
-    Args:
-        width: of the body in the full picture, pixels.
-        most: largest factor.
-    """
+    """Factor by which pictures are reduced in which a body is looked for, so that it is not too narrow there."""
     return max(1, min(most, int(width / SEARCH.reduced_width)))
 
 

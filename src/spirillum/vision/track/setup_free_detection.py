@@ -93,19 +93,9 @@ class SetupFreeDetection(NamedTuple):
 
 
 def detect_without_setup(
-    video: Video,
-    robot: Robot,
-    spacing: float | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    video: Video, robot: Robot, spacing: float | None = None, progress: Callable[[str, int, int], None] | None = None
 ) -> SetupFreeDetection:
-    """Look at a video without a setup.
-
-    Args:
-        video: the video.
-        robot: the robot in front of the camera.
-        spacing: of the ruler's lines, m, where it is known.
-        progress: told what is looked for, how many looks are done, and how many there are at most.
-    """
+    """Look at a video without a setup."""
     tell = progress or (lambda _what, _done, _total: None)
     anywhere = _setup(robot, video.size, 1e-4, "right")
     tell("reading frames", 0, 1)
@@ -215,10 +205,7 @@ def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: 
 
 
 def _found_at(
-    video: Video,
-    robot: Robot,
-    guess: tuple[float, Lines | None, tuple[str, ...]],
-    stills: _Stills,
+    video: Video, robot: Robot, guess: tuple[float, Lines | None, tuple[str, ...]], stills: _Stills
 ) -> Iterator[tuple[str, Identified | None]]:
     """Look for the robot near a guessed scale, in each direction; then at half to twice of it, if anything moves."""
     finders = {}

@@ -114,12 +114,7 @@ class OutlineFit(NamedTuple):
         return bool(abs(self.size - 1.0) > SIZE.tolerance[0])
 
     def fits(self, pixel: float, *, stated: bool = True) -> bool:
-        """Whether size and pose are correct within the bias of shading and glare.
-
-        Args:
-            pixel: m per pixel.
-            stated: whether the size is the stated one; one that was found by outlines alone has to agree better.
-        """
+        """Whether size and pose are correct within the bias of shading and glare."""
         off = np.abs([self.size - 1.0, self.move.x / pixel, self.move.y / pixel, self.move.heading])
         return bool(np.all(off <= SIZE.tolerance)) and (stated or bool(off[0] <= SIZE.found))
 
@@ -179,13 +174,6 @@ def checked_scale(
     A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid may
     be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body, the
     ruler or the heights are doubted; where it agrees with the ruler, the outline.
-
-    Args:
-        scale: the scale by the ruler.
-        body: the body.
-        size: its apparent size over that of the robot file.
-        spacing: of the ruler's lines as the setup states it, m; None without a ruler.
-        tail: apparent wavelength of the tail over that of the robot file at this scale; NaN: unknown.
     """
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel

@@ -75,13 +75,7 @@ class StillPicture(NamedTuple):
 
 
 def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> StillPicture:
-    """What stands still in some pictures, three or more.
-
-    Args:
-        images: 8-bit RGB, (h, w, 3) each; all of them may be reduced by a whole factor.
-        start: result of the first look.
-        ruled: whether a ruler is in the picture.
-    """
+    """What stands still in some pictures, three or more."""
     factor = start.body.optics.size[0] // images[0].shape[1]
     still, bounds = still_picture(list(images)), start.body.shape(factor).bounds
     if start.body.optics.upright:  # the channel's shift is looked for along the rows
@@ -127,9 +121,8 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     before, after = (float(np.median([frames[k].time for k in parts[step + more]])) for more in (0, 1))
     shift = factor * np.ptp(shifts)
     sentence = (
-        f"the camera or the ruler was moved: the picture shifts by {shift:.1f} pixels along the channel, most "
-        f"between {before:.1f} s and {after:.1f} s; nothing is given (start and end of the setup choose a part of the "
-        "video)"
+        f"the camera or the ruler was moved: the picture shifts by {shift:.1f} pixels along the channel, most between "
+        f"{before:.1f} s and {after:.1f} s; nothing is given (start and end of the setup choose a part of the video)"
     )
     return (Flag("camera-moved", sentence, ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")),)
 

@@ -265,14 +265,7 @@ def nothing_moves(motion: RobotMotion, robot: Robot) -> tuple[Flag, ...]:
 
 
 def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0) -> tuple[Flag, ...]:
-    """Flag a body that stays where it is while its tail turns: shades of the lamp may have been taken for stripes.
-
-    Args:
-        motion: the robot's motion.
-        robot: the robot; body and tail of one with a fixed joint are one.
-        readable: share of a turn in which something of the stripes faces the camera. Below 1 a highlight that stays
-            looks like a single line that stands still, however little the tail turned.
-    """
+    """Flag a body that stays where it is while its tail turns: shades of the lamp may have been taken for stripes."""
     known = motion.body_angle[np.isfinite(motion.body_angle)]
     turns = abs(_slope(motion.time, motion.tail_phase)[1]) / (2.0 * np.pi)
     fixed = robot.drive is not None and robot.drive.joint == "fixed"
@@ -295,11 +288,6 @@ def contradictions(motion: RobotMotion, robot: Robot, hand_seen: int = 0) -> tup
 
     Without an external torque the body counter-rotates. The tail propels in the sense of its rotation and handedness,
     and its advance per turn does not exceed that of a tail without body.
-
-    Args:
-        motion: the robot's motion.
-        robot: the robot.
-        hand_seen: handedness by perspective, as of `TailWave.handedness`.
     """
     time, x, body_angle, tail_phase = motion
     if robot.drive is not None and robot.drive.joint == "fixed":

@@ -72,10 +72,7 @@ def nose_on_the_other_side(side: str, why: str = "turned round, it has the robot
 def _turned(body: Shape, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
     """Median score ratio of the body turned by 180 degrees; `seen` holds each frame with its score as stated."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
-        backs = pool.map(
-            lambda image: close_places(image, still, body, turn=np.pi),
-            [image for image, _ in seen],
-        )
+        backs = pool.map(lambda image: close_places(image, still, body, turn=np.pi), [image for image, _ in seen])
         ratios = [
             back[0].score / max(score, 1e-9) if back else 0.0 for back, (_, score) in zip(backs, seen, strict=True)
         ]
@@ -129,16 +126,7 @@ def cut_off(found: Sequence[PoseFit]) -> np.ndarray:
 def sight_flags(
     time: Samples, pose: Samples, errors: Samples, found: Sequence[PoseFit], optics: Optics, setup: Setup
 ) -> tuple[Flag, ...]:
-    """Flag a robot that leaves, enters late, is partly out of view or hidden, or swims backwards.
-
-    Args:
-        time: times, s, (n,).
-        pose: x, y, heading, (n, 3); NaN where not detected.
-        errors: their standard errors, (n, 3).
-        found: fit of the body on each frame.
-        optics: the camera.
-        setup: the setup.
-    """
+    """Flag a robot that leaves, enters late, is partly out of view or hidden, or swims backwards."""
     flags: list[Flag] = []
     known = np.isfinite(pose[:, 0])
     count = known.size

@@ -85,10 +85,6 @@ def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
     """Display of a video's frame, and the angle by which its display matrix is off a quarter turn, rad.
 
     The matrix maps stored to shown coordinates: x' = a x + c y, y' = b x + d y, y downwards.
-
-    Args:
-        frame: decoded by PyAV.
-        aspect: width of a stored pixel over its height.
     """
     try:
         matrix = next((data for data in frame.side_data if data.type.name == "DISPLAYMATRIX"), None)

@@ -315,11 +315,6 @@ def open_video(
     """Open a video, a TIFF file of several pages, or a folder of images in their natural order.
 
     Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
-
-    Args:
-        path: the video, TIFF file or folder.
-        frames_per_second: rate of images, or instead of a video's own time stamps.
-        pixel_aspect_ratio: width of a pixel over its height, instead of what the file states.
     """
     path = checked_path(path, VIDEO)
     try:

@@ -126,14 +126,7 @@ def read_image(path: Path, *, grey: bool = False, display: Display | None = None
 
 
 def read_pages(path: Path, header: Header, start: int, count: int) -> list[np.ndarray | None]:
-    """Some pages of a TIFF file as they are stored, 8-bit or 16-bit BGR; None for one that cannot be decoded.
-
-    Args:
-        path: the file.
-        header: of the file.
-        start: first page, from 0.
-        count: number of pages.
-    """
+    """Some pages of a TIFF file as they are stored, 8-bit or 16-bit BGR; None for one that cannot be decoded."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     try:
         _, found = cv2.imreadmulti(str(path), start, count, flags=_flags(grey=False))
