@@ -270,7 +270,7 @@ def test_a_posterior_of_places_needs_a_table(one_gap: Path) -> None:
 
 def test_a_study_does_not_take_draws_of_places(one_gap: Path) -> None:
     study = {"title": "one", "robots": [WIDE], "models": ["tube"]}
-    with pytest.raises(InputError, match="has a place of its own"):
+    with pytest.raises(InputError, match="has its own pose"):
         sp.study(study, posterior=one_gap / "fitted" / "posterior.nc")
 
 

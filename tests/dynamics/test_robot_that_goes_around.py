@@ -38,7 +38,7 @@ def test_means_are_over_the_last_circuit() -> None:
         rows[:, place["time"]] = np.linspace(0.5 / steps, 0.5, steps)
         raw = -2.0 * np.pi / 1.75 * (0.5 * number + rows[:, place["time"]])
         rows[:, place["azimuth"]] = (raw + np.pi) % (2.0 * np.pi) - np.pi
-        turn = Turn(np.full(rigid_links.STATES, number + 1.0), 0.5, rows)
+        turn = Turn(np.full(rigid_links.STATES, number + 1.0), 0.5, rows, np.eye(8))
         turn.state[:3] = 0.0
         path.add(turn)
         states.append(turn.state)

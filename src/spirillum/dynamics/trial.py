@@ -385,9 +385,9 @@ class TrialRequest:
             self._check_unused(reason)
         if not wanted:
             return held
-        self._announce("held", held.forward_velocity)
         if reason:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
+        self._announce("held", held.forward_velocity)
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
     def trial(self, held: Prediction) -> ReleasedMotion:

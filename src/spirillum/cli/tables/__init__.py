@@ -12,8 +12,9 @@ _MODULES = {
     "fits": "calibration model_ranking suggestion observations",
     "studies": "study study_store design validation",
     "robots": "robot check export resistance preparation preparations report",
-    "videos": "measurement feasibility track setup_check setup_proposal",
-    "films": "virtual_experiment virtual_trial film show recording",
+    "videos": (
+        "measurement feasibility track setup_check setup_proposal virtual_experiment virtual_trial film show recording"
+    ),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 
