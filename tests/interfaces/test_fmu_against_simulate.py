@@ -267,7 +267,7 @@ def test_without_a_compiler_nothing_is_written(tmp_path: Path, monkeypatch: pyte
         ({"sidecar": True}, "only for the robot's shape"),
         ({"model": "nonsense"}, "nonsense"),
         ({"motion": "nonsense"}, "held, free"),
-        ({"motion": "free", "model": "rft"}, "allowed: model 'tube'"),
+        ({"motion": "free", "model": "rft"}, "allowed: 'tube', or 'auto'"),
         ({"model": "rft", "placement": {"flow": 1e-3}}, "does not compute the channel's walls"),
     ],
 )

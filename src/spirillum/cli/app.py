@@ -95,7 +95,8 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
 
     with renderer.progress_bar(quiet=json) as progress:
         result = request(progress=progress)
-        beside = other_tube(result)
+        alike = not {"duration", "roughness"}.intersection(request.typed) and "in_tube" not in request.arguments
+        beside = other_tube(result) if alike else None
         answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
         published = published_beside(result, beside)
     more = {"published": published} if published else {}

@@ -124,9 +124,9 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
     if json:
         _print_json(answer)
         return
-    console = _PipedConsole()
+    console = _PipedConsole(emoji=False)
     if console.width < _NARROWEST:
-        console = _PipedConsole(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
+        console = _PipedConsole(width=_NARROWEST, emoji=False)  # a narrow terminal wraps; it must not lose numbers
     notes, every = notes_in_answer(answer), every_note.get()
     cautions = [] if every else shown_cautions(notes)
     title, *blocks = blocks_of(answer, **options)

@@ -102,7 +102,9 @@ def prepare(
         loaded = load_study(study_of(study), overrides_from(settings))
         asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
-        found = prepare_all(asked, stage="fine" if fine else stage or "yaw", workers=workers, progress=progress)
+        found = prepare_all(
+            asked, stage="fine" if fine else "yaw" if stage is None else stage, workers=workers, progress=progress
+        )
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)
 
 

@@ -375,6 +375,10 @@ def _released_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, 
     """The FMU of a robot that is released in its tube, written."""
     from spirillum.interfaces.fmu import free_model
 
+    if options["model"] not in (AUTO, "tube"):
+        raise InputError(
+            f"model = {str(options['model'])[:40]!r} with motion = 'free' and .fmu; allowed: 'tube', or 'auto'"
+        )
     plant = Plant(robot, **options)
     return _unit_of(free_model(plant), target, plant.warnings)
 

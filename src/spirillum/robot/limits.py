@@ -236,7 +236,7 @@ def _tail_limits(b: RobotBatch) -> list[Limit]:
             "tail.wire_diameter",
             b.wire_diameter,
             "less than",
-            2.0 / curvature,
+            np.divide(2.0, curvature, out=np.full_like(curvature, np.inf), where=curvature > 0),
             "mm",
             f"the wire's radius has to stay below the {bend} radius of curvature",
             "wire-too-thick-for-coil",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import isfinite
@@ -29,15 +30,21 @@ DISPLACED = {
     "body.shape": ("profile",),
 }
 """Fields of the layer below that a field of a layer replaces."""
+_COLUMN = re.compile(r"[\s_]*[\[(]?mm[\])]?$")
+"""The unit behind the name of a column."""
 _TURNED = 0.5
 """Cosine of the largest angle between neighbouring chords of a centre line."""
 
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:
-    """Points of a file, one a row; a first row of words names the columns."""
+    """Points of a file, one a row; a first row of words names the columns, which are in mm."""
     what = f"{field}: a CSV file of points ({', '.join(columns)}) in mm"
     rows = csv_rows(read_text(path, what), path, what)
     if rows and not any(map(_is_written_number, rows[0][1])):
+        names = [_COLUMN.sub("", cell.strip().lower()) for cell in rows[0][1]]
+        if names != list(columns):
+            shown = ", ".join(rows[0][1])[:60]
+            raise InputError(f"{path}, line {rows[0][0]}: columns {shown!r}; allowed: {what}, with no names or these")
         rows = rows[1:]
     if len(rows) > MOST_POINTS:
         raise InputError(f"{path} has {len(rows)} points; allowed: {what}, at most {MOST_POINTS}")
@@ -83,7 +90,10 @@ def checked_points(points: Any, columns: Sequence[str], field: str, least: int) 
                 f"{field}: point {number} = {str(point)[:60]} is not {len(columns)} numbers; allowed: {allowed}"
             )
         if not all(is_number(value) and isfinite(value) and abs(value) <= 1e5 for value in point):
-            raise refuse(f"{field}: point {number} = {str(point)[:60]} is not finite; allowed: {allowed}")
+            raise refuse(
+                f"{field}: point {number} = {str(point)[:60]} has other than finite numbers of at most 1e5; allowed: "
+                f"{allowed}"
+            )
         found.append(tuple(float(value) for value in point))
         if number > 1 and found[-1] == found[-2]:
             raise refuse(f"{field}: points {number - 1} and {number} are the same; allowed: each point once")

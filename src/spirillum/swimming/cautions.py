@@ -6,7 +6,6 @@ import numpy as np
 
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
@@ -82,7 +81,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     are = "is" if len(over) == 1 else "are"
     more = "--band gives the band over them, in minutes"
     if not has_table(batch):
-        more = f"`spirillum prepare --stage straight` ({TABLE_TAKES}) makes the band quick"
+        more = "`spirillum prepare ROBOT` makes band, trial and steady motion, with --stage straight the band alone"
     return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]
 
 

@@ -51,7 +51,7 @@ def _add(rows: Table, name: str, item: Answer) -> None:
     rows.add_row(escape(name), *numbers, "" if unit == "1" else unit)
 
 
-def _friction(answer: Answer) -> Iterator[Detail]:
+def _friction(answer: Answer) -> Iterator[str | Detail]:
     """The effective friction over the tails."""
     found = [tail["effective_friction"] for tail in answer["tails"] if "effective_friction" in tail]
     found = [item for item in found if item["value"] is not None]
@@ -60,7 +60,7 @@ def _friction(answer: Answer) -> Iterator[Detail]:
     low, high = (f"{end(item['value'] for item in found):.4g}" for end in (min, max))
     only = found[0] if len(found) == 1 and found[0].get("low") is not None else {}
     interval = f" ({only['low']:.4g} to {only['high']:.4g})" if only else ""
-    yield Detail(
+    yield (
         f"B_eff of {counted(len(found), 'tail')} (friction reading {answer['friction']}): "
         f"{low if low == high else f'{low} to {high}'}{interval} N m s/rad, tail by tail in predictions.csv"
     )
