@@ -68,7 +68,7 @@ def why_not_released(held: Prediction, *, fitted: bool) -> str:
         return "the draws of a posterior are followed by `simulate --posterior` and by motion 'free'"
     batch = RobotBatch.of(held.robot, held.batch.placement)
     if not has_table(batch, "yaw"):
-        made = "its tube has no table with yawed poses yet; `prepare`, `simulate` and `settle` make it"
+        made = "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
         return why_no_table(batch) or made
     return ""
 
