@@ -23,6 +23,8 @@
 #pragma GCC target("fma")
 #endif
 #endif
+#include "axial.h"
+
 #include "drive.h"
 
 /* One robot, SI; torques and rates at the joint: the columns of spirillum/kernels/motor.py. */

@@ -13,9 +13,8 @@
  */
 #include <stddef.h>
 
-#include "motion.h"
+#include "stiff_steps.h"
 
-enum { STAGES = 8 };
 static const double GAMMA = 0.21193756319429014;
 /* a_ij */
 #define SIXTH -7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946
@@ -64,7 +63,6 @@ static const double DENSE[3][STAGES] = {
 };
 
 #define COLUMN(field) ((int)(offsetof(State, field) / sizeof(double)))
-enum { ACTING = 8 }; /* components of the state on which the rates depend */
 static const int ACTS[ACTING] = {
     COLUMN(position[1]), COLUMN(position[2]), COLUMN(attitude[0]), COLUMN(attitude[1]),
     COLUMN(attitude[2]), COLUMN(attitude[3]), COLUMN(phase),       COLUMN(current),

@@ -5,6 +5,7 @@
  */
 #include <string.h>
 
+#include "axial.h"
 #include "model.h"
 
 enum {
@@ -21,12 +22,6 @@ _Static_assert(VALUE_COUNT == PARAMETERS && STATE_COUNT == STATE && OUTPUT_COUNT
 
 static const double START[PARAMETERS] = VALUES, TORQUES[25] = CURVE;
 static const double FINENESS = 16.0; /* pieces of a step as in a run of `simulate` */
-
-/* See axial.c. */
-void advance_axial(const double *parameters, double *states, double dt, const double *duty, const double *flow,
-                   double fineness, int64_t count);
-void advance_on_curve(const double *parameters, double *states, double dt, const double *duty, const double *flow,
-                      const double *curve, int64_t count);
 
 void start_model(Model *m) {
     memset(m, 0, sizeof *m);

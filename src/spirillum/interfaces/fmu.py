@@ -81,7 +81,7 @@ _MOTION = (
     "film",
     "cavitation",
 )
-_MOTION_HEADERS = ("motion.h", "contacts.h", "table.h", "links.h", "film.h", "cavitation.h")
+_MOTION_HEADERS = ("stiff_steps.h", "motion.h", "contacts.h", "table.h", "links.h", "film.h", "cavitation.h")
 _REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
 """Value references, which the C source knows too."""
 
@@ -141,7 +141,7 @@ def axial_model(axial: AxialRobot) -> FmuModel:
         duty=axial.duty,
         flow=axial.flow,
         source="axial_robot.c",
-        equations=("axial.c", "drive.c", *_HEADERS),
+        equations=("axial.c", "axial.h", "drive.c", *_HEADERS),
         outputs={place: _output(name) for name, place in axial.outputs.items()},
         parameters={
             PARAMETERS.index(item): FmuVariable(item.name, item.meaning, item.unit, value)

@@ -10,12 +10,11 @@
 #include <string.h>
 
 #include "model.h"
-#include "motion.h"
+#include "stiff_steps.h"
 
 extern const double DATA[], TABLE[], FIRST[STATES], SIZES[STATES + 2], LIMITS[];
 
-enum { STAGES = 8, MEMORY = sizeof(Memory) / sizeof(double), WATCHING = GAPS + WATCHED };
-enum { JACOBIAN = 64 };   /* of what acts, which a run does not need */
+enum { WATCHING = GAPS + WATCHED };
 enum { STEPS = 64 };      /* of the integrator between two looks */
 static const double ROUNDING = 1e-15; /* share of a step within which an end is found */
 
@@ -30,17 +29,6 @@ typedef struct {
 } Free;
 
 _Static_assert(sizeof(Free) == STATE * sizeof(double), "the numbers of robot.h");
-
-/* See stiff_steps.c. */
-void rates(double *dy, double time, const double *y, double *data, const double *table, int64_t size,
-           int64_t table_size);
-double watched(const double *y, double outside, double *data, const double *table, const double *limits, double rough,
-               double *gaps, int64_t size, int64_t table_size, int64_t count);
-void interpolate(double share, const double *y, const double *end, const double *increments, double *out);
-int64_t advance(double stop, int64_t clip, int64_t steps, double tolerance, double *memory, double *y, double *before,
-                double *increments, double *jacobian, double *gaps, const double *samples, double *states,
-                const double *sizes, const double *limits, double rough, double *data, const double *table,
-                int64_t count, int64_t sample_count, int64_t size, int64_t table_size);
 
 static Free *free_of(Model *m) { return (Free *)m->state; }
 static const Free *seen_of(const Model *m) { return (const Free *)m->state; }
@@ -146,7 +134,7 @@ typedef enum { ARRIVED, EMPTY, AT_END, TOO_STIFF } Arrival;
 static Arrival follow(Free *f, double duty, double flow, double stop, bool clip, double *y) {
     const Limits limits = limits_of(f);
     double run[STATES], sizes[STATES + 2], samples[1] = {stop}, states[1][STATES], gaps[WATCHING];
-    double jacobian[JACOBIAN];
+    double jacobian[ACTING * ACTING]; /* which a run does not need */
     bool answered = false;
     memcpy(sizes, SIZES, sizeof sizes);
     memcpy(run, y, sizeof run);
