@@ -28,7 +28,7 @@ from spirillum.dynamics.integration import (
     integrate,
     observed_at,
 )
-from spirillum.dynamics.record import series_of
+from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.start import (
@@ -434,8 +434,7 @@ class Plant:
 
     def _moment(self, run: Trajectory) -> Snapshot:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
-        phase_at_start = self._first.state[rigid_links.PHASE]
-        series["tail_angle"] = run.states[:, rigid_links.ROLL] + run.states[:, rigid_links.PHASE] - phase_at_start
+        series["tail_angle"] = tail_angle_of(run.states, self._first.state[rigid_links.PHASE])
         if isinstance(self._links, TubeRobot):
             series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
         elif self.roughness is not None:

@@ -112,6 +112,11 @@ def _rotations(states: Samples) -> Samples:
     return np.asarray(Rotation.from_quat(attitude, scalar_first=True).as_matrix())
 
 
+def tail_angle_of(states: Samples, begun: float) -> Samples:
+    """Angle of the tail in the lab, rad, (n,), from the phase at the start of the run, rad."""
+    return np.asarray(states[:, rigid_links.ROLL] + states[:, rigid_links.PHASE] - begun)
+
+
 def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     axis = rotation[:, :, 0]
@@ -119,7 +124,7 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     body_rate, motor_rate = rates[:, rigid_links.ROTATION], rates[:, rigid_links.JOINT]
     return {
         "tail_phase": phase,
-        "tail_angle": roll + phase - phase[0],
+        "tail_angle": tail_angle_of(states, float(phase[0])),
         "body_angle": roll,
         "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : rigid_links.ROTATION], axis=1),
         "tail_rotation_rate": body_rate + motor_rate,

@@ -20,7 +20,7 @@ from spirillum.dynamics.integration import (
     integrate,
     observed_at,
 )
-from spirillum.dynamics.record import dataset_of, free_attributes
+from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.run_summary import stretches_on
 from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, reach_of, state_at_release
@@ -104,10 +104,6 @@ def tube_run(
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
-    if not isinstance(start, StartPlace):  # angles go on counting
-        last = start.isel(time=-1)
-        begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
-        dataset["tail_angle"].values[:] = dataset["body_angle"].values + dataset["tail_phase"].values - begun
     return dataset.isel(time=np.isin(run.time, times.time) | (run.time == ended))
 
 
@@ -194,9 +190,12 @@ def series_in_tube(run: Trajectory) -> dict[str, Samples]:
 
 
 def _in_the_tube(run: Trajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
-    """These, the azimuth counted on from the run that is continued."""
+    """These, azimuth and tail angle counted on from the run that is continued."""
     found = series_in_tube(run)
     if not isinstance(start, StartPlace):
+        last = start.isel(time=-1)
+        begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
+        found["tail_angle"] = tail_angle_of(run.states, begun)
         turns = np.round((float(start["azimuth"][-1]) - found["azimuth"][0]) / (2.0 * np.pi))
         found["azimuth"] = found["azimuth"] + 2.0 * np.pi * turns
     return found
