@@ -76,6 +76,10 @@ def _root(
     """
 
 
+_RELEASED = ("duration", "roughness", "in_tube")
+"""Arguments of `predict` for the motions after release."""
+
+
 @from_function(
     "spirillum.dynamics.prediction:predict",
     without={
@@ -95,8 +99,10 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
 
     with renderer.progress_bar(quiet=json) as progress:
         result = request(progress=progress)
-        alike = not {"duration", "roughness"}.intersection(request.typed) and "in_tube" not in request.arguments
-        beside = other_tube(result) if alike else None
+        asked = {
+            name: value for name, value in request.arguments.items() if name in ("duration", "roughness", "in_tube")
+        }
+        beside = other_tube(result, asked)
         answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
         published = published_beside(result, beside)
     more = {"published": published} if published else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -28,11 +29,12 @@ _WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
 _SOURCE = "BioRob 2012, text on Figs 5 and 6"
 
 
-def other_tube(found: Prediction) -> Prediction | None:
+def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> Prediction | None:
     """Return the same robot in the paper's other tube; None for any other request than one of which it states numbers.
 
     Args:
         found: the prediction, with its released motions.
+        released: arguments of `predict` for these, which the other tube takes too.
     """
     if (
         not found.released
@@ -46,7 +48,7 @@ def other_tube(found: Prediction) -> Prediction | None:
     for own, other in ((_WIDE, _NARROW), (_NARROW, _WIDE)):
         if found.robot == _with_tail_of(found.robot, own) and found.friction == found.robot.friction.reading:
             robot = _with_tail_of(found.robot, other)
-            return predict(robot, model=found.model.name, calibrated=found.calibrated, band=False)
+            return predict(robot, model=found.model.name, calibrated=found.calibrated, band=False, **(released or {}))
     return None
 
 
