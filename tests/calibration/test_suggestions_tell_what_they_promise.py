@@ -51,7 +51,7 @@ def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.Mo
 
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     certain = replace(known, draws={name: np.full_like(values, 1.5) for name, values in known.draws.items()})
-    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: certain)
+    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer: certain)
     found = sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, "40,20,2.5"))
     assert found.candidates[0].gain == pytest.approx(0.0, abs=1e-9)
 
@@ -76,7 +76,7 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
         discrepancy={"advance": tau * one, "turning": tau * one},
         error={"advance": sigma * one, "turning": sigma * one},
     )
-    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: known)
+    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer: known)
     found = sp.suggest("any", WIDE, candidates=candidates(fitted, "40,20,2.5"), trials=trials).candidates[0]
 
     robot = load(WIDE, **{"tail.wavelength": "20 mm", "tail.amplitude": "2.5 mm"})
@@ -132,7 +132,9 @@ def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
             discrepancy={"advance": 0.01 * one, "turning": 0.01 * one},
             error={"advance": 0.02 * one, "turning": 0.02 * one},
         )
-        monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, new=drawn_anew: new)
+        monkeypatch.setattr(
+            "spirillum.calibration.suggest.read_posterior", lambda _path, *, answer, new=drawn_anew: new
+        )
         found = sp.suggest("any", WIDE, candidates=path)
         last = next(item for item in found.candidates if item.wavelength < 0.015)
         sign = 1.0 if found.candidates[0].wavelength > 0.015 else -1.0
@@ -233,7 +235,7 @@ def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatc
     assert "biorob2012-wide and biorob2012-narrow, are used" in found.warnings[0]
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):
-        monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path, one=changed: one)
+        monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, *, answer, one=changed: one)
         with pytest.raises(InputError, match="allowed: ROBOT, one for each channel"):
             sp.suggest("any")
 

@@ -239,7 +239,7 @@ def _tree(posterior: Posterior, logs: Samples, observed: Mapping[Quantity, Sampl
 
 
 def _tails(found: Calibrated) -> list[dict[str, Any]]:
-    """What was observed of every robot, and how well."""
+    """Observations of every robot with their errors."""
     problem, experiment = found.problem, found.experiment
     tails = []
     for place, robot in enumerate(experiment.robots):

@@ -92,7 +92,7 @@ class Suggestion(DisplayMixin):
     posterior: PosteriorFile
     trials: int
     answer: str
-    """What they are measured as: `held` or `trial`."""
+    """Motion of the robots in these trials: `held` or `trial`."""
     candidates: tuple[CandidateRobot, ...]
     warnings: tuple[Note, ...]
 
@@ -147,7 +147,7 @@ def suggest(
     """
     check_range("trials", trials, 1, 10**6)
     check_choice("answer", answer, (HELD, RELEASED))
-    known = read_posterior(posterior) if answer == HELD else read_posterior(posterior, answer=answer)
+    known = read_posterior(posterior, answer=answer)
     tell = progress or (lambda _what, _done, _total: None)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)

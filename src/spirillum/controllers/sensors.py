@@ -25,7 +25,7 @@ from spirillum.robot.tube_pose import gap_of
 
 @dataclass(frozen=True)
 class Detection:
-    """What the camera has seen on one frame; SI."""
+    """A detection of the robot on one frame of the camera; SI."""
 
     time: float
     """When the frame was taken, s."""
@@ -45,17 +45,17 @@ class Detection:
 
 @dataclass(frozen=True)
 class Command:
-    """What is sent to a robot."""
+    """A command to a robot."""
 
     duty: float
     """Of its drive, 0 (off) to 1; a field is on at any duty but 0."""
     field: Field | None = None
-    """What changes of the field of a magnetic robot."""
+    """Changes of the field of a magnetic robot."""
 
 
 @dataclass(frozen=True)
 class MeterReading:
-    """What the meter has read; SI."""
+    """A reading of the meter; SI."""
 
     time: float
     """When it was read, s."""
@@ -67,7 +67,7 @@ class MeterReading:
 
 @dataclass(frozen=True)
 class Message:
-    """What a controller knows when it decides."""
+    """Information that a controller has when it decides."""
 
     time: float
     """Now, s."""

@@ -69,7 +69,7 @@ class PosteriorFile:
     friction_reading: str = ""
     """Reading of the friction under which it was inferred."""
     tails: tuple[Mapping[str, Any], ...] = ()
-    """What was observed of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
+    """Observations of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
     `stated`), `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in
     older files."""
 
