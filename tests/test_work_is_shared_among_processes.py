@@ -21,15 +21,16 @@ def test_answers_of_several_processes_are_those_of_one() -> None:
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="processes are looked up in /proc")
 def test_processes_end_with_the_one_that_asked(tmp_path: Path) -> None:
-    """A process that is killed cannot end those that it has started: they notice."""
+    """A terminal's Ctrl-C reaches none of them; a parent that is killed cannot end them, but they notice."""
     script = (
         "import time; from spirillum.worker_pool import imap_unordered; list(imap_unordered(time.sleep, [60.0] * 4, 2))"
     )
     asking = subprocess.Popen([sys.executable, "-c", script])
     children = _waited_for(lambda: _workers_of(asking.pid), 2)
+    held = [_holds(child, signal.SIGINT) for child in children]
     asking.send_signal(signal.SIGKILL)
     asking.wait()
-    assert len(children) == 2
+    assert held == [True, True]
     assert _waited_for(lambda: [1] * (not any(map(_runs, children))), 1) == [1]
 
 
@@ -46,6 +47,13 @@ def _workers_of(pid: int) -> list[int]:
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
     words = {int(child): Path(f"/proc/{child}/cmdline").read_bytes() for child in children}
     return [child for child, command in words.items() if b"spawn_main" in command]
+
+
+def _holds(pid: int, number: signal.Signals) -> bool:
+    """Whether a process was started with a signal blocked."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    blocked = next(line.split()[1] for line in status.splitlines() if line.startswith("SigBlk:"))
+    return bool(int(blocked, 16) >> (number - 1) & 1)
 
 
 def _runs(pid: int) -> bool:

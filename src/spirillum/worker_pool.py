@@ -52,15 +52,13 @@ def imap_unordered(
     )
     try:
         waiting: dict[Future[_Answer], _Task] = {}
-        with _no_main():
-            with _interrupts_held():  # the pool starts all its processes here
-                waiting[pool.submit(work, first[0])] = first[0]
-            for task in first[1:]:
+        with _start_of_processes():
+            for task in first:
                 waiting[pool.submit(work, task)] = task
         while waiting:
             done, _ = wait(waiting, return_when=FIRST_COMPLETED)
             for future in done:
-                with _no_main():
+                with _start_of_processes():
                     for task in islice(ahead, 1):
                         waiting[pool.submit(work, task)] = task
                 task = waiting.pop(future)
@@ -104,27 +102,22 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Processes that are started here never see Ctrl-C, which a terminal sends to them too: their parent ends them."""
-    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+def _start_of_processes() -> Iterator[None]:
+    """Tasks are handed to the pool here, and any of them may start a process.
 
-
-@contextmanager
-def _no_main() -> Iterator[None]:
-    """Processes that are started here do not run the caller's script again: what they do is in this package."""
+    It does not run the caller's script again, for what it does is in this package; and it never sees Ctrl-C, which a
+    terminal sends to it too: its parent ends it.
+    """
     own = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
+    held = hasattr(signal, "pthread_sigmask")  # not on Windows
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if held else set()
     try:
         yield
     finally:
         sys.modules["__main__"] = own
+        if held:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 ESTIMATE = "estimate: "
