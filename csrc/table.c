@@ -158,6 +158,19 @@ static void add_weighted(double weight, const double *restrict values, int64_t c
     for (int64_t n = 0; n < count; n++) out[n] += weight * values[n];
 }
 
+/* Add several, in their order: four at a time, so that what they are added to is read and written less often. */
+static void add_series(const double *weights, const double *const *values, int64_t terms, int64_t count,
+                       double *restrict out) {
+    int64_t k = 0;
+    for (; k + 4 <= terms; k += 4) {
+        const double p = weights[k], q = weights[k + 1], r = weights[k + 2], s = weights[k + 3];
+        const double *a = values[k], *b = values[k + 1], *c = values[k + 2], *d = values[k + 3];
+#pragma omp simd
+        for (int64_t n = 0; n < count; n++) out[n] = out[n] + p * a[n] + q * b[n] + r * c[n] + s * d[n];
+    }
+    for (; k < terms; k++) add_weighted(weights[k], values[k], count, out);
+}
+
 /* Add what a share of the largest yaw makes of the coefficients. */
 static void add_yaw(const Table *table, const Position *p, double share, double *out) {
     const int64_t gaps = table->yaw_gaps, pitches = table->yaw_pitches, block = table->phases * FACTOR;
@@ -171,12 +184,15 @@ static void add_yaw(const Table *table, const Position *p, double share, double 
     for (int64_t j = 0; j < count; j++) sizes[j] = fabs(nodes[level + step * j]);
     pitch_weights(sizes, count, fabs(p->f), BEYOND_YAWED, of_pitch);
     yaw_powers(clamped(share, -YAW_SLACK, YAW_SLACK), powers);
+    double weights[MOST_NODES * YAW_ORDERS];
+    const double *values[MOST_NODES * YAW_ORDERS];
     for (int64_t i = 0; i < gaps; i++) {
-        for (int64_t j = 0; j < count; j++) {
-            const double *node = table->yawed + (i * pitches + level + step * j) * YAW_ORDERS * block;
-            const double weight = of_gap[i] * of_pitch[j];
-            for (int n = 0; n < YAW_ORDERS; n++) add_weighted(weight * powers[n], node + n * block, block, out);
+        for (int64_t k = 0; k < count * YAW_ORDERS; k++) {
+            const int64_t j = k / YAW_ORDERS, n = k % YAW_ORDERS;
+            weights[k] = of_gap[i] * of_pitch[j] * powers[n];
+            values[k] = table->yawed + ((i * pitches + level + step * j) * YAW_ORDERS + n) * block;
         }
+        add_series(weights, values, count * YAW_ORDERS, block, out);
     }
 }
 
@@ -187,13 +203,17 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
     const int64_t pitches = lowered ? table->down : table->up;
     double of_pitch[MOST_NODES];
     pitch_weights(lowered ? table->down_nodes : table->up_nodes, pitches, fabs(p->f), BEYOND, of_pitch);
-    for (int64_t n = 0; n < block; n++) out[n] = 0.0;
+    double weights[MOST_NODES * MOST_NODES];
+    const double *values[MOST_NODES * MOST_NODES];
     for (int64_t i = 0; i < table->gaps; i++) {
         for (int64_t j = 0; j < pitches; j++) {
             const int64_t column = lowered && j > 0 ? table->up + j - 1 : j;
-            add_weighted(p->of_gap[i] * of_pitch[j], table->outer + (i * columns + column) * block, block, out);
+            weights[i * pitches + j] = p->of_gap[i] * of_pitch[j];
+            values[i * pitches + j] = table->outer + (i * columns + column) * block;
         }
     }
+    for (int64_t n = 0; n < block; n++) out[n] = 0.0;
+    add_series(weights, values, table->gaps * pitches, block, out);
     if (pose.yaw != 0.0) {
         const double most = largest_yaw_at(table->yaw_limit, pose.offset / table->radius, p->yawed_pitch);
         if (!(table->yaw_gaps > 0)) return TOO_FAR_YAWED;
