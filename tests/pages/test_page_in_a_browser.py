@@ -52,6 +52,21 @@ def test_knob_gives_the_number_that_python_gives(tab: Any) -> None:
     tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'fluid.viscosity' && knob.value == 3.5)")
 
 
+def test_nothing_is_cut_at_any_width(tab: Any) -> None:
+    """All columns of the numbers lie inside their card, and the page is no wider than its window."""
+    before = tab.page.viewport_size
+    tab.until(f"{NUMBERS} && Object.values({NUMBERS}.columns).every(column => column)")
+    for width in (390, 820, 1100, 1440):
+        tab.page.set_viewport_size({"width": width, "height": 900})
+        reach = tab.value("""() => {
+          const end = (place) => document.querySelector(place).getBoundingClientRect().right;
+          return [end("#numbers table"), end("#numbers"), document.documentElement.scrollWidth, innerWidth];
+        }""")
+        assert reach[0] <= reach[1], width
+        assert reach[2] <= reach[3], width
+    tab.page.set_viewport_size(before)
+
+
 def test_forces_are_those_of_the_prediction(tab: Any) -> None:
     tab.page.select_option("#model", "slender")
     tab.until(f"spirillum.scene.lanes[0].swims_by == 'slender' && {NUMBERS}?.model == 'slender'")

@@ -1,5 +1,5 @@
-// The table of numbers: now, held at a place, in a trial and in the steady state of a tube, and the range that is not known
-// better; with the stated error in words.
+// The table of numbers: now, held at a place, in a trial and in the steady state of a tube; under what is held its range over
+// the poses that are possible; the stated error in words.
 
 import { element, figure, inUnit, span, unitText } from "./format.js";
 import { capital } from "./plots.js";
@@ -33,20 +33,20 @@ export class Numbers {
       this.cells[name] = now;
       const ranged = row.low !== null && Math.abs(row.high - row.low) > 1e-9 * Math.abs(row.value || 1);
       body.append(element("tr", { title: quantity.meaning, "data-quantity": name },
-        element("th", { scope: "row" }, capital(quantity.label), element("small", { text: ` ${unitText(quantity.unit)}` })),
+        element("th", { scope: "row", rowspan: ranged ? 2 : 1 }, capital(quantity.label), element("small", { text: ` ${unitText(quantity.unit)}` })),
         now,
         element("td", { class: "steady", text: inUnit(row.value, quantity), "data-value": row.value }),
         ...columns.map(([, column]) => element("td", { class: column ? "steady" : "steady soft", text: !column ? "\u2026" : column.rows[name] === null ? "\u2013" : inUnit(column.rows[name], quantity) })),
-        element("td", { class: "range", text: ranged ? span(row.low * quantity.factor, row.high * quantity.factor) : "" }),
       ));
+      if (ranged) body.append(element("tr", {}, element("td", { class: "range", colspan: 2, text: span(row.low * quantity.factor, row.high * quantity.factor) })));
     }
     const table = numbers && element("table", {},
       element("thead", {}, element("tr", {},
         element("th", { scope: "col", text: "" }),
         element("th", { scope: "col", text: "now", title: "at this moment of the run" }),
-        element("th", { scope: "col", text: "held", title: "steady swimming in axial motion at a fixed pose, as predicted by predict" }),
+        element("th", { scope: "col", title: `steady swimming in axial motion at a fixed pose, as predicted by predict${numbers?.band ? "; under it the least and largest over the gaps and pitches that are possible" : ""}` },
+          "held", numbers?.band ? element("small", { text: "range" }) : null),
         ...columns.map(([name, column]) => element("th", { scope: "col", text: name, title: `${RELEASED[name]}: ${column ? column.title : "computing \u2026"}` })),
-        element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
       )), body);
     this.table = table;
     this.tag = element("span", { class: "tag", text: numbers ? `${lane.provisional ? "provisional: " : ""}model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" });
