@@ -76,4 +76,15 @@ def test_help_loads_nothing_heavy(loaded: Loaded) -> None:
 
 
 def test_one_prediction_draws_no_picture(loaded: Loaded) -> None:
-    assert not loaded.tube & {"matplotlib", "xarray", "h5py", "jinja2", "pandas"}
+    assert not loaded.tube & {"matplotlib", "xarray", "h5py", "jinja2", "pandas", "jaxtyping", "asyncio"}
+
+
+def test_a_command_reads_its_own_options_alone() -> None:
+    script = (
+        "from spirillum.cli.app import command_line\n"
+        "commands = command_line().commands\n"
+        "assert {'--model', '--notes'} <= {name for option in commands['predict'].params for name in option.opts}\n"
+        "print(*(name for name, command in commands.items() if '_made' in vars(command)))\n"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["predict"]

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+
+if not TYPE_CHECKING and "jaxtyping" in sys.modules:  # where tests check shapes at every call
+    from jaxtyping import Bool, Complex, Float, Int
+else:
+    from typing import Annotated as Bool
+    from typing import Annotated as Complex
+    from typing import Annotated as Float
+    from typing import Annotated as Int
 
 if TYPE_CHECKING:
     _Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]

@@ -22,9 +22,9 @@ from spirillum.cli.shared_options import (
     NO_START,
     All,
     Json,
+    NotedCommand,
     Picture,
     Settings,
-    add_notes_option,
     complete_auto_models,
     complete_resistance_models,
     complete_schemas,
@@ -261,7 +261,8 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
 
 for _task, _commands in _TASKS.items():
     for _command in _commands:
-        app.command(cls=FunctionCommand if hasattr(_command, "source") else None, rich_help_panel=_task)(_command)
+        _kind = FunctionCommand if hasattr(_command, "source") else NotedCommand
+        app.command(cls=_kind, rich_help_panel=_task)(_command)
 app.add_typer(robot_app, name="robot", rich_help_panel="Files")
 app.add_typer(setup_app, name="setup", rich_help_panel="Files")
 app.add_typer(observations_app, name="observations", rich_help_panel="Files")
@@ -269,5 +270,5 @@ app.add_typer(observations_app, name="observations", rich_help_panel="Files")
 
 @cache
 def command_line() -> Any:
-    """The tree of commands and their parameters, made once in a process: that takes as long as a short command."""
-    return add_notes_option(typer.main.get_command(app))
+    """Return the tree of commands, made once in a process; each makes its parameters when they are needed."""
+    return typer.main.get_command(app)

@@ -21,7 +21,17 @@ import typer
 from typer.core import TyperCommand
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.shared_options import COMPLETIONS, LISTED, METAVARS, NAMES, PANELS, TEXTS, RobotArgument, Settings
+from spirillum.cli.shared_options import (
+    COMPLETIONS,
+    LISTED,
+    METAVARS,
+    NAMES,
+    PANELS,
+    TEXTS,
+    NotedCommand,
+    RobotArgument,
+    Settings,
+)
 from spirillum.errors import InputError
 
 _SOURCE = Path(__file__).parents[2]
@@ -196,7 +206,7 @@ class FunctionCommand(TyperCommand):
     @cached_property
     def _made(self) -> Any:
         maker = typer.Typer(add_completion=False)
-        maker.command()(_complete(self._stub.source))
+        maker.command(cls=NotedCommand)(_complete(self._stub.source))
         return typer.main.get_command(maker)
 
     @property
@@ -393,13 +403,17 @@ def _found(module: str, name: str, kind: type[Any]) -> Any:
     return next(item for item in _tree(module).body if isinstance(item, kind) and item.name == name)
 
 
+@cache
+def _imported(module: str) -> dict[str, str]:
+    """Names that a module imports from this package, with the modules that they come from."""
+    imports = [item for item in ast.walk(_tree(module)) if isinstance(item, ast.ImportFrom)]
+    ours = [item for item in reversed(imports) if str(item.module).startswith("spirillum")]
+    return {alias.name: str(item.module) for item in ours for alias in item.names}
+
+
 def _home(module: str, name: str) -> str:
     """The module of this package that a name is imported from; the module itself for other names."""
-    for item in ast.walk(_tree(module)):
-        ours = isinstance(item, ast.ImportFrom) and str(item.module).startswith("spirillum")
-        if isinstance(item, ast.ImportFrom) and ours and any(alias.name == name for alias in item.names):
-            return str(item.module)
-    return module
+    return _imported(module).get(name, module)
 
 
 def _value(module: str, node: ast.expr | None) -> Any:

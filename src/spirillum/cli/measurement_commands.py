@@ -10,7 +10,15 @@ import typer
 
 from spirillum.cli.function_command import FunctionCommand, Request, from_function
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
-from spirillum.cli.shared_options import DISTURBANCES_PANEL, PANELS, Json, Settings, optional_robot, starting
+from spirillum.cli.shared_options import (
+    DISTURBANCES_PANEL,
+    PANELS,
+    Json,
+    NotedCommand,
+    Settings,
+    optional_robot,
+    starting,
+)
 
 if TYPE_CHECKING:
     from spirillum.live.observation import Observation, Tracked
@@ -285,7 +293,7 @@ def propose(
     renderer.show(found.to_dict(), json=json)
 
 
-@setup_app.command("check")
+@setup_app.command("check", cls=NotedCommand)
 def check_setup(
     file: Annotated[Path, typer.Argument(help="Setup file (TOML).")],
     film: Annotated[Path | None, typer.Argument(help="A film that was taken with it, to look at too.")] = None,
@@ -304,7 +312,7 @@ def check_setup(
 observations_app = typer.Typer(name="observations", help="Files of observed speeds and rates.", no_args_is_help=True)
 
 
-@observations_app.command("new")
+@observations_app.command("new", cls=NotedCommand)
 def new_observations(
     file: Annotated[Path, typer.Argument(help="File to write (.csv).")],
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
@@ -319,7 +327,7 @@ def new_observations(
     typer.echo(f"{file}: columns and their units are explained in its comments")
 
 
-@observations_app.command("check")
+@observations_app.command("check", cls=NotedCommand)
 def check_observations(
     file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")], json: Json = False
 ) -> None:
@@ -333,7 +341,7 @@ def check_observations(
     renderer.show(observations_answer(file), json=json)
 
 
-@observations_app.command("join")
+@observations_app.command("join", cls=NotedCommand)
 def join_observations(
     files: Annotated[list[Path], typer.Argument(help="Observations files (CSV or Parquet), two or more.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.csv).")],

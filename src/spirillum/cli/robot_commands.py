@@ -9,12 +9,20 @@ import typer
 
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
-from spirillum.cli.shared_options import Json, RobotArgument, Settings, complete_presets, complete_robots, starting
+from spirillum.cli.shared_options import (
+    Json,
+    NotedCommand,
+    RobotArgument,
+    Settings,
+    complete_presets,
+    complete_robots,
+    starting,
+)
 
 robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 
 
-@robot_app.command("new")
+@robot_app.command("new", cls=NotedCommand)
 def robot_new(
     path: Annotated[Path, typer.Argument(help="Robot file to write.")],
     preset: Annotated[
@@ -32,7 +40,7 @@ def robot_new(
     typer.echo(f"{path} written; see what follows from it with: spirillum robot show {path}")
 
 
-@robot_app.command("show")
+@robot_app.command("show", cls=NotedCommand)
 def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
     """Show a robot's fields and what follows from them: arc length, volumes, weight.
 
@@ -44,7 +52,7 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
     renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
 
 
-@robot_app.command("check")
+@robot_app.command("check", cls=NotedCommand)
 def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
     """Check a robot file and list every problem at once; exit code 1 if there is one.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
@@ -212,18 +213,18 @@ Picture = Annotated[
 ]
 
 
-def add_notes_option(command: Any) -> Any:
-    """Give every command that has `--json`, and so prints an answer, the option `--notes` too."""
-    for below in getattr(command, "commands", {}).values():
-        add_notes_option(below)
-    json = next((parameter for parameter in command.params if "--json" in parameter.opts), None)
-    if json is not None:
-        notes = copy(json)
-        notes.name, notes.opts, notes.secondary_opts, notes.expose_value = "notes", ["--notes"], [], False
-        notes.help = "Print all notes with their codes, and the methods used."
-        notes.callback = lambda _context, _parameter, value: every_note.set(bool(value))
-        command.params.insert(command.params.index(json) + 1, notes)
-    return command
+class NotedCommand(TyperCommand):
+    """A command with the option `--notes` where it has `--json`, and so prints an answer."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        json = next((parameter for parameter in self.params if "--json" in parameter.opts), None)
+        if json is not None:
+            notes: Any = copy(json)
+            notes.name, notes.opts, notes.secondary_opts, notes.expose_value = "notes", ["--notes"], [], False
+            notes.help = "Print all notes with their codes, and the methods used."
+            notes.callback = lambda _context, _parameter, value: every_note.set(bool(value))
+            self.params.insert(self.params.index(json) + 1, notes)
 
 
 every_note: ContextVar[bool] = ContextVar("every_note", default=False)

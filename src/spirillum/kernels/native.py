@@ -17,15 +17,33 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, cast, get_type_hints
 
 import numpy as np
-from jaxtyping import Complex128, Float32, Float64, Int64, UInt8
 
 if TYPE_CHECKING:
+    from typing import Annotated as Complex128
+    from typing import Annotated as Float32
+    from typing import Annotated as Float64
+    from typing import Annotated as Int64
+    from typing import Annotated as UInt8
+
     Array: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[Any]]
 else:
     Array = np.ndarray
+
+    class _ArrayOf:
+        """Annotations of arrays of a dtype, with their shape."""
+
+        def __init__(self, dtype):
+            self._dtype = np.dtype(dtype)
+
+        def __getitem__(self, array_and_shape):
+            array, shape = array_and_shape
+            return Annotated[array, self._dtype, shape]
+
+    Complex128, Float32, Float64 = _ArrayOf("complex128"), _ArrayOf("float32"), _ArrayOf("float64")
+    Int64, UInt8 = _ArrayOf("int64"), _ArrayOf("uint8")
 
 __all__ = [
     "Array",
@@ -159,8 +177,8 @@ class _ArrayArgument:
 
     def __init__(self, name: str, annotation: Any, *, is_written: bool) -> None:
         self.name, self.is_written = name, is_written
-        self.dtype = np.dtype(annotation.dtypes[0])
-        shape = annotation.dim_str.split()
+        self.dtype, dimensions = annotation.__metadata__
+        shape = dimensions.split()
         self.shape = None if shape == ["..."] else tuple(int(size) if size.isdigit() else size for size in shape)
 
     def accepted(self, value: Any) -> np.ndarray[Any, Any]:
@@ -186,7 +204,7 @@ class _Call:
     """A function of the library with the checks of its arguments."""
 
     def __init__(self, stub: Callable[..., Any], symbol: str, written: frozenset[str], rows: str) -> None:
-        hints = get_type_hints(stub)
+        hints = get_type_hints(stub, include_extras=True)
         returned = hints.pop("return")
         self._arguments = [
             None if hint in _SCALARS else _ArrayArgument(name, hint, is_written=name in written)

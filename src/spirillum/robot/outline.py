@@ -210,12 +210,18 @@ class Outline:
 
     def distance(self, x: Samples, rho: Samples) -> Samples:
         """Distance of points from the surface, to a thousandth of a piece's length, m."""
-        from scipy.spatial import cKDTree
-
         shape = np.broadcast_shapes(np.shape(x), np.shape(rho))
         points = np.stack(np.broadcast_arrays(x, rho), axis=-1).reshape(-1, 2)
-        found, _ = cKDTree(np.stack(self.line(np.linspace(0.0, 1.0, 1001)), axis=-1)).query(points)
+        found, _ = _nearest(self).query(points)
         return np.asarray(found).reshape(shape)
+
+
+@lru_cache(maxsize=256)
+def _nearest(outline: Outline) -> Any:
+    """Tree of points along an outline."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(np.stack(outline.line(np.linspace(0.0, 1.0, 1001)), axis=-1))
 
 
 def _end(end: End | None, x_tip: float, outward: float, radius: float, fillet: float) -> list[Segment | Arc]:

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from jaxtyping import Int
 
-from spirillum.arrays import Samples
+from spirillum.arrays import Samples, Whole
 from spirillum.errors import check_memory
 from spirillum.robot.outline import Outline, Piece, Segment, Smooth
 
-if TYPE_CHECKING:
-    _Integers = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-else:
-    _Integers = np.ndarray
-
-Faces: TypeAlias = Int[_Integers, "..."]
+Faces: TypeAlias = Whole
 """Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
 
 _LEAST_AROUND = 3

@@ -100,15 +100,18 @@ class Seat:
         """Smallest distance between a solid of revolution and the wall, m; negative where it cuts into it."""
         ends, arcs = _rings(outline)
         reach = float(self._farthest(*ends)[0].max(initial=0.0))
-        for arc, whole in arcs:
-            rings, low, width = whole, 0.0, 1.0
-            for _ in range(_ROUNDS):
-                distance, _ = self._farthest(*rings)
+        sampled = [(self._farthest(*whole)[0], arc, step) for arc, whole, step in arcs]
+        for whole, arc, step in sorted(sampled, key=lambda item: -item[0].max()):
+            if whole.max() + step < reach:
+                continue
+            distance, low, width = whole, 0.0, 1.0
+            for _ in range(_ROUNDS - 1):
                 at = int(distance.argmax())
                 reach = max(reach, float(distance[at]))
                 first, last = max(at - 1, 0), min(at + 1, _SAMPLES.size - 1)
                 low, width = low + width * float(_SAMPLES[first]), width * float(_SAMPLES[last] - _SAMPLES[first])
-                rings = arc.points(low + width * _SAMPLES)
+                distance, _ = self._farthest(*arc.points(low + width * _SAMPLES))
+            reach = max(reach, float(distance.max()))
         return float(self.radius - reach)
 
     def tail_clearance(self, points: Samples, wire_radius: float) -> TailClearance:
@@ -180,12 +183,15 @@ class Seat:
 
 
 @lru_cache(maxsize=256)
-def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Piece, tuple[Samples, Samples]]]]:
-    """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's."""
+def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Piece, tuple[Samples, Samples], float]]]:
+    """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's.
+
+    An arc comes with the largest distance between its rings: by no more does one between them reach farther.
+    """
     ends = [end for piece in outline.pieces if isinstance(piece, Segment) for end in (piece.start, piece.end)]
     x, rho = np.array(ends, dtype=float).reshape(-1, 2).T
-    arcs = [piece for piece in outline.pieces if not isinstance(piece, Segment)]
-    return (x, rho), [(arc, arc.points(_SAMPLES)) for arc in arcs]
+    arcs = [(piece, piece.points(_SAMPLES)) for piece in outline.pieces if not isinstance(piece, Segment)]
+    return (x, rho), [(arc, rings, float(np.hypot(*np.diff(rings)).max())) for arc, rings in arcs]
 
 
 def _farthest_of_ellipses(
