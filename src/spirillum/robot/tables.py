@@ -293,10 +293,11 @@ class RobotTables(Section):
         """Whether there is a body, against which a joint can turn."""
         return self.body.shape != "none"
 
-    def check_body(self, what: str) -> None:
-        """Refuse a bare tail for what takes a body."""
+    def check_body(self, what: str, instead: str = "") -> None:
+        """Refuse a bare tail for what takes a body; a sentence ends with what may be done instead."""
         if not self.has_body:
-            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: a robot with a body")
+            allowed = f"a robot with a body{instead}"
+            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: {allowed}")
 
     def _problems_without_body(self) -> list[str]:
         if self.has_body:
