@@ -36,7 +36,7 @@ from spirillum.robot.fields import (
     quantity_schema,
     refuse,
 )
-from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, CouplingOrNone, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.robot.shape_input import DISPLACED
 from spirillum.units import KINDS, show
@@ -233,8 +233,8 @@ class RobotTables(Section):
     """The body, or `none` for a bare tail."""
     seal: SealOrNone = None
     """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
-    coupling: Coupling = Coupling()
-    """The coupling between motor and tail."""
+    coupling: CouplingOrNone = Coupling()
+    """The coupling between motor and tail, or `none`."""
     tail: Tail
     """The helical tail."""
     channel: ChannelOrNone = None
