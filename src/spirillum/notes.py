@@ -85,8 +85,8 @@ CAUTIONS = {
         "what does."
     ),
     "no-weight": (
-        "Masses are missing or left out: the robot is taken to rest on the floor, or moves without weight. Give "
-        "`body.mass` and `tail.density`, or the pose."
+        "Masses are missing or left out: the robot is taken to rest on the floor (a bare tail: on the axis), or moves "
+        "without weight. Give `body.mass` and `tail.density`, or the pose."
     ),
     "imposed-flow": (
         "Efficiencies and cost of transport use the velocity in the lab, and do not compare with those in fluid at "

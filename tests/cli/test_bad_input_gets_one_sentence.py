@@ -35,7 +35,7 @@ WIDE = "biorob2012-wide"
         (["predict", WIDE, "--model", "perrin"], "model = 'perrin'"),
         (
             ["predict", WIDE, "--model", "slender", "--band"],
-            "band = True with model 'slender'; allowed: only with",
+            "--band with model 'slender'; allowed: only with",
         ),
         (["predict", WIDE, "--friction", "ice"], "friction = 'ice'; allowed: none, rotor, body, paper"),
         (["predict", WIDE, "--friction", ""], "friction = ''; allowed: none, rotor, body, paper"),

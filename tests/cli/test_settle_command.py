@@ -85,9 +85,9 @@ def test_first_line_says_that_no_steady_motion_was_reached(
     [
         (["--motion", "free", "--phases", "3"], "phases = 3 with model 'tube' and motion 'free'"),
         (["--motion", "free", "--accuracy", "high"], "accuracy = 'high' with model 'tube' and motion 'free'"),
-        (["--motion", "free", "--band"], "band = True with motion 'free' in the tube"),
+        (["--motion", "free", "--band"], "--band with motion 'free' in the tube"),
         (["--motion", "held", "--roughness", "20um"], "roughness = 20um is of released motion in the tube"),
-        (["--tail-rate", "1Hz", "--friction-coefficient", "0.2"], "in_tube.friction_coefficient = 0.2 is of released"),
+        (["--tail-rate", "1Hz", "--friction-coefficient", "0.2"], "--friction-coefficient = 0.2 is of released"),
     ],
 )
 def test_what_a_motion_does_not_read_is_refused(run: Callable[..., Any], arguments: list[str], words: str) -> None:

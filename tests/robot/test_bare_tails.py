@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 from tests.support.commands import run_command
 
-from spirillum import load, predict, prepare, resistance, simulate
+from spirillum import compare_models, load, predict, prepare, resistance, simulate
+from spirillum.designs.criteria import Variable
+from spirillum.designs.learned import corrected, solved_at
 from spirillum.errors import InputError
+from spirillum.fluid.wire.slender import Slender
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import robot_text
+from spirillum.swimming.balance import joined
 
 BARE: dict[str, Any] = {
     "name": "bare",
@@ -41,6 +46,25 @@ def test_a_tail_on_the_axis_of_its_tube_is_held_more_than_without_walls() -> Non
     walled, free = (resistance(BARE, model=model).matrix for model in ("tube", "slender"))
     assert walled[0, 0] > 1.2 * free[0, 0]
     assert abs(walled[0, 1]) < 1e-3 * walled[0, 0]
+
+
+def test_models_stand_side_by_side_without_effects_of_a_body() -> None:
+    compared = compare_models(load(BARE, channel="none"), models=["sbt", "slender"])
+    assert [(one.name, one.speed) for one in compared.effects] == [
+        ("Lighthill's theory", compared.predictions["sbt"].forward_velocity),
+        ("wire resolved", compared.predictions["slender"].forward_velocity),
+    ]
+
+
+def test_a_design_is_learned_as_that_of_a_robot() -> None:
+    batch = RobotBatch.of(load(BARE)).with_values({"tail.wavelength": np.array([11e-3, 12e-3, 13e-3, 14e-3])})
+    model = corrected("slender", solved_at("slender", batch, (Variable("tail.wavelength", "m", 10e-3, 14e-3),)))
+    assert np.allclose(joined(model.axial(batch)), joined(Slender().axial(batch)), rtol=1e-9, atol=1e-15)
+
+
+def test_its_pose_is_on_the_axis_and_said_to_be() -> None:
+    notes = {note.code: str(note) for note in predict(BARE, model="tube", motion="held").warnings}
+    assert "on its channel's axis" in notes["no-weight"]
 
 
 def test_the_robot_is_its_wire(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import robot_solids
 from spirillum.robot.mesh import robot_mesh
 from spirillum.robot.robot import robot_text
+from spirillum.robot.shape_input import read_points
 from spirillum.robot.tail_form import strand_spacing
 
 CONE = {"from": "1 mm", "to": "3 mm"}
@@ -162,8 +163,28 @@ def test_wrong_tails_get_a_sentence(what: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("header", "scale"),
+    [("x_m,y_m,z_m", 1e-3), ("x [um],y [um],z [um]", 1e3), ("X (mm),Y (mm),Z (mm)", 1.0), ("x,y,z", 1.0)],
+)
+def test_a_header_may_name_another_unit(header: str, scale: float, tmp_path: Path) -> None:
+    path = written(tmp_path / "points.csv", (scale * np.array(helix())).tolist(), f"{header}\n")
+    assert np.allclose(read_points(path, ("x", "y", "z"), "tail.curve"), helix(), rtol=1e-12, atol=0.0)
+
+
+def test_none_takes_nothing_away() -> None:
+    plain = load("biorob2012-wide")
+    for setting in ({"tail.curve": "none"}, {"body.profile": "none"}, {"tail": {"curve": "none"}}):
+        assert load("biorob2012-wide", **setting) == plain
+    assert load("biorob2012-wide", coupling="none").coupling.length == 0.0
+
+
+@pytest.mark.parametrize(
     ("rows", "said"),
     [
+        ("y,x,z\n0, 0, 0\n", "line 1: columns 'y, x, z'; allowed: "),
+        ("x_kg,y_kg,z_kg\n0, 0, 0\n", "or in another length, as x_m"),
+        ("x_m,y,z\n0, 0, 0\n", "or in another length, as x_m"),
+        ("0 0 0\n1 0 1\n", "line 1: columns '0 0 0'"),
         ("0, 0, 0\n1, nan, 0\n", "line 2: '1, nan, 0' is no point"),
         ("x,y,z\n0,0\n", "line 2"),
         ("", "is empty"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -253,7 +253,10 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
             if given[name] is not None and given[name] != default
         }
         robot = () if source.robot is None else (given["robot"], given["settings"])
-        source.body(Request(source, typed, *robot), **{name: given[name] for name in own})
+        try:
+            source.body(Request(source, typed, *robot), **{name: given[name] for name in own})
+        except InputError as error:
+            raise _with_options(error, [item for item, _, _ in made.values()]) from error
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {item.name: item.annotation for item in parameters}
@@ -270,10 +273,28 @@ def _as_argument(item: Declaration, value: Any) -> Any:
     return not item.default if item.is_switch else value
 
 
+_IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")
+"""Tables of functions whose fields no file has."""
+
+
+def _with_options(error: InputError, items: Iterable[Declaration]) -> InputError:
+    """The error with options in place of such fields, of arguments that are on, and of names that no option has."""
+    sentence = str(error)
+    for item in items:
+        last = item.path.rpartition(".")[2]
+        found = rf"{re.escape(item.path)}\b" if item.table in _IN_PYTHON else rf"{last} = True\b"
+        found += rf"|{last}(?= = )" if "_" in last else ""
+        sentence = re.sub(rf"(?<![\w.-])(?:{found})", _name_of(item), sentence)
+    return error if sentence == str(error) else InputError(sentence)
+
+
+def _name_of(item: Declaration) -> str:
+    return NAMES.get(item.path, f"--{item.path.rpartition('.')[2].replace('_', '-')}")
+
+
 def _option(item: Declaration, completions: Mapping[str, Any]) -> tuple[Any, Any]:
     """Annotation and default of an option."""
-    last, words = item.path.rpartition(".")[2], item.words
-    option = NAMES.get(item.path, f"--{last.replace('_', '-')}")
+    last, words, option = item.path.rpartition(".")[2], item.words, _name_of(item)
     unit = re.search(r"float in ([\w/]+)", item.text)
     metavar = next((_BY_FIELD_TYPE[word] for word in words if word in _BY_FIELD_TYPE), None)
     if metavar is None and {"str", "float"} <= words and unit is not None:

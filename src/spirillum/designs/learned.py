@@ -126,7 +126,7 @@ class Corrected(SwimmerModel):
         correction = _exponential(self.points.at(each))[np.ravel(inverse)]
         fast, sound = _fast(batch)
         lower = np.linalg.cholesky(fast)
-        whole = lower @ correction @ np.swapaxes(lower, -1, -2)
+        whole = lower @ correction @ np.swapaxes(lower, -1, -2) - _of_no_body(batch)
         found = np.zeros((batch.size, 4, 4))
         found[:, _PLACES[:, None], _PLACES] = np.where(sound[:, None, None], whole, np.nan)
         return found
@@ -177,7 +177,7 @@ def _spread(limit: Limit, place: np.ndarray[Any, Any], size: int) -> Limit:
 def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:
     """A_0 of the fast model, (robots, 3, 3), one where it has none, and whether it has."""
     with np.errstate(all="ignore"):
-        found = np.broadcast_to(joined(Sbt().axial(batch)), (batch.size, 3, 3))
+        found = np.broadcast_to(joined(Sbt().axial(batch)) + _of_no_body(batch), (batch.size, 3, 3))
     size = np.sqrt(np.abs(np.diagonal(found, axis1=-2, axis2=-1)))
     sound = np.all(np.isfinite(found), axis=(-2, -1)) & np.all(size > 0, axis=-1)
     plain = np.where(sound[:, None, None], found, np.eye(3))
@@ -185,6 +185,11 @@ def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:
     least = np.linalg.eigvalsh(plain / (scale[:, :, None] * scale[:, None, :]))[:, 0]
     sound &= least > 0
     return np.where(sound[:, None, None], plain, np.eye(3)), sound
+
+
+def _of_no_body(batch: RobotBatch) -> Samples:
+    """What takes the place of the drag on the rotation of a body, (3, 3), of a bare tail, that A may be definite."""
+    return np.diag([0.0, float(batch.shape == "none"), 0.0])
 
 
 def _exponential(upper: Samples) -> Samples:
@@ -205,7 +210,7 @@ def solved_at(name: str, batch: RobotBatch, variables: tuple[Variable, ...]) -> 
 
 def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callable[[RobotBatch], Samples]) -> Points:
     """What some designs teach."""
-    found = np.concatenate([joined(solve(one)) for _, one in batch.blocks(1)])
+    found = np.concatenate([joined(solve(one)) for _, one in batch.blocks(1)]) + _of_no_body(batch)
     fast, sound = _fast(batch)
     if not (np.all(np.isfinite(found)) and np.all(sound)):
         raise InputError("the flow around a design is not resolved; allowed: narrower ranges")

@@ -87,10 +87,12 @@ def _steps(robot: Robot, answers: Mapping[str, Prediction], friction: str) -> It
         return float(found.forward_velocity[0])
 
     yield Effect("Lighthill's theory", answers[LIGHTHILL].forward_velocity)
-    yield Effect("body and wire resolved", apart(coupling=False))
-    if robot.coupling.length > 0.0 and robot.coupling.diameter > 0.0:
+    if robot.has_body:
+        yield Effect("body and wire resolved", apart(coupling=False))
+    if robot.has_body and robot.coupling.length > 0.0 and robot.coupling.diameter > 0.0:
         yield Effect("coupling", apart(coupling=True))
-    yield Effect("interaction of the parts", answers[UNBOUNDED].forward_velocity)
+    whole = "interaction of the parts" if robot.has_body else "wire resolved"
+    yield Effect(whole, answers[UNBOUNDED].forward_velocity)
     held = answers.get(WALLED)
     if held is None:
         return

@@ -77,7 +77,7 @@ def films_of(robot: Robot, roughness: float | None, drag: float, load: float) ->
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
         return WallFilms(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
-    robot.check_body("motion beside the wall of a channel, with lubrication films,")
+    robot.check_body("motion beside the wall of a channel, with lubrication films,", ", or channel = 'none'")
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)

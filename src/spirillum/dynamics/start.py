@@ -62,7 +62,7 @@ def _check(robot: Robot, placement: Placement) -> None:
 
 
 def _seat(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) -> Seat:
-    robot.check_body("motion beside the wall of a channel, with lubrication films,")
+    robot.check_body("motion beside the wall of a channel, with lubrication films,", ", or channel = 'none'")
     radius, body, pitch = 0.5 * channel.diameter, outlines_of(robot)["body"], placement.pitch or 0.0
     if placement.eccentricity is not None:
         return Seat.of(placement, body, robot.body.diameter, radius)

@@ -95,7 +95,7 @@ CenterOfMassOrNone = Annotated[CenterOfMass | None, UNSET, NONE]
 
 _NUMBERS = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
 ProfileOrNone = Annotated[
-    ProfilePoints | None, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})
+    ProfilePoints | None, UNSET, WithJsonSchema({"anyOf": [_NUMBERS, {"type": "string"}, {"type": "null"}]})
 ]
 
 
@@ -151,6 +151,8 @@ class Body(Section):
 def _read_body(value: Any) -> Any:
     none = value == "none" or (isinstance(value, Mapping) and value.get("shape") == "none")
     if not none:
+        if not isinstance(value, (Mapping, Body)):
+            raise ValueError("'none', or a [body] table")
         return value
     given = [] if value == "none" else [name for name, item in value.items() if name != "shape" and _is_size(item)]
     if given:
@@ -195,6 +197,8 @@ class Coupling(Section):
     clearance: LengthOrZero = 0.0005
     """Axial clearance on both sides; its solid is `length - 2 clearance` long. Assumed: the paper does not say."""
 
+
+CouplingOrNone = Annotated[Coupling, BeforeValidator(lambda value: {} if value == "none" else value), NONE]
 
 _SIZE = {
     "anyOf": [

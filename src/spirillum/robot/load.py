@@ -19,7 +19,7 @@ from spirillum.notes import Note
 from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Derived, Robot
-from spirillum.robot.shape_input import DISPLACED, with_points_of_files
+from spirillum.robot.shape_input import DISPLACED, FILES, with_points_of_files
 from spirillum.units import show
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -97,7 +97,7 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
     folder = _folder_of(robot)
     table, changes = _extended(with_points_of_files(table, folder), source, folder)
     for path, value in overrides.items():
-        _displace(table, _touched(_nested(path, value)))
+        _displace(table, _nested(path, value))
         _put(table, path.split("."), value, path)
     table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
@@ -230,17 +230,18 @@ def _laid_over(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[
     changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
     if changed:
         below = {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
-    _displace(below, changed)
+    _displace(below, table)
     return _merged(below, table)
 
 
-def _displace(table: dict[str, Any], changed: set[str]) -> None:
-    """Take out what fields of the layer above replace."""
-    for field in changed:
-        inner = table.get(field.partition(".")[0])
-        for name in DISPLACED.get(field, ()):
-            if isinstance(inner, dict):
-                inner.pop(name, None)
+def _displace(table: dict[str, Any], above: Mapping[str, Any]) -> None:
+    """Take out what fields of the layer above replace; points that are `none` replace nothing."""
+    for field in _touched(above):
+        section, _, name = field.partition(".")
+        inner = table.get(section)
+        if isinstance(inner, dict) and not ((section, name) in FILES and above[section][name] in (None, "none")):
+            for other in DISPLACED.get(field, ()):
+                inner.pop(other, None)
 
 
 def _resolved(path: Path, source: str) -> Path:

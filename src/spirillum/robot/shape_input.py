@@ -30,32 +30,45 @@ DISPLACED = {
     "body.shape": ("profile",),
 }
 """Fields of the layer below that a field of a layer replaces."""
-_COLUMN = re.compile(r"[\s_]*[\[(]?mm[\])]?$")
-"""The unit behind the name of a column."""
+_COLUMN = re.compile(r"(\w+?)(?:(?:[\s_]+|\s*(?=[\[(]))[\[(]?([a-zµμ]+)[\])]?)?")
+"""The name of a column and the unit behind it."""
 _TURNED = 0.5
 """Cosine of the largest angle between neighbouring chords of a centre line."""
 
 
 def read_points(path: Path, columns: Sequence[str], field: str) -> list[list[float]]:
-    """Points of a file, one a row; a first row of words names the columns, which are in mm."""
+    """Points of a file, one a row, mm; a first row of words names the columns, which are in mm or in its unit."""
     what = f"{field}: a CSV file of points ({', '.join(columns)}) in mm"
-    rows = csv_rows(read_text(path, what), path, what)
+    rows, scale = csv_rows(read_text(path, what), path, what), 1.0
     if rows and not any(map(_is_written_number, rows[0][1])):
-        names = [_COLUMN.sub("", cell.strip().lower()) for cell in rows[0][1]]
-        if names != list(columns):
+        scale = _scale_of(rows[0][1], columns)
+        if not scale:
             shown = ", ".join(rows[0][1])[:60]
-            raise InputError(f"{path}, line {rows[0][0]}: columns {shown!r}; allowed: {what}, with no names or these")
+            named = f"with no names or these, or in another length, as {columns[0]}_m"
+            raise InputError(f"{path}, line {rows[0][0]}: columns {shown!r}; allowed: {what}, {named}")
         rows = rows[1:]
     if len(rows) > MOST_POINTS:
         raise InputError(f"{path} has {len(rows)} points; allowed: {what}, at most {MOST_POINTS}")
     found = []
     for line, cells in rows:
-        numbers = [number_in(cell) if _is_written_number(cell) else float("nan") for cell in cells]
+        numbers = [scale * number_in(cell) if _is_written_number(cell) else float("nan") for cell in cells]
         if len(numbers) != len(columns) or not all(map(isfinite, numbers)):
             shown = ", ".join(cells)[:60]
             raise InputError(f"{path}, line {line}: {shown!r} is no point; allowed: {what}, {len(columns)} numbers")
         found.append(numbers)
     return found
+
+
+def _scale_of(header: Sequence[str], columns: Sequence[str]) -> float:
+    """The unit of the columns that a header names, mm; 0 where it names others."""
+    parts = [found.groups(default="mm") for cell in header if (found := _COLUMN.fullmatch(cell.strip().lower()))]
+    units = {unit for _, unit in parts}
+    if [name for name, _ in parts] != list(columns) or len(parts) != len(header) or len(units) != 1:
+        return 0.0
+    try:
+        return 1.0 if units == {"mm"} else 1e3 * parse_quantity(f"1 {units.pop()}", KINDS["length"])
+    except InputError:
+        return 0.0
 
 
 def _is_written_number(cell: str) -> bool:

@@ -36,7 +36,7 @@ from spirillum.robot.fields import (
     quantity_schema,
     refuse,
 )
-from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
+from spirillum.robot.geometry import Body, BodyOrNone, ChannelOrNone, Coupling, CouplingOrNone, Fluid, SealOrNone, Tail
 from spirillum.robot.model_options import Calibrations, ModelOptions
 from spirillum.robot.shape_input import DISPLACED
 from spirillum.units import KINDS, show
@@ -233,8 +233,8 @@ class RobotTables(Section):
     """The body, or `none` for a bare tail."""
     seal: SealOrNone = None
     """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
-    coupling: Coupling = Coupling()
-    """The coupling between motor and tail."""
+    coupling: CouplingOrNone = Coupling()
+    """The coupling between motor and tail, or `none`."""
     tail: Tail
     """The helical tail."""
     channel: ChannelOrNone = None
@@ -293,10 +293,11 @@ class RobotTables(Section):
         """Whether there is a body, against which a joint can turn."""
         return self.body.shape != "none"
 
-    def check_body(self, what: str) -> None:
-        """Refuse a bare tail for what takes a body."""
+    def check_body(self, what: str, instead: str = "") -> None:
+        """Refuse a bare tail for what takes a body; a sentence ends with what may be done instead."""
         if not self.has_body:
-            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: a robot with a body")
+            allowed = f"a robot with a body{instead}"
+            raise InputError(f"{what} takes a body, and {self.name} has body = 'none'; allowed: {allowed}")
 
     def _problems_without_body(self) -> list[str]:
         if self.has_body:

@@ -200,11 +200,19 @@ _NO_TORQUE = Note(
     "fit tube",
     ("shaft_torque", "effective_friction"),
 )
-_NO_WEIGHT = Note(
-    "no-weight",
-    "body.mass or tail.density is unset: the robot is assumed to rest on the floor; set both, or its pose (--gap)",
-    ("body.mass", "tail.density"),
-)
+_UNPLACED = {
+    True: Note(
+        "no-weight",
+        "body.mass or tail.density is unset: the robot is assumed to rest on the floor; set both, or its pose (--gap)",
+        ("body.mass", "tail.density"),
+    ),
+    False: Note(
+        "no-weight",
+        "the bare tail is assumed on its channel's axis, where nothing supports its weight; else set --eccentricity",
+        ("placement.eccentricity",),
+    ),
+}
+"""Where a robot is assumed, by whether it has a body."""
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
     "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
@@ -334,7 +342,7 @@ def _case_warnings(scenario: Scenario, result: Swimming) -> list[Note]:
         *drive_warnings(known, model, scenario.friction, result, rate),
         *_free_warnings(robot, scenario.motion),
         *([_IN_A_FLOW] if batch.placement.flow else []),
-        *([_NO_WEIGHT] if model.placed and not scenario.has_weight_or_place() else []),
+        *([_UNPLACED[robot.has_body]] if model.placed and not scenario.has_weight_or_place() else []),
     ]
 
 

@@ -79,8 +79,8 @@ class Places:
     def rings(self) -> Samples:
         """See `rings_of`."""
         if self.geometry.shape == "none":
-            said = "a bare tail (body = 'none') has no table in its tube"
-            raise InputError(f"{said}; allowed: single poses, model.tube.form = 'direct'")
+            said = "a bare tail (body = 'none') has no table in its tube, and no free motion there"
+            raise InputError(f"{said}; allowed: `predict` at a pose (motion 'held'), or channel = 'none'")
         if self.geometry.shape == "profile":
             FilmBody.of(self.geometry.body)  # refuses one whose film is not known
         return rings_of(self.geometry.body)

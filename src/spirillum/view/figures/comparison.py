@@ -89,7 +89,7 @@ def _column(
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
     panel.set_xlabel(RANKED[name].title + ("" if scale.unit == "1" else f" ({scale.unit})"))
     panel.xaxis.set_major_locator(MaxNLocator(ticks))
-    panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))))
+    panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))) or 1.0)
     panel.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):
         panel.spines[side].set_visible(False)
