@@ -53,6 +53,7 @@ typedef struct {
 typedef struct {
     double gap, bend;                          /* h0, R', m */
     double length;                             /* along the body, m */
+    double share;                              /* of its pressure that the ends of the film leave */
     double opening[RATES], entrainment[RATES]; /* V and u per rate */
 } Slice;
 

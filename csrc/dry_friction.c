@@ -30,7 +30,7 @@ Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]) 
         contact.opening += slice->opening[i] * q[i];
         contact.entrainment += slice->entrainment[i] * q[i];
     }
-    return cavitation_lift(&contact, balance->viscosity, balance->bound);
+    return cavitation_lift(&contact, slice->share * balance->viscosity, balance->bound);
 }
 
 static int skipped_row(const Balance *b) { return b->prescribed ? b->along : -1; }
