@@ -232,6 +232,7 @@ static Slice slice_at(const TubeRobot *robot, const State *y, const double rotat
     const Site site = {.x = x, .ring = a};
     const Nearest at = site_nearest(&site, y, rotation, radius);
     Slice s = {.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a), .length = length};
+    s.edges[0] = s.edges[1] = NAN;
     const double width = sqrt(2.0 * s.bend * s.gap);
     s.share = share_at(x - film->rear, film->rear_round, width, s.bend)
             * share_at(film->front - x, film->front_round, width, s.bend);
@@ -302,9 +303,11 @@ static void scale_slices(const double film[6][6], Balance *b) {
 }
 
 /* Whether any slice cavitates at the rates; scaled, its pressure is less. */
-static bool cavitates_at(const Balance *b, const double q[RATES]) {
-    for (int64_t n = 0; n < b->slice_count; n++)
-        if (lift_at(b, b->slices + n, q).normal != 0.0) return true;
+static bool cavitates_at(Balance *b, const double q[RATES]) {
+    for (Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
+        set_lift(b, s, q);
+        if (s->lift.normal != 0.0) return true;
+    }
     return false;
 }
 
@@ -417,9 +420,8 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
     }
     for (int64_t n = 0; n < b->slice_count; n++) {
         const Slice *s = b->slices + n;
-        const Lift of_slice = lift_at(b, s, q);
         for (int i = 0; i < RATES; i++) {
-            const double force = s->length * (of_slice.normal * s->opening[i] + of_slice.along * s->entrainment[i]);
+            const double force = s->length * (s->lift.normal * s->opening[i] + s->lift.along * s->entrainment[i]);
             if (i < 3) lift[i] += force;
             seen->dissipated_power -= force * q[i];
         }
