@@ -17,7 +17,7 @@
  */
 #include "cavitation.h"
 
-enum { MOMENTS = 5, ROUNDS = 100 };
+enum { MOMENTS = 5, ROUNDS = 100, GUESSED = 8 };
 static const double FAR = 1e8; /* in s: no cavity is as wide */
 
 /* Integrals K_n of xi^n/(1 + xi^2)^3 from -infinity up to a place, n = 0 to 4. */
@@ -51,23 +51,36 @@ static double excess(double a, double b, double xi, double k[MOMENTS]) {
     return a * (k[2] - xi * xi * k[0]) + b * (k[1] - xi * k[0]) + 1.0;
 }
 
-/* The edge of the cavity behind a film that comes from -infinity, and the moments up to it: by Newton's method between
- * bounds that are found first. */
-static double edge_of(double a, double b, double k[MOMENTS]) {
+/* Newton's step for an edge, with the moments up to the place after it where it is small: the next one is its square. */
+static bool step_edge(double a, double b, double *xi, double k[MOMENTS], double *over) {
+    *over = excess(a, b, *xi, k);
+    const double moved = *over / ((2.0 * a * *xi + b) * k[0]);
+    const bool found = fabs(moved) <= 1e-8 * (1.0 + fabs(*xi));
+    if (found) {
+        const double wide = 1.0 + *xi * *xi;
+        double density = moved / (wide * wide * wide);
+        for (int n = 0; n < MOMENTS; n++, density *= *xi) k[n] += density;
+    }
+    *xi += moved;
+    return found;
+}
+
+/* The edge of the cavity behind a film that comes from -infinity, and the moments up to it: by Newton's method from a
+ * guess (NaN: none), else between bounds that are found first. */
+static double edge_of(double a, double b, double guess, double k[MOMENTS]) {
+    double over;
+    for (int round = 0; round < GUESSED && 2.0 * a * guess + b > 0.0; round++)
+        if (step_edge(a, b, &guess, k, &over)) return guess;
     const double turn = clamped(-0.5 * b / a, -FAR, FAR); /* where 2 a xi + b is zero; none without a */
     double low = a > 0.0 ? turn : -1.0, high = a < 0.0 ? turn : 1.0;
     for (double far = 1.0; !(a > 0.0) && excess(a, b, low, k) < 0.0; far *= 2.0) low = high - 2.0 * far - 1.0;
     for (double far = 1.0; !(a < 0.0) && (high <= low || excess(a, b, high, k) > 0.0); far *= 2.0) high = low + far;
     double xi = 0.5 * (low + high);
     for (int round = 0; round < ROUNDS; round++) {
-        const double over = excess(a, b, xi, k);
+        double next = xi;
+        if (step_edge(a, b, &next, k, &over)) return next;
         *(over > 0.0 ? &low : &high) = xi;
-        const double slope = -(2.0 * a * xi + b) * k[0];
-        double next = xi - over / slope;
-        if (!(low < next && next < high)) next = 0.5 * (low + high);
-        const double moved = fabs(next - xi);
-        xi = next;
-        if (moved <= 1e-8 * (1.0 + fabs(xi))) break; /* the next one would be its square */
+        xi = low < next && next < high ? next : 0.5 * (low + high);
     }
     set_moments(xi, k);
     return xi;
@@ -79,9 +92,9 @@ typedef struct {
     double normal_a, normal_b, along_a, along_b; /* normal_a is twice along_b */
 } Side;
 
-static Side side_of(double a, double b) {
+static Side side_of(double a, double b, double *guess) {
     double k[MOMENTS];
-    const double edge = edge_of(a, b, k);
+    const double edge = *guess = edge_of(a, b, *guess, k);
     return (Side){
         .normal = -(a * (k[3] - edge * edge * k[1]) + b * (k[2] - edge * k[1])),
         .along = -0.5 * (a * (k[4] - edge * edge * k[2]) + b * (k[3] - edge * k[2])),
@@ -121,12 +134,12 @@ bool is_near_cavitation(const LineContact *c, double viscosity, double bound) {
     return is_near(film.a, film.b);
 }
 
-Lift cavitation_lift(const LineContact *c, double viscosity, double bound) {
+Lift cavitation_lift(const LineContact *c, double viscosity, double bound, double edges[2]) {
     const Scaled film = scaled(c, viscosity, bound);
     const double s = film.s, per_u = film.per_u, per_v = film.per_v, a = film.a, b = film.b;
     if (!is_near(a, b) || !cavitates(a, b)) return (Lift){0};
     /* less the linear film, whose integrals are -pi b/8 and -pi a/6 */
-    const Side before = side_of(a, b), behind = side_of(-a, b);
+    const Side before = side_of(a, b, edges), behind = side_of(-a, b, edges + 1);
     const double normal = bound * s, along = 2.0 * bound * c->gap; /* s^2/R' = 2 h0 */
     return (Lift){
         .normal = normal * (before.normal + behind.normal + 0.125 * PI * b),
@@ -142,7 +155,8 @@ EXPORT void lift_of_cavitation(const double *gap, const double *bend, const doub
                                double viscosity, double bound, double *out, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
         const LineContact contact = {gap[n], bend[n], opening[n], entrainment[n]};
-        const Lift lift = cavitation_lift(&contact, viscosity, bound);
+        double edges[2] = {NAN, NAN};
+        const Lift lift = cavitation_lift(&contact, viscosity, bound, edges);
         const double row[6]
             = {lift.normal,           lift.along, lift.of_opening[0], lift.of_opening[1], lift.of_entrainment[0],
                lift.of_entrainment[1]};

@@ -20,6 +20,7 @@ typedef struct {
 } Lift;
 
 bool is_near_cavitation(const LineContact *contact, double viscosity, double bound);
-Lift cavitation_lift(const LineContact *contact, double viscosity, double bound);
+/* `edges` of the cavity, over s, are guesses (NaN: none), and become those that were found. */
+Lift cavitation_lift(const LineContact *contact, double viscosity, double bound, double edges[2]);
 
 #endif

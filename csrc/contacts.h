@@ -53,7 +53,10 @@ typedef struct {
 typedef struct {
     double gap, bend;                          /* h0, R', m */
     double length;                             /* along the body, m */
+    double share;                              /* of its pressure that the ends of the film leave */
     double opening[RATES], entrainment[RATES]; /* V and u per rate */
+    double edges[2];                           /* of its cavity where it was last looked for, over s; NaN: nowhere */
+    Lift lift;                                 /* at the rates that were last tried */
 } Slice;
 
 enum { MOST_SLICES = 24 };
@@ -71,8 +74,8 @@ typedef struct {
     bool prescribed;         /* whether the spin q_3 + q_6 is */
 } Balance;
 
-Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]);
+void set_lift(const Balance *balance, Slice *slice, const double q[RATES]);
 Sliding sliding_at(const Contact *contact, const double q[RATES], double slow);
-double balance_rates(const Balance *balance, double q[RATES], double left[RATES]);
+double balance_rates(Balance *balance, double q[RATES], double left[RATES]);
 
 #endif

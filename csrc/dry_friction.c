@@ -24,20 +24,21 @@ Sliding sliding_at(const Contact *contact, const double q[RATES], double slow) {
     return (Sliding){u, v, contact->load / sqrt(u * u + v * v + slow * slow)};
 }
 
-Lift lift_at(const Balance *balance, const Slice *slice, const double q[RATES]) {
+/* Set the lift of a slice at rates. */
+void set_lift(const Balance *balance, Slice *slice, const double q[RATES]) {
     LineContact contact = {.gap = slice->gap, .bend = slice->bend};
     for (int i = 0; i < RATES; i++) {
         contact.opening += slice->opening[i] * q[i];
         contact.entrainment += slice->entrainment[i] * q[i];
     }
-    return cavitation_lift(&contact, balance->viscosity, balance->bound);
+    slice->lift = cavitation_lift(&contact, slice->share * balance->viscosity, balance->bound, slice->edges);
 }
 
 static int skipped_row(const Balance *b) { return b->prescribed ? b->along : -1; }
 
-/* What rates leave of the balance, and the lifts of its slices; its size, in the measure of A's diagonal, without the row
- * of a torque. */
-static double residual(const Balance *b, const double q[RATES], double left[RATES], Lift lifts[MOST_SLICES]) {
+/* What rates leave of the balance, with the lifts of its slices; its size, in the measure of A's diagonal, without the
+ * row of a torque. */
+static double residual(Balance *b, const double q[RATES], double left[RATES]) {
     for (int i = 0; i < RATES; i++) {
         left[i] = -b->force[i];
         for (int j = 0; j < RATES; j++) left[i] += b->a[i][j] * q[j];
@@ -47,10 +48,14 @@ static double residual(const Balance *b, const double q[RATES], double left[RATE
         for (int i = 0; i < RATES; i++) left[i] += s.drag * (c->rows[0][i] * s.u + c->rows[1][i] * s.v);
     }
     for (int64_t n = 0; n < b->slice_count; n++) {
-        const Slice *s = b->slices + n;
-        lifts[n] = lift_at(b, s, q);
+        Slice *s = b->slices + n;
+        if (n > 0 && isnan(s->edges[0])) { /* its neighbour's are near */
+            s->edges[0] = s[-1].edges[0];
+            s->edges[1] = s[-1].edges[1];
+        }
+        set_lift(b, s, q);
         for (int i = 0; i < RATES; i++)
-            left[i] -= s->length * (lifts[n].normal * s->opening[i] + lifts[n].along * s->entrainment[i]);
+            left[i] -= s->length * (s->lift.normal * s->opening[i] + s->lift.along * s->entrainment[i]);
     }
     double size = 0.0;
     for (int i = 0; i < RATES; i++)
@@ -72,7 +77,8 @@ static double scale_of(const Balance *b, const double q[RATES]) {
 }
 
 /* Take the derivative of a slice's lift from the derivative of the balance. */
-static void add_slice(const Slice *s, Lift lift, double h[RATES][RATES]) {
+static void add_slice(const Slice *s, double h[RATES][RATES]) {
+    const Lift lift = s->lift;
     for (int i = 0; i < RATES; i++) {
         const double v = s->length * (s->opening[i] * lift.of_opening[0] + s->entrainment[i] * lift.of_opening[1]);
         const double u
@@ -85,8 +91,7 @@ static void add_slice(const Slice *s, Lift lift, double h[RATES][RATES]) {
  *
  * mu_c N_c J_c' (1 - (w v' + v w')/(2 s)) J_c/s with v = J_c q, s = sqrt(|v|^2 + v_r^2): positive definite, and the
  * derivative itself where w = v/s. */
-static void set_tangent(const Balance *b, const Duals duals, const double q[RATES], const Lift lifts[MOST_SLICES],
-                        double h[RATES][RATES]) {
+static void set_tangent(const Balance *b, const Duals duals, const double q[RATES], double h[RATES][RATES]) {
     for (int i = 0; i < RATES; i++)
         for (int j = 0; j < RATES; j++) h[i][j] = b->a[i][j];
     for (int64_t n = 0; n < b->count; n++) {
@@ -100,7 +105,7 @@ static void set_tangent(const Balance *b, const Duals duals, const double q[RATE
             for (int j = 0; j < RATES; j++) h[i][j] += x * c->rows[0][j] + z * c->rows[1][j];
         }
     }
-    for (int64_t n = 0; n < b->slice_count; n++) add_slice(b->slices + n, lifts[n], h);
+    for (int64_t n = 0; n < b->slice_count; n++) add_slice(b->slices + n, h);
 }
 
 /* Largest share of a step from w that stays in the unit circle. */
@@ -136,14 +141,13 @@ static double along_step(const Balance *b, const double left[RATES], const doubl
 
 /* Move q along a step to where the residual along it, which grows, is small; the residual's size. Where a prescribed spin
  * bends the step from that of the convex function, the size decides too. */
-static double take_step(const Balance *b, double before, const double step[RATES], double q[RATES], double left[RATES],
-                        Lift lifts[MOST_SLICES]) {
+static double take_step(Balance *b, double before, const double step[RATES], double q[RATES], double left[RATES]) {
     const double begin = along_step(b, left, step);
     const bool descends = begin < 0.0 || !b->prescribed;
     double low = 0.0, high = INFINITY, share = 1.0, size = 0.0, trial[RATES];
     for (int round = 0; round < (descends ? 60 : 10); round++) {
         for (int i = 0; i < RATES; i++) trial[i] = q[i] + share * step[i];
-        size = residual(b, trial, left, lifts);
+        size = residual(b, trial, left);
         if (b->prescribed && (size <= 0.5 * before || (!descends && size < before))) break;
         const double here = along_step(b, left, step);
         if (descends && here <= -0.5 * fabs(begin))
@@ -176,11 +180,10 @@ static void find_step(const Balance *b, double h[RATES][RATES], const double lef
  * Newton's method for rates and duals, the directions of sliding (T. F. Chan, G. H. Golub, P. Mulet, SIAM J. Sci.
  * Comput. 20:1964, 1999), which converges for any v_r. Where the spin q_3 + q_6 is prescribed, q has it at first and
  * keeps it, and a torque along one rate is left as that row's residual. */
-double balance_rates(const Balance *b, double q[RATES], double left[RATES]) {
+double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
     double h[RATES][RATES], step[RATES];
     Duals duals;
-    Lift lifts[MOST_SLICES];
-    double size = residual(b, q, left, lifts);
+    double size = residual(b, q, left);
     const double scale = larger(scale_of(b, q), 1e-300);
     for (int64_t n = 0; n < b->count; n++) {
         const Sliding s = sliding_at(b->contacts + n, q, b->slow);
@@ -189,11 +192,11 @@ double balance_rates(const Balance *b, double q[RATES], double left[RATES]) {
         duals[n][1] = s.v / speed;
     }
     for (int round = 0; round < ROUNDS && !(size <= BALANCED * scale); round++) {
-        set_tangent(b, duals, q, lifts, h);
+        set_tangent(b, duals, q, h);
         find_step(b, h, left, step);
         move_duals(b, q, step, duals);
         const double before = size;
-        size = take_step(b, before, step, q, left, lifts);
+        size = take_step(b, before, step, q, left);
         if (size > 0.5 * before && size <= 1e4 * BALANCED * scale) break; /* rounding */
     }
     return size / scale;

@@ -154,25 +154,38 @@ static void yaw_powers(double share, double out[YAW_ORDERS]) {
     }
 }
 
-static void add_weighted(double weight, const double *restrict values, int64_t count, double *restrict out) {
-    for (int64_t n = 0; n < count; n++) out[n] += weight * values[n];
+enum { MOST_TERMS = MOST_NODES * MOST_NODES * (1 + YAW_ORDERS) };
+
+/* Terms of the interpolation: weights, and blocks of (phases, FACTOR) values. */
+typedef struct {
+    int64_t count;
+    double weights[MOST_TERMS];
+    const double *values[MOST_TERMS];
+} Terms;
+
+static void add_term(Terms *terms, double weight, const double *values) {
+    terms->weights[terms->count] = weight;
+    terms->values[terms->count++] = values;
 }
 
-/* Add several, in their order: four at a time, so that what they are added to is read and written less often. */
-static void add_series(const double *weights, const double *const *values, int64_t terms, int64_t count,
-                       double *restrict out) {
+/* Sum the terms in their order, six in one pass over the sums. */
+static void sum_terms(const Terms *terms, int64_t count, double *restrict out) {
     int64_t k = 0;
-    for (; k + 4 <= terms; k += 4) {
-        const double p = weights[k], q = weights[k + 1], r = weights[k + 2], s = weights[k + 3];
-        const double *a = values[k], *b = values[k + 1], *c = values[k + 2], *d = values[k + 3];
-#pragma omp simd
-        for (int64_t n = 0; n < count; n++) out[n] = out[n] + p * a[n] + q * b[n] + r * c[n] + s * d[n];
+    for (int64_t n = 0; n < count; n++) out[n] = 0.0;
+    for (; k + 6 <= terms->count; k += 6) {
+        const double *w = terms->weights + k, *const *v = terms->values + k;
+        const double *restrict v0 = v[0], *restrict v1 = v[1], *restrict v2 = v[2], *restrict v3 = v[3];
+        const double *restrict v4 = v[4], *restrict v5 = v[5];
+        const double w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3], w4 = w[4], w5 = w[5];
+        for (int64_t n = 0; n < count; n++)
+            out[n] = out[n] + w0 * v0[n] + w1 * v1[n] + w2 * v2[n] + w3 * v3[n] + w4 * v4[n] + w5 * v5[n];
     }
-    for (; k < terms; k++) add_weighted(weights[k], values[k], count, out);
+    for (; k < terms->count; k++)
+        for (int64_t n = 0; n < count; n++) out[n] += terms->weights[k] * terms->values[k][n];
 }
 
 /* Add what a share of the largest yaw makes of the coefficients. */
-static void add_yaw(const Table *table, const Position *p, double share, double *out) {
+static void add_yaw(const Table *table, const Position *p, double share, Terms *terms) {
     const int64_t gaps = table->yaw_gaps, pitches = table->yaw_pitches, block = table->phases * FACTOR;
     const double *nodes = table->yaw_pitch_nodes;
     double of_gap[MOST_NODES], of_pitch[MOST_NODES], sizes[MOST_NODES], powers[YAW_ORDERS];
@@ -184,15 +197,12 @@ static void add_yaw(const Table *table, const Position *p, double share, double 
     for (int64_t j = 0; j < count; j++) sizes[j] = fabs(nodes[level + step * j]);
     pitch_weights(sizes, count, fabs(p->f), BEYOND_YAWED, of_pitch);
     yaw_powers(clamped(share, -YAW_SLACK, YAW_SLACK), powers);
-    double weights[MOST_NODES * YAW_ORDERS];
-    const double *values[MOST_NODES * YAW_ORDERS];
     for (int64_t i = 0; i < gaps; i++) {
-        for (int64_t k = 0; k < count * YAW_ORDERS; k++) {
-            const int64_t j = k / YAW_ORDERS, n = k % YAW_ORDERS;
-            weights[k] = of_gap[i] * of_pitch[j] * powers[n];
-            values[k] = table->yawed + ((i * pitches + level + step * j) * YAW_ORDERS + n) * block;
+        for (int64_t j = 0; j < count; j++) {
+            const double *node = table->yawed + (i * pitches + level + step * j) * YAW_ORDERS * block;
+            const double weight = of_gap[i] * of_pitch[j];
+            for (int n = 0; n < YAW_ORDERS; n++) add_term(terms, weight * powers[n], node + n * block);
         }
-        add_series(weights, values, count * YAW_ORDERS, block, out);
     }
 }
 
@@ -203,24 +213,22 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
     const int64_t pitches = lowered ? table->down : table->up;
     double of_pitch[MOST_NODES];
     pitch_weights(lowered ? table->down_nodes : table->up_nodes, pitches, fabs(p->f), BEYOND, of_pitch);
-    double weights[MOST_NODES * MOST_NODES];
-    const double *values[MOST_NODES * MOST_NODES];
+    Terms terms;
+    terms.count = 0;
     for (int64_t i = 0; i < table->gaps; i++) {
         for (int64_t j = 0; j < pitches; j++) {
             const int64_t column = lowered && j > 0 ? table->up + j - 1 : j;
-            weights[i * pitches + j] = p->of_gap[i] * of_pitch[j];
-            values[i * pitches + j] = table->outer + (i * columns + column) * block;
+            add_term(&terms, p->of_gap[i] * of_pitch[j], table->outer + (i * columns + column) * block);
         }
     }
-    for (int64_t n = 0; n < block; n++) out[n] = 0.0;
-    add_series(weights, values, table->gaps * pitches, block, out);
+    int left = p->within ? INSIDE : TOO_FAR_PITCHED;
     if (pose.yaw != 0.0) {
         const double most = largest_yaw_at(table->yaw_limit, pose.offset / table->radius, p->yawed_pitch);
-        if (!(table->yaw_gaps > 0)) return TOO_FAR_YAWED;
-        add_yaw(table, p, pose.yaw / most, out);
-        if (!(fabs(pose.yaw) <= YAW_SLACK * most)) return TOO_FAR_YAWED;
+        if (table->yaw_gaps > 0) add_yaw(table, p, pose.yaw / most, &terms);
+        if (!(table->yaw_gaps > 0 && fabs(pose.yaw) <= YAW_SLACK * most)) left = TOO_FAR_YAWED;
     }
-    return p->within ? INSIDE : TOO_FAR_PITCHED;
+    sum_terms(&terms, block, out);
+    return left;
 }
 
 /* Fill the matrix with a share of the film's resistance, and the film with it. */
@@ -239,7 +247,8 @@ static void add_outer(const double *coefficients, int64_t phases, double phase, 
     for (int k = 0; k < FACTOR; k++) factor[k] = coefficients[k];
     for (int64_t m = 1; m < phases; m++) {
         const double angle = (double)((m + 1) / 2) * phase;
-        add_weighted(m % 2 == 1 ? cos(angle) : sin(angle), coefficients + m * FACTOR, FACTOR, factor);
+        const double weight = m % 2 == 1 ? cos(angle) : sin(angle);
+        for (int k = 0; k < FACTOR; k++) factor[k] += weight * coefficients[m * FACTOR + k];
     }
     for (int i = 0; i < MOTIONS; i++) {
         double *row = factor + i * (i + 1) / 2;

@@ -64,27 +64,30 @@ def test_sliding_films(pitch: float, yaw: float, most: float) -> None:
 @pytest.mark.parametrize(
     ("gap", "pitch", "yaw", "turning", "bound", "most"),
     [
-        (2e-6, 0.0, 0.0, 0.06, 1e4, 0.05),
-        (1e-6, 0.0, 0.6, 0.02, 1e4, 0.05),
-        (1e-6, 0.1, 0.0, 0.06, 1e4, 0.3),
-        (1e-6, 0.02, 0.0, 0.06, 1e5, 0.35),
+        (2e-6, 0.0, 0.0, 0.06, 1e4, 0.03),
+        (1e-6, 0.0, 0.6, 0.02, 1e4, 0.03),
+        (1e-6, 0.1, 0.0, 0.06, 1e4, 0.1),
+        (1e-6, 0.02, 0.0, 0.06, 1e5, 0.1),
     ],
 )
 def test_lift_of_a_rotating_cylinder(
     gap: float, pitch: float, yaw: float, turning: float, bound: float, most: float
 ) -> None:
-    """Slices lift more than the film in two dimensions, which takes up oil along the body too where it is pitched."""
+    """Slices with less pressure near both ends, as csrc/tube_motion.c has them."""
     pose = (np.radians(pitch), np.radians(yaw))
     found = cylinder(gap, *pose)
     linear, lifted = (found.solve({ROLL: turning}, OIL, p)[0][Z] for p in (np.inf, bound))
     x = np.linspace(-0.5, 0.5, 401) * LENGTH
     h = TUBE - BODY - np.hypot(offset_at(gap, *pose) - x * pose[0], x * pose[1])
-    out, flat = np.empty((x.size, 6)), np.ones_like(x)
-    numbers = (h, BODY * TUBE / (TUBE - BODY) * flat, 0.0 * flat, 0.5 * BODY * turning * flat)
-    lift_of_cavitation(*numbers, OIL, bound, out)
-    sliced = float(np.trapezoid(out[:, 0], x))
+    bend = BODY * TUBE / (TUBE - BODY)
+    from_end = (0.5 * LENGTH - np.abs(x)) / np.sqrt(2.0 * bend * h)
+    sliced, out = np.empty(x.size), np.empty((1, 6))
+    for n, share in enumerate(1.0 - np.exp(-1.85 * from_end)):
+        numbers = (np.array([number]) for number in (h[n], bend, 0.0, 0.5 * BODY * turning))
+        lift_of_cavitation(*numbers, share * OIL + 1e-12, bound, out)
+        sliced[n] = out[0, 0]
     assert abs(linear) < 1e-6 * lifted
-    assert 0.0 < sliced / lifted - 1.0 < most
+    assert float(np.trapezoid(sliced, x)) == pytest.approx(lifted, rel=most)
 
 
 def test_the_grid_is_converged() -> None:

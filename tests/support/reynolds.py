@@ -11,10 +11,14 @@ up no less than what the gap opens (Swift, Stieber): a linear complementarity pr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
+
+from spirillum.dynamics.run_file import robot_of
 
 _ROUNDS = 60
 
@@ -147,3 +151,32 @@ class ShortCylinder:
         q_x, _ = slopes(flux(x[:, None], ym[None], 0), flux(xm[:, None], y[None], 0))
         _, q_y = slopes(flux(x[:, None], ym[None], 1), flux(xm[:, None], y[None], 1))
         return np.broadcast_to(v[2] - v[0] * z_x - v[1] * z_y + q_x + q_y, z_x.shape)
+
+
+def film_of_run(moment: Any, cells: tuple[int, int] = (90, 90)) -> tuple[ShortCylinder, dict[int, float]]:
+    """The straight side of the body at one sample of a run in a tube, and its rates; for yaws up to 3 degrees."""
+    robot = robot_of(moment)
+    body, tube = robot.body, 0.5 * robot.channel.diameter
+    rear, front = (0.5 * body.length - body.rounding(end) for end in (body.rear_end, body.front_end))
+    angles = [float(moment[name]) for name in ("azimuth", "wall_yaw", "wall_pitch")]
+    local = Rotation.from_euler("XZY", angles * np.array([1.0, 1.0, -1.0])).as_matrix()
+    axis = Rotation.from_euler("X", angles[0]).as_matrix().T @ local[:, 0]
+    middle = 0.5 * (front - rear) * axis + [0.0, 0.0, -float(moment["offset"])]
+    # Axes from the tube's axis over the middle of the side, which need not be where the origin is nearest.
+    turned = Rotation.from_euler("X", np.arctan2(middle[1], -middle[2])).as_matrix().T
+    to_middle = turned @ Rotation.from_euler("X", angles[0]).as_matrix().T
+    spin = moment["angular_velocity"].values
+    at = to_middle @ (moment["velocity"].values + np.cross(spin, 0.5 * (front - rear) * local[:, 0]))
+    rates = np.concatenate([at, turned @ local.T @ spin])
+    _, yaw, pitch = np.arcsin(to_middle @ local[:, 0])
+    offset = float(np.hypot(*middle[1:]))
+    cylinder = ShortCylinder(0.5 * body.diameter, front + rear, tube, offset, float(pitch), float(yaw), cells)
+    return cylinder, dict(enumerate(rates.tolist()))
+
+
+def run_lift(moment: Any) -> float:
+    """What cavitation adds to the film's force away from the wall at one sample of a run, N."""
+    fluid = robot_of(moment).fluid
+    cylinder, rates = film_of_run(moment)
+    linear, bounded = (cylinder.solve(rates, fluid.viscosity, p)[0][2] for p in (np.inf, fluid.cavitation_pressure))
+    return float(bounded - linear)
