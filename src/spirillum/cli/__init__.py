@@ -83,6 +83,7 @@ def _prepare() -> None:
     # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
     os.environ["MPLBACKEND"] = "agg"
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"  # else every installed package is searched for them
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # what is wrong with a picture is said in a sentence
     try:
         Path.home()

@@ -39,6 +39,7 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
     "font.size": 9.0,
     "mathtext.fontset": "dejavusans",
     "axes.titlesize": 9.0,
+    "axes.titley": 1.0,
     "axes.labelsize": 9.0,
     "axes.linewidth": 0.7,
     "axes.edgecolor": "#444444",
