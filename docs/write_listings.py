@@ -158,7 +158,7 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
             yield from field_rows(below, f"{path}.")
             continue
         kind = _kind(info)
-        yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "")
+        yield f"`{path}`", _default(info, kind), _allowed(info, kind), words.get(name, "").replace(" (here None)", "")
 
 
 def _fields(rows: Rows) -> str:
@@ -209,7 +209,7 @@ def quantities() -> str:
     """The quantities of a prediction."""
     from spirillum.swimming.steady import STEADY
 
-    return items((f"`{item.name}`", f"{item.unit}; {item.source}", item.meaning) for item in STEADY)
+    return items((f"`{item.name}`", item.unit, item.meaning) for item in STEADY)
 
 
 @lru_cache(maxsize=1)
@@ -370,13 +370,13 @@ def sweep_variables() -> str:
 
 
 def claims() -> str:
-    """The verdicts of the paper's study without observations: a table of what is decided, a list of what is not."""
+    """The verdicts of the paper's study without observations: a table of what is decided, a count of what is not."""
     from spirillum.papers.registry import claims_of
 
     found = claims_of(_studied())
     rows = [(c.claim, c.paper, c.computed, c.verdict) for c in found if c.verdict != "undecidable"]
-    others = "".join(f"- {_cell(c.claim)}: {_cell(c.paper)}\n" for c in found if c.verdict == "undecidable")
-    return table(("Statement", "Paper", "Computed", "Verdict"), rows) + f"\nUndecidable:\n\n{others}"
+    others = f"Undecidable: {len(found) - len(rows)} statements.\n"
+    return table(("Statement", "Paper", "Computed", "Verdict"), rows) + f"\n{others}"
 
 
 def study_figure(name: str) -> str:
@@ -494,14 +494,22 @@ def reference_list() -> str:
 def command_options(words: str) -> str:
     """Arguments and options of a command, those that it shares with others by name alone, the usual ones not at all."""
     shared = _shared_options()
-    found = _options_of(words)
+    found = [option for option in _options_of(words) if words != "study" or not _is_study_field(option)]
     lines = [_item(option._replace(meaning=_brief(option.meaning))) for option in found if option not in shared]
     names = [option.names[-1] for option in found if option in shared and option.names[-1] not in _USUAL]
-    pose = [name for name in names if name in _POSE]
-    if len(pose) == len(_POSE):
-        names = ["pose", *(name for name in names if name not in pose)]
-    words = ", ".join(name if name == "pose" else f"`{name}`" for name in names)
+    for group, members in _GROUPS.items():
+        if set(members) <= set(names):
+            names = [group, *(name for name in names if name not in members)]
+    words = ", ".join(name if name in _GROUPS else f"`{name}`" for name in names)
     return "".join(lines) + ("\n" if lines and words else "") + (f"Shared: {words}.\n" if words else "")
+
+
+def _is_study_field(option: Option) -> bool:
+    """Whether an option of `study` sets the field of its name, which the study file's list explains."""
+    from spirillum.studies.spec import Study
+
+    field = Study.model_fields.get(option.names[-1].removeprefix("--"))
+    return field is not None and field.annotation is bool
 
 
 def _brief(meaning: str) -> str:
@@ -514,8 +522,14 @@ def _brief(meaning: str) -> str:
 
 _USUAL = ("--set", "--json", "--notes")
 """Options of nearly every command, which the page names once."""
-_POSE = ("--gap", "--eccentricity", "--pitch", "--yaw", "--ends", "--flow")
-"""Options that the page calls the pose."""
+_GROUPS = {
+    "pose": ("--gap", "--eccentricity", "--pitch", "--yaw", "--ends", "--flow"),
+    "camera": (
+        *("--view", "--direction", "--fps", "--size", "--noise", "--lamp-drift", "--crf", "--dropped", "--tilt"),
+        *("--glare", "--glare-fixed", "--bubbles", "--hand", "--preset"),
+    ),
+}
+"""Options that the page names together."""
 _EXAMPLE = re.compile(r"(?:, |; )such as -?[\d.]+ ?[A-Za-z/]+(?=[.;,]|$)")
 """An example of a value with its unit, of which the page has one for every kind."""
 
@@ -537,9 +551,8 @@ class Option(typing.NamedTuple):
 
 def _item(option: Option) -> str:
     names = ", ".join(f"`{name}`" for name in option.names) + (f" `{option.metavar}`" if option.metavar else "")
-    default = f" Default: `{option.default}`." if option.default not in ("", "required") else ""
-    needed = " (required)" if option.default == "required" else ""
-    return f"- {names}{needed}: {_cell(option.meaning)}{default}\n"
+    default = "required" if option.default == "required" else option.default and f"`{option.default}`"
+    return f"- {names}{f' ({default})' if default else ''}: {_cell(option.meaning)}\n"
 
 
 @lru_cache(maxsize=1)
