@@ -69,8 +69,8 @@ CAUTIONS = {
         "fit in this channel."
     ),
     "fit-other-motion": (
-        "Numbers were fitted to robots held at a pose, and are used for free motion: intervals need not contain the "
-        "observations."
+        "Numbers were fitted to robots held at a pose and are used for free motion, or to trials and are used for "
+        "held motion: intervals need not contain the observations."
     ),
     "field-slips": (
         "The field turns as fast as, or faster than, the step-out rate: rates and speed are averages over slips. "

@@ -66,6 +66,11 @@ def test_planted_numbers_are_found_and_predicted_again(truth, observed: Path, tm
         assert all(0.0 < share < 1.0 for share in one.narrowing.values())
     with pytest.raises(InputError, match="suggest --as trial"):
         sp.suggest(tmp_path / "fit" / "posterior.nc", "biorob2012-wide")
+    with_draws = sp.predict("biorob2012-wide", posterior=tmp_path / "fit" / "posterior.nc", interval=True).trial
+    assert with_draws is not None
+    speed = with_draws.intervals["forward_velocity"]
+    assert speed.low < truth[25.0].values["forward_velocity"] < speed.high
+    assert not {"friction_coefficient", "friction.effective"} & {one["name"] for one in with_draws.basis["unknowns"]}
     again = sp.predict("biorob2012-wide", calibration=tmp_path / "fit" / "calibration.toml").trial
     assert again is not None
     assert again.values["forward_velocity"] == pytest.approx(truth[25.0].values["forward_velocity"], rel=0.15)

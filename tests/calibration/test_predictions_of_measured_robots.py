@@ -187,7 +187,7 @@ def test_runs_take_model_and_motion_of_what_was_fitted(fitted: Any) -> None:
         sp.simulate(WIDE, model="rft", posterior=folder / "posterior.nc", timing=timing)
     with pytest.raises(sp.InputError, match="a posterior alone"):
         sp.simulate(WIDE, posterior=folder / "posterior.nc", calibration=folder / "calibration.toml")
-    with pytest.raises(sp.InputError, match="draws = 5; allowed: a whole number from 20 to 1000"):
+    with pytest.raises(sp.InputError, match="draws = 5; allowed: a whole number from 20 to 1000, or 0"):
         sp.simulate(WIDE, posterior=folder / "posterior.nc", draws=5, timing=timing)
 
 

@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+import posteriors
 import spirillum as sp
 from spirillum.cli.tables.parts import released_columns
-from spirillum.dynamics.trial import RUNS, UNKNOWNS, open_unknowns, samples_of, variance_shares, with_interval
+from spirillum.dynamics.trial import (
+    RUNS,
+    UNKNOWNS,
+    open_unknowns,
+    samples_of,
+    samples_of_draws,
+    variance_shares,
+    with_interval,
+)
+from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.links import links_of
 from spirillum.swimming.released_motion import ReleasedMotion
 
@@ -86,6 +96,69 @@ def test_what_is_stated_is_not_varied() -> None:
     along = along - links_of(known).body.centre[0]  # of uniform density
     assert (along.min(), along.max()) == pytest.approx((-0.05 * length, 0.05 * length), rel=0.1)
     assert (aside.min(), aside.max()) == pytest.approx((0.0, 0.05 * radius), abs=0.005 * radius)
+
+
+COEFFICIENTS = (0.08, 0.1, 0.14)
+
+
+def posterior() -> PosteriorFile:
+    """Three draws of a fit of trials, made up."""
+    draws = {"friction_coefficient": np.array([COEFFICIENTS]).T}
+    return PosteriorFile(
+        source="made up",
+        sha256="",
+        model="tube",
+        observations="none",
+        synthetic=True,
+        channels=(0.04,),
+        body=(0.018, 0.035),
+        draws=draws,
+        middle={name: np.median(values, axis=0) for name, values in draws.items()},
+        discrepancy={},
+        error={},
+        friction=(),
+        answer="trial",
+    )
+
+
+def test_draws_of_a_fit_take_the_place_of_what_it_determines() -> None:
+    unknowns = open_unknowns(WIDE, WEIGHT, {**NOTHING, "friction_coefficient": 0.1})
+    found, plain = samples_of_draws(WIDE, WEIGHT, unknowns, posterior()), samples_of(WIDE, WEIGHT, unknowns)
+    assert {one.friction_coefficient for one in found} == {None}  # that of the draw
+    assert [one.draw for one in found] == [number % len(COEFFICIENTS) for number in range(RUNS)]
+    assert [one.wait for one in found] == [one.wait for one in plain]
+    assert [one.robot.body.mass for one in found] == [one.robot.body.mass for one in plain]
+
+
+def test_a_discrepancy_widens_the_interval_of_what_it_acts_on() -> None:
+    unknowns = open_unknowns(WIDE, WEIGHT, NOTHING)
+    samples = samples_of(WIDE, WEIGHT, unknowns)
+    factors, speeds = np.linspace(0.9, 1.1, RUNS), np.array([1e-3 / one.wait for one in samples if one.wait])
+    found = with_interval(
+        motion(1e-4),
+        samples,
+        unknowns,
+        lambda sample: motion(1e-3 / (sample.wait or 1.0)),
+        discrepancy=lambda _, runs: {"forward_velocity": factors[: len(runs)]},
+    )
+    ends = np.quantile(speeds * factors, [0.5, 0.05, 0.95])
+    speed = found.intervals["forward_velocity"]
+    assert (speed.median, speed.low, speed.high) == pytest.approx(ends, rel=1e-12)
+
+
+def test_the_trial_of_a_posterior_is_the_run_of_its_median(tmp_path: Path) -> None:
+    """`simulate` with draws 0; the held answer of a fit of trials has no interval, and says so."""
+    free = {"friction_coefficient": 0.02, "shared_friction": 1.1e-5}
+    path = posteriors.write_trials(tmp_path / "posterior.nc", free)
+    found = sp.predict("biorob2012-wide", posterior=path, duration="1 s")
+    run = sp.simulate("biorob2012-wide", posterior=path, draws=0, timing={"duration": "1 s"})
+    assert found.trial is not None
+    assert found.trial.values["forward_velocity"] == pytest.approx(float(run["mean_forward_velocity_on"]), rel=1e-9)
+    assert run.attrs["friction_coefficient"] == pytest.approx(0.02, rel=0.05)
+    assert found.intervals is None
+    assert any("the held answer has its median and no interval" in str(note) for note in found.warnings)
+    with pytest.raises(sp.InputError, match="which was fitted to trials; allowed: motion 'free'"):
+        sp.simulate("biorob2012-wide", posterior=path, motion="held")
 
 
 def test_the_page_of_unknowns_lists_all_of_them() -> None:

@@ -35,13 +35,24 @@ def attributes() -> dict[str, Any]:
     }
 
 
-def write(path: Path, about: dict[str, Any] | None = None, draws: np.ndarray | None = None) -> Path:
+def write_trials(path: Path, free: dict[str, float]) -> Path:
+    """Write a posterior of trials by `tube`, with draws a tenth about some numbers."""
+    about = attributes() | {"model": "tube", "answer": "trial", "friction": "[]", "free": json.dumps(list(free))}
+    parameters = [{"label": name, "parameter": name, "channel": None} for name in free]
+    rng = np.random.default_rng(4)
+    draws = {name: rng.lognormal(np.log(middle), 0.1, (4, 100)) for name, middle in free.items()}
+    return write(path, about | {"parameters": json.dumps(parameters)}, draws)
+
+
+def write(path: Path, about: dict[str, Any] | None = None, draws: Any = None) -> Path:
     """Write a posterior with its checksum."""
     rng = np.random.default_rng(1)
     about = attributes() if about is None else about
-    values = {"body_drag": rng.lognormal(0.6, 0.05, (4, 100)) if draws is None else draws}
+    draws = rng.lognormal(0.6, 0.05, (4, 100)) if draws is None else draws
+    values = dict(draws) if isinstance(draws, dict) else {"body_drag": draws}
+    size = next(iter(values.values())).shape
     for name in ("advance", "turning"):
-        values |= {f"{kind}_{name}": rng.lognormal(-3.0, 0.1, values["body_drag"].shape) for kind in _KINDS}
+        values |= {f"{kind}_{name}": rng.lognormal(-3.0, 0.1, size) for kind in _KINDS}
     posterior = xr.Dataset({name: (("chain", "draw"), array) for name, array in values.items()})
     tree = xr.DataTree.from_dict({"/": xr.Dataset(), "/posterior": posterior})
     tree.attrs = {**about, "checksum": posterior_checksum(about, values)}

@@ -15,15 +15,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment
 from spirillum.calibration.forward import DryContact, Forward
-from spirillum.dynamics.simulation import simulate
-from spirillum.dynamics.trial import trial_means
+from spirillum.dynamics.trial import quick_run, trial_means
+from spirillum.dynamics.tube_options import InTube
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, tables_of
@@ -36,10 +36,12 @@ from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import Draws, TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import prepare_all
+from spirillum.swimming.preparation import prepare_all, table_for
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator
+
+    from spirillum.fluid.tube.table import TubeTable
 
 
 ROUGHNESS_BAND = (1e-4, 1e-2)
@@ -190,8 +192,9 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, i
     for place, robot in enumerate(robots):
         seen = np.full((count, 3), np.nan)
         values = [dict(zip(names, row.tolist(), strict=True)) for row in np.exp(logs)]
+        table = table_for(RobotBatch.of(robot))
         with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
-            for number, measured in enumerate(pool.map(partial(_measured, robot), values)):
+            for number, measured in enumerate(pool.map(partial(_measured, robot, table), values)):
                 tell("trials of the robots", place * count + number, len(robots) * count)
                 seen[number] = measured
         known = np.isfinite(seen).all(axis=1)
@@ -227,17 +230,14 @@ def _points(ends: Ends, count: int) -> Samples:
     return found
 
 
-def _measured(robot: Robot, values: Mapping[str, float]) -> tuple[float, float, float]:
+def _measured(robot: Robot, table: TubeTable, values: Mapping[str, float]) -> tuple[float, float, float]:
     """U/omega, Omega/omega and the motor's rate of a trial; NaN where there is none."""
-    more: dict[str, Any] = {}
-    if "roughness" in values:
-        more["roughness"] = values["roughness"]
-    if "friction_coefficient" in values:
-        more["in_tube"] = {"friction_coefficient": values["friction_coefficient"]}
+    placed = Placement()
+    asked = InTube().model_copy(update={"friction_coefficient": values.get("friction_coefficient")}).of_trial(placed)
     if "shared_friction" in values:
         robot = with_numbers(robot, {"friction.effective": values["shared_friction"]})
     try:
-        trial = trial_means(simulate(robot, model=WALLED, **more)).values
+        trial = trial_means(quick_run(robot, table, placed, asked, values.get("roughness"))).values
     except InputError:
         return (np.nan, np.nan, np.nan)
     tail = trial["tail_rotation_rate"]

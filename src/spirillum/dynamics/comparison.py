@@ -296,7 +296,6 @@ def compare_models(
         own,
         friction=reading,
         calibrated=factors,
-        calibration=calibration,
         fit=fit,
         resolution=None,
         placement=place,

@@ -6,12 +6,13 @@ that of the posterior's middle lies, by Newton's method over a turn of the tail.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.arrays import Samples
 from spirillum.dynamics.free_motion import FreeMotion, means_over, prepare_release
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.return_map import ReturnMap, fixed_place
@@ -40,11 +41,11 @@ _SURE = 80
 """Number of draws from which on the limits of a 95 % interval are interpolated."""
 _FEWEST, _MOST = 20, 1000
 _FACTORS = {
-    "mean_forward_velocity": ("advance", "motor_rate"),
-    "mean_tail_rotation_rate": ("motor_rate",),
-    "mean_body_rotation_rate": ("turning", "motor_rate"),
+    "forward_velocity": ("advance", "motor_rate"),
+    "tail_rotation_rate": ("motor_rate",),
+    "body_rotation_rate": ("turning", "motor_rate"),
 }
-"""Averages that have intervals, and the quantities whose discrepancy goes onto each."""
+"""Quantities whose averages have intervals, and the observables whose discrepancy goes onto each."""
 _OVER = ("", "_on", "_steady")
 
 
@@ -94,12 +95,12 @@ def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
     """How many draws of a posterior are run.
 
     Args:
-        draws: the number that is asked for; None: 100.
+        draws: the number that is asked for, 0 for the median alone; None: 100.
         posterior: the posterior; None without one.
     """
     given: Any = _DRAWS if draws is None else draws
-    if not is_whole(given) or not _FEWEST <= int(given) <= _MOST:
-        raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
+    if not is_whole(given) or not (int(given) == 0 or _FEWEST <= int(given) <= _MOST):
+        raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}, or 0")
     if draws is not None and posterior is None:
         raise InputError(f"draws = {draws} without a posterior, whose draws they are; allowed: with one")
     return int(given)
@@ -115,23 +116,18 @@ def with_intervals(
 ) -> xr.Dataset:
     """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`."""
     rng = np.random.default_rng(1)
-    found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}
+    found: dict[str, list[float]] = {f"mean_{name}{over}": [] for name in _FACTORS for over in _OVER}
     drawn, kept = posterior.drawn(robot, draws, rng), posterior.places(draws)
     for number, one in enumerate(drawn):
         tell("draws of the posterior", number, len(drawn))
         answer = run(one, kept[number])
         for name, values in found.items():
             values.append(float(answer[name]))
-    off = drawn_discrepancy(posterior.at(kept), {"advance": np.zeros(len(drawn))}, rng)
-    if robot.drive is not None and robot.drive.joint == "fixed":
-        off["turning"] = np.ones(len(drawn))
-    if robot.drive is None or robot.drive.kind != "dc-motor":
-        off["motor_rate"] = np.ones(len(drawn))
+    off = discrepancy_factors(posterior.at(kept), robot, {"advance": np.zeros(len(drawn))}, rng)
     scalars: dict[str, Any] = {}
-    for name, factors in _FACTORS.items():
-        for over in _OVER:
-            values = np.array(found[name + over]) * np.prod([off[factor] for factor in factors], axis=0)
-            scalars |= _limits(name + over, values, dataset)
+    for quantity, factor in off.items():
+        for name in (f"mean_{quantity}{over}" for over in _OVER):
+            scalars |= _limits(name, np.array(found[name]) * factor, dataset)
     notes = notes_in(dataset.attrs)
     if len(drawn) < _SURE:
         words = (
@@ -139,6 +135,24 @@ def with_intervals(
         )
         notes = (*notes, Note("intervals-incomplete", words, ("draws",)))
     return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL, **note_attributes(notes))
+
+
+def discrepancy_factors(
+    posterior: PosteriorFile,
+    robot: Robot,
+    predicted: Mapping[str, Samples],
+    rng: np.random.Generator,
+    *,
+    whose: PosteriorFor = "new",
+) -> dict[str, Samples]:
+    """Factors of a model's discrepancy on the mean speed and rates of a run of each draw, (draws,) each."""
+    off = drawn_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
+    one = np.ones_like(off["advance"])
+    if robot.drive is not None and robot.drive.joint == "fixed":
+        off["turning"] = one
+    if robot.drive is None or robot.drive.kind != "dc-motor":
+        off["motor_rate"] = one
+    return {name: np.prod([off[factor] for factor in factors], axis=0) for name, factors in _FACTORS.items()}
 
 
 def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from spirillum.dynamics.trial import TrialRequest
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
-from spirillum.fitted.fit import FITTED_HELD, read_fit
+from spirillum.fitted.fit import FITTED_HELD, FITTED_TRIAL, read_fit
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
@@ -87,32 +87,36 @@ def predict(  # noqa: PLR0913 - the options of the command
         InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a
             turn.
     """
-    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated)
+    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated, answer=None)
     own = load(robot)
     if beyond_stokes:
         own = without_reynolds_bound(own)
     choice = choose_model(model, own, placement=Placement.of(placement), fit=fit)
+    whose = posterior_for_of(posterior_for, fit.posterior, own)
     if motion != "free" or choice.model != WALLED:
+        of_trials = fit.posterior is not None and fit.posterior.answer != "held"
         held = prediction.predict(
-            own,
+            fit.central(own) if of_trials else own,
             model=choice,
             tail_rate=tail_rate,
             friction=friction,
             calibrated=calibrated,
-            fit=fit,
-            posterior_for=posterior_for,
+            fit=replace(fit, posterior=None) if of_trials else fit,
+            posterior_for="new" if of_trials else posterior_for,
             resolution=resolution,
             placement=placement,
             band=band,
             motion=motion or "held",
             progress=progress,
         )
+        if of_trials:
+            held = replace(held, warnings=(*held.warnings, FITTED_TRIAL))
         request = TrialRequest(
             own,
             friction=friction,
             calibrated=calibrated,
-            calibration=calibration,
             fit=fit,
+            posterior_for=whose,
             resolution=resolution,
             placement=placement,
             roughness=roughness,
@@ -125,7 +129,6 @@ def predict(  # noqa: PLR0913 - the options of the command
     for name, value in (("interval", interval or None), ("duration", duration)):
         if value is not None:
             raise InputError(f"{name} = {str(value)[:40]} with motion 'free'; allowed: without a motion, of the trial")
-    whose = posterior_for_of(posterior_for, fit.posterior, own)
     check_not_resolved(own, resolution)
     if band:
         raise InputError(
@@ -148,11 +151,12 @@ def predict(  # noqa: PLR0913 - the options of the command
         return answer
     from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 
+    said = [FITTED_HELD] if fit.posterior.answer == "held" else []
     intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(
         answer,
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(fit.posterior, answer.robot, whose),
-        warnings=(*answer.warnings, FITTED_HELD, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
+        warnings=(*answer.warnings, *said, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
     )

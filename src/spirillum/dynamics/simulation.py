@@ -21,8 +21,7 @@ from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import FittedContact
-from spirillum.fitted.fit import FITTED_HELD, NO_FIT, read_fit
+from spirillum.fitted.fit import FITTED_HELD, NO_FIT, Fit, read_fit
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube
 from spirillum.fluid.tube.table import TubeTable
@@ -86,7 +85,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         calibration: calibration file whose factors replace the robot's.
         posterior: posterior of a calibration: its median replaces the robot's values, and mean speed and rates
             have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
-        draws: number of draws of the posterior for the intervals, 20 to 1000; None: 100.
+        draws: number of draws of the posterior for the intervals, 20 to 1000, or 0: its median alone; None: 100.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, of a free robot in a tube 20 s, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.
@@ -109,7 +108,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
-    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated)
+    fit = read_fit(calibration, posterior, *([] if model == AUTO else [model]), calibrated=calibrated, answer=None)
     known = fit.posterior
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
@@ -128,7 +127,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     walled = model == "tube" and not held
     fixed = placed if held and find_swimmer_model(model).placed else None
     if held:
-        _check_held(placed if fixed is None else Placement(), roughness, contact, fit.name, weight=weight)
+        _check_held(placed if fixed is None else Placement(), roughness, fit, weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled, drawn=known is not None)
@@ -160,8 +159,9 @@ def simulate(  # noqa: PLR0913 - the options of the command
     dataset = run(central, times, progress)
     if known is not None:
         reading = friction_reading(central.friction.reading if friction is None else friction)
-        said += [FITTED_HELD] if walled else []
+        said += [FITTED_HELD] if walled and known.answer == "held" else []
         said += fit.run_warnings(central, find_swimmer_model(model), reading)
+    if known is not None and number:
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
         dataset = with_intervals(
@@ -252,13 +252,13 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> N
         )
 
 
-def _check_held(
-    placement: Placement, roughness: str | float | None, contact: FittedContact, source: str, *, weight: bool
-) -> None:
+def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *, weight: bool) -> None:
     """Refuse what only a free run knows."""
-    if contact.friction_coefficient:
+    if fit.posterior is not None and fit.posterior.answer != "held":
+        raise InputError(f"motion = 'held' with {fit.name}, which was fitted to trials; allowed: motion 'free'")
+    if fit.contact().friction_coefficient:
         raise InputError(
-            f"{source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
+            f"{fit.name} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
             "'tube' with motion 'free'"
         )
     given = [

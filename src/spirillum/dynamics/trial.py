@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -26,7 +25,8 @@ from spirillum.dynamics.timing import TRIAL_DURATION, Timing
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit import Fit, read_fit
+from spirillum.fitted.fit import NO_FIT, Fit
+from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
 from spirillum.quantities import QUANTITIES
@@ -37,15 +37,19 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
+from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, interval_statement, predict
 from spirillum.swimming.preparation import table_for, why_no_table
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
+from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
 from spirillum.units import KINDS, display_unit, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from spirillum.fluid.tube.table import TubeTable
 
 
 ASSUMPTION = "contact assumed, not validated"
@@ -56,7 +60,7 @@ _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
 
-def why_not_released(held: Prediction, *, fitted: bool) -> str:
+def why_not_released(held: Prediction) -> str:
     """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
     if held.robot.channel is None:
         return "the robot has no channel in which it could be released"
@@ -64,8 +68,6 @@ def why_not_released(held: Prediction, *, fitted: bool) -> str:
         return f"model '{held.model.name}' has no walls on which a robot could rest; use model '{WALLED}'"
     if held.tail_rate is not None:
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
-    if fitted:
-        return "the draws of a posterior are followed by `simulate --posterior` and by motion 'free'"
     batch = RobotBatch.of(held.robot, held.batch.placement)
     if not has_table(batch, "yaw"):
         made = "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
@@ -233,6 +235,8 @@ class TrialSample(NamedTuple):
     wait: float | None
     roughness: float | None
     friction_coefficient: float | None
+    draw: int | None = None
+    """Number of the draw of a posterior whose values the robot has; None without one."""
 
 
 def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
@@ -272,6 +276,18 @@ def samples_of(
     return found
 
 
+def samples_of_draws(
+    robot: Robot, weight: float, unknowns: Sequence[TrialUnknown], posterior: PosteriorFile
+) -> list[TrialSample]:
+    """Return the runs over draws of a posterior and over the unknowns that it leaves open."""
+    kept = posterior.places(RUNS)
+    drawn = posterior.drawn(without_reynolds_bound(robot), RUNS, np.random.default_rng(1))
+    return [
+        samples_of(drawn[number % len(kept)], weight, unknowns, own[None])[0]._replace(draw=kept[number % len(kept)])
+        for number, own in enumerate(_shares(unknowns))
+    ]
+
+
 def _with_center(robot: Robot, own: Mapping[str, float]) -> Robot:
     """The robot with the centre of mass of a sample, where that is open."""
     if _AXIAL not in own:
@@ -288,9 +304,20 @@ def with_interval(
     unknowns: Sequence[TrialUnknown],
     run: Callable[[TrialSample], ReleasedMotion],
     progress: Callable[[str, int, int], None] | None = None,
+    discrepancy: Callable[[Sequence[TrialSample], Sequence[ReleasedMotion]], Mapping[str, Samples]] | None = None,
 ) -> ReleasedMotion:
-    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes."""
-    if nominal.reason or not unknowns:
+    """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
+
+    Args:
+        nominal: the trial at nominal unknowns.
+        samples: settings of the runs.
+        unknowns: what they vary.
+        run: follows the robot of a sample.
+        progress: told how many runs are done.
+        discrepancy: gives the factors of a fitted model's discrepancy on quantities of runs, (runs,) each; only these
+            quantities then have intervals.
+    """
+    if nominal.reason or not (unknowns or discrepancy):
         return nominal
     runs: list[ReleasedMotion] = []
     with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
@@ -316,6 +343,9 @@ def with_interval(
     basis["unknowns"] = [one.to_dict(share) for one, share in zip(unknowns, shares, strict=True)]
     edge = 0.5 * (1.0 - LEVEL)
     values = {name: np.array([one.values[name] for one in moving]) for name in nominal.values}
+    if discrepancy is not None:
+        factors = discrepancy([one for one, there in zip(samples, swims, strict=True) if there], moving)
+        values = {name: values[name] * factor for name, factor in factors.items()}
     quantiles = {name: np.quantile(column, [0.5, edge, 1.0 - edge]) for name, column in values.items()}
     intervals = {
         name: TrialInterval(float(middle), float(low), float(high), LEVEL)
@@ -358,6 +388,25 @@ _SAMPLES_PER_TURN = 12
 """Samples over which their means are taken."""
 
 
+def quick_run(
+    robot: Robot,
+    table: TubeTable,
+    placed: Placement,
+    asked: InTube,
+    roughness: float | None,
+    duration: float = TRIAL_DURATION,
+    **settings: Any,
+) -> xr.Dataset:
+    """Return the run of one of many trials, with a waiting time, in larger steps than `simulate`."""
+    from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
+
+    steady = predict(robot, model=WALLED, placement=placed, band=False, **settings)
+    times = Timing(duration=duration, samples_per_turn=_SAMPLES_PER_TURN)
+    return run_in_tube(
+        steady, table, times, placed, asked, roughness, Field(), weight=True, progress=None, tolerance=_TOLERANCE
+    )
+
+
 @dataclass(frozen=True)
 class TrialRequest:
     """Arguments of `spirillum.predict` that decide the released motions of a robot."""
@@ -365,7 +414,6 @@ class TrialRequest:
     robot: Robot
     friction: str | None
     calibrated: bool
-    calibration: str | Path | None
     fit: Fit
     resolution: Resolution | Mapping[str, Any] | None
     placement: Placement | Mapping[str, Any] | None
@@ -375,12 +423,14 @@ class TrialRequest:
     """Of the trial, s; None: that of a run by its defaults."""
     interval: bool
     progress: Callable[[str, int, int], None] | None
+    posterior_for: PosteriorFor = "new"
+    """Whose discrepancy the interval holds, with a posterior."""
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
-        reason = why_not_released(held, fitted=self.fit.posterior is not None)
+        reason = why_not_released(held)
         if not wanted or reason:
             self._check_unused(reason)
         if not wanted:
@@ -402,8 +452,7 @@ class TrialRequest:
 
         still = self.in_tube.model_copy(update={"wait": None})
         shared = {**self._shared(), "progress": None}
-        fit = read_fit(shared.pop("calibration"))
-        found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=fit, **shared).prediction)
+        found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=self.fit, **shared).prediction)
         self._announce("steady", found.values.get("forward_velocity"))
         return found
 
@@ -413,6 +462,7 @@ class TrialRequest:
 
         robot, length = self._resolved(), self._length
         settings = {"in_tube": self.in_tube, "timing": {"duration": length}, **self._shared()}
+        settings |= {"calibration": self.fit, "draws": None if self.fit.posterior is None else 0}
         return trial_of(held, lambda: simulate(robot, model=WALLED, calibrated=self.calibrated, **settings), length)
 
     @property
@@ -422,7 +472,7 @@ class TrialRequest:
 
     def _shared(self) -> dict[str, Any]:
         """What all runs take of the request."""
-        names = ("friction", "calibration", "placement", "roughness", "progress")
+        names = ("friction", "placement", "roughness", "progress")
         return {name: getattr(self, name) for name in names}
 
     def _resolved(self) -> Robot:
@@ -431,50 +481,50 @@ class TrialRequest:
 
     def _with_interval(self, held: Prediction, nominal: ReleasedMotion) -> ReleasedMotion:
         """The trial with its interval over what neither robot, request nor calibration states."""
-        from spirillum.dynamics.tube_simulation import run_in_tube  # its equations are compiled
-
-        robot, placed = self.fit.central(self.robot), Placement.of(self.placement)
+        known = self.fit.posterior
+        robot = self.fit.central(self.robot)
+        placed = self.fit.placed(robot, Placement.of(self.placement))
         given = None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
         rough, touching = with_contact(self.fit.contact(), given, self.in_tube)
         derived = robot.derived().get("submerged_weight")
         weight = 0.0 if derived is None else derived.value
         stated = {"wait": touching.wait, "roughness": rough, "friction_coefficient": touching.friction_coefficient}
         table = table_for(RobotBatch.of(robot, placed))
-        times = Timing(duration=self._length, samples_per_turn=_SAMPLES_PER_TURN)
         unknowns = open_unknowns(robot, weight, stated)
 
         def run(sample: TrialSample) -> ReleasedMotion:
+            own, asked = with_contact(self.fit.contact(sample.draw), given, self.in_tube)
             values = {"wait": sample.wait, "friction_coefficient": sample.friction_coefficient}
             update = {name: value for name, value in values.items() if value is not None}
-            asked = touching.model_copy(update=update).of_trial(placed)
-            height = rough if sample.roughness is None else sample.roughness
+            there = self.fit.placed(sample.robot, Placement.of(self.placement), sample.draw)
+            asked = asked.model_copy(update=update).of_trial(there)
+            height = own if sample.roughness is None else sample.roughness
 
-            def quick() -> xr.Dataset:
-                steady = predict(
-                    sample.robot,
-                    model=WALLED,
-                    friction=self.friction,
-                    calibrated=self.calibrated,
-                    fit=self.fit,
-                    placement=placed,
-                    band=False,
-                )
-                return run_in_tube(
-                    steady,
-                    table,
-                    times,
-                    placed,
-                    asked,
-                    height,
-                    Field(),
-                    weight=True,
-                    progress=None,
-                    tolerance=_TOLERANCE,
-                )
-
+            fit = self.fit if known is None else NO_FIT  # a draw's values stand in its robot
+            settings = {"friction": self.friction, "calibrated": self.calibrated, "fit": fit}
+            quick = partial(quick_run, sample.robot, table, there, asked, height, self._length, **settings)
             return trial_of(held, quick, self._length)
 
-        return with_interval(nominal, samples_of(robot, weight, unknowns), unknowns, run, self.progress)
+        if known is None:
+            return with_interval(nominal, samples_of(robot, weight, unknowns), unknowns, run, self.progress)
+        drawn = samples_of_draws(robot, weight, unknowns, known)
+        found = with_interval(nominal, drawn, unknowns, run, self.progress, self._discrepancy)
+        return replace(
+            found, basis={**found.basis, "interval_of": interval_statement(known, robot, self.posterior_for)}
+        )
+
+    def _discrepancy(self, samples: Sequence[TrialSample], runs: Sequence[ReleasedMotion]) -> Mapping[str, Samples]:
+        """Factors of the discrepancy of the posterior's model on runs of its draws."""
+        from spirillum.dynamics.fitted_runs import discrepancy_factors  # loads compiled loops
+
+        known = self.fit.posterior
+        assert known is not None  # noqa: S101 - of a posterior's draws alone
+        rates = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate", "motor_rotation_rate")
+        speed, body, tail, motor = (np.array([one.values[name] for one in runs]) for name in rates)
+        predicted = {"advance": speed / tail, "turning": body / tail, "motor_rate": motor}
+        kept = known.at([one.draw for one in samples if one.draw is not None])
+        rng = np.random.default_rng(1)
+        return discrepancy_factors(kept, self.fit.central(self.robot), predicted, rng, whose=self.posterior_for)
 
     def _announce(self, column: str, speed: float | None) -> None:
         """Tell of a column as soon as it is there."""

@@ -36,6 +36,11 @@ FITTED_HELD = Note(
     "fitted observations",
 )
 """Caution of a free motion in the tube with a posterior."""
+FITTED_TRIAL = Note(
+    "fit-other-motion",
+    "the posterior was fitted to trials: the held answer has its median and no interval; --interval gives the trial's",
+)
+"""Caution of a held answer with a posterior of trials."""
 CALIBRATED_HELD = Note(
     "fit-other-motion",
     "the calibration was fitted to robots held at a pose, and this one moves freely: it need not swim as observed",
@@ -246,13 +251,14 @@ def read_fit(
     posterior: str | Path | None = None,
     *models: str,
     calibrated: bool = True,
+    answer: str | None = "held",
 ) -> Fit:
-    """Read a calibration file or a posterior, once for a request."""
+    """Read a calibration file or a posterior (of held motion, of a trial, or of either: None), once for a request."""
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        return fit_of_posterior(read_posterior(posterior, *models))
-    if calibration is None:
+        return fit_of_posterior(read_posterior(posterior, *models, answer=answer))
+    if calibration is None or calibration == NO_FIT:
         return NO_FIT
     if not calibrated:
         raise InputError("calibration together with no-calibration (calibrated = False); allowed: one of them")
@@ -308,7 +314,7 @@ def check_not_replaced(
     asked = tuple(fields)
     for paths in ((calibration, None), (None, posterior)):
         if asked and any(paths):
-            check_kept(asked, robot, read_fit(*paths).central(robot), str(paths[0] or paths[1]))
+            check_kept(asked, robot, read_fit(*paths, answer=None).central(robot), str(paths[0] or paths[1]))
 
 
 def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:

@@ -83,6 +83,7 @@ class PosteriorAttributes(_Table):
     quantities: Json[Annotated[tuple[_Quantity, ...], Field(max_length=10)]]
     settings: Json[Annotated[tuple[_Robot, ...], Field(min_length=1, max_length=100_000)]]
     tails: Json[Annotated[tuple[_Tail, ...], Field(max_length=100_000)]] = ()
+    answer: Literal["held", "trial"] = "held"
 
     @classmethod
     def of(cls, attributes: dict[str, Any]) -> PosteriorAttributes:

@@ -72,6 +72,8 @@ class PosteriorFile:
     """Observations of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
     `stated`), `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in
     older files."""
+    answer: str = "held"
+    """Motion that was fitted: `held`, or a `trial`."""
 
     def measured(self, robot: Robot) -> Mapping[str, Any] | None:
         """What was observed of a robot; None if it was not."""
@@ -271,8 +273,8 @@ def _possible(name: str, values: Samples) -> bool:
     return bool(values.size and np.all((values >= least) & (values < _GREATEST)))
 
 
-def read_posterior(path: str | Path, *models: str, answer: str = "held") -> PosteriorFile:
-    """Read a posterior that a calibration has written, of `held` motion or of a `trial`."""
+def read_posterior(path: str | Path, *models: str, answer: str | None = "held") -> PosteriorFile:
+    """Read a posterior that a calibration has written, of `held` motion, of a `trial`, or (None) of either."""
     path = Path(path)
     with open_netcdf(path, _WHAT) as file:
         attributes = {str(name): item for name, item in file.attrs.items()}
@@ -294,11 +296,11 @@ def read_posterior(path: str | Path, *models: str, answer: str = "held") -> Post
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0; "
             "`spirillum calibrate` with more --doublings samples for longer"
         )
-    if (own := attributes.get("answer", "held")) != answer:
+    if answer is not None and found.answer != answer:
         raise InputError(
             f"{path} is of trials, whose draws no held motion follows; allowed: the calibration.toml beside it, as "
-            "--calibration, or `suggest --as trial`"
-            if own == "trial"
+            "--calibration, or with `predict`, `simulate` in the tube and `suggest --as trial`"
+            if answer == "held"
             else f"{path} is of held motion; allowed: as held, or a posterior by `calibrate --as trial`"
         )
     if models and found.model not in models:
@@ -340,6 +342,7 @@ def _read(path: Path, content: PosteriorAttributes, values: Mapping[str, Samples
         friction=tuple(item.model_dump() for item in content.friction),
         friction_reading=content.friction_reading,
         tails=tuple(item.model_dump() for item in content.tails),
+        answer=content.answer,
     )
 
 

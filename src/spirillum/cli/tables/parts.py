@@ -114,9 +114,11 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
         f"{_UNKNOWN.get(one['name'], one['name'].replace('_', ' '))} {percent(one['share']['value'])}" for one in parts
     ]
     stand = f", {trial['standing']} of {trial['runs']} stand" if trial["standing"] else ""
-    level = f"{100 * speed['level']:g} % interval of the speed over what is not stated"
+    over = "draws of the fit and what it leaves open" if "interval_of" in trial else "what is not stated"
+    level = f"{100 * speed['level']:g} % interval of the speed over {over}"
     yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
-    yield f"of its variance: {', '.join(words)}; state the first of them first"
+    if words:
+        yield f"of its variance: {', '.join(words)}; state the first of them first"
 
 
 _UNKNOWN = {
