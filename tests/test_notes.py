@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import spirillum as sp
 from spirillum.notes import KINDS, LONGEST, TRACKING, Note, note_attributes, notes_in, shown_cautions
 
 ROOT = Path(__file__).parent.parent
@@ -74,3 +75,8 @@ def test_the_weightiest_cautions_take_three_rows() -> None:
     ]
     assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "misfit"]
     assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
+
+
+def test_a_robot_that_does_not_rest_on_the_floor_says_so_first() -> None:
+    light = sp.predict(sp.load("biorob2012-wide", **{"body.mass": "6 g"}), model="tube", motion="held", band=False)
+    assert shown_cautions(light.warnings)[0].code == "robot-floats"

@@ -27,6 +27,10 @@ CAUTIONS = {
         "The gap under the body or its pitch is not given, and they decide much of the speed. `--band` computes the "
         "range, `--gap` and `--pitch` state them, `--motion free` finds the pose."
     ),
+    "robot-floats": (
+        "Buoyancy lifts the robot off the floor, and axial motion holds it at a pose there. Its trial, `simulate` and "
+        "`settle` follow it to where it goes. Check `body.mass`."
+    ),
     "outside-validity": (
         "A field lies outside the range in which the model is accurate: the error is larger than the stated one. "
         "Another model may hold there."

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import spirillum as sp
 from spirillum.results.study_store import _spread
 from spirillum.studies.regions import Pace, RobotBlock
+from spirillum.worker_pool import ESTIMATE
 
 
 def _said(workers: int, regions: int, seconds: float, loading: float, change: float = 0.0) -> tuple[float, float]:
@@ -50,3 +54,25 @@ def test_regions_are_spread_and_none_is_lost() -> None:
         order = [region.number for region in _spread(places)]
         assert sorted(order) == list(range(count))
     assert 400.0 < np.mean(order[:20]) < 600.0
+
+
+def test_work_without_tables_is_told_before_it_begins(tmp_path: Path) -> None:
+    """The flow around robots without a table is solved for in blocks, and nothing ends for minutes."""
+
+    class Told(Exception):  # noqa: N818 - ends the study before its work
+        pass
+
+    def tell(what: str, _done: int, _total: int) -> None:
+        said.append(what)
+        if what.startswith("tube"):
+            raise Told
+
+    said: list[str] = []
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'robots = ["biorob2012-wide"]\nmodels = ["tube"]\n[vary]\n"tail.wavelength" = ["21.3 mm", "25 mm"]\n'
+    )
+    with pytest.raises(Told):
+        sp.study(path, progress=tell)
+    assert "without a table of its tube (1 of them)" in said[-2]
+    assert said[-2].startswith(ESTIMATE)

@@ -339,7 +339,7 @@ def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:
         f"the robot floats (submerged weight {weight.value:.3g} N): axial motion assumes a robot that rests on the "
         "floor; check body.mass"
     )
-    return (Note("robot-file-doubtful", words, ("body.mass", "tail.density", "fluid.density")),)
+    return (Note("robot-floats", words, ("body.mass", "tail.density", "fluid.density")),)
 
 
 def _displaced(robot: Robot) -> tuple[Note, ...]:

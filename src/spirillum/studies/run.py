@@ -34,7 +34,7 @@ from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.preparation import missing_tables
 from spirillum.swimming.steady import requirements
 from spirillum.version import own_version
-from spirillum.worker_pool import WorkerPool, map_tasks
+from spirillum.worker_pool import ESTIMATE, WorkerPool, map_tasks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,6 +113,7 @@ def computed_study(
     missing = [task for task in asked if found[task.number] is None]
     done = len(asked) - len(missing)
     if missing:
+        _announce_solved(missing, tell)
         tell(missing[0].words, done, len(asked))
     jobs = (task.job(loaded, observed) for task in missing)
     at_work = _worth(missing, crew or WorkerPool())
@@ -143,6 +144,15 @@ def computed_study(
     warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
     return assembled(loaded, answers, band, beside, observed, fingerprint, list(dict.fromkeys(warnings)))
+
+
+def _announce_solved(missing: Sequence[StudyTask], tell: Progress) -> None:
+    """Tell beforehand that the flow is solved for around robots without a table, a block of them at a time."""
+    walled = (task for task in missing if isinstance(task, ModelTask) and find_swimmer_model(task.model).placed)
+    count = sum(len(missing_tables(task.batch, "straight")) for task in walled)
+    if count:
+        words = f"the flow is solved for at one pose of each robot without a table of its tube ({count} of them)"
+        tell(f"{ESTIMATE}{words}, in some 10 s of one core each, up to 64 at a time; `prepare` makes tables", 0, 0)
 
 
 _KEPT = "; what was answered is kept"
