@@ -42,7 +42,7 @@ def test_numbers_are_written_before_the_figures(found: Any, tmp_path: Path, monk
     def interrupted(_found: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("spirillum.results.calibration.calibration_figures", interrupted)
+    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_calibration(found, tmp_path)
     assert {path.name for path in tmp_path.glob("*.*")} == {"calibration.toml", "predictions.csv"}
@@ -52,7 +52,7 @@ def test_numbers_are_written_before_the_figures(found: Any, tmp_path: Path, monk
 def test_figures_of_an_earlier_run_go_and_changed_ones_stay(
     found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spirillum.results.calibration.calibration_figures", small_figures)
+    monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", small_figures)
     write_calibration(found, tmp_path)
     (tmp_path / "figures" / "my-own.png").write_bytes(b"mine")
     assert {path.name for path in earlier_results(tmp_path)} == {

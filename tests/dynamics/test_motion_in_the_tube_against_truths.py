@@ -46,10 +46,11 @@ def made(stand_in: Any) -> Callable[..., Made]:
         rest: float = 1.0,
         weight: bool = True,
         friction: str | None = None,
+        model: str = "slender",
         **more: float,
     ) -> Made:
         robot = sp.load("biorob2012-wide", **(overrides or {}))
-        steady = predict(robot, model="slender", friction=friction)
+        steady = predict(robot, model=model, friction=friction)
         matrix = np.zeros((8, 8))
         twelve = calibrated_resistance(steady.batch, steady.model, calibrated=False)[0]
         matrix[:7, :7] = rest * LINKS.T @ twelve @ LINKS / robot.fluid.viscosity
@@ -409,7 +410,7 @@ TAILS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("pitch", [0.02, 0.07])
 def test_any_tail_touches_where_its_points_do(made: Any, tail: str, pitch: float) -> None:
     """Its gap is that of dense points of its wires, and closes as its gradient says."""
-    steady, links, _ = made(overrides={"tail": TAILS[tail]})
+    steady, links, _ = made(overrides={"tail": TAILS[tail]}, model="rft")  # its geometry alone matters
     dense = [swept.position for swept in [centreline_of(steady.robot, np.linspace(0.0, 1.0, 40001) * 0.06)]]
     points = np.concatenate([dense[0] @ turn.T for turn in steady.robot.tail.form.rotations])
     state = state_at_release(steady.robot, links, StartPlace(gap=3e-4, pitch=pitch))
@@ -435,8 +436,8 @@ def test_a_tail_along_points_of_a_helix_touches_as_the_helix(made: Any) -> None:
     x = np.linspace(0.0, 60.0, 121)
     k = 2 * np.pi / 25.0
     points = np.stack([x, 2.5 * np.cos(k * x), 2.5 * np.sin(k * x)], axis=1).tolist()
-    curve = made(overrides={"tail": {"curve": points}})
-    helix = made(overrides={"tail.taper": "none"})
+    curve = made(overrides={"tail": {"curve": points}}, model="rft")
+    helix = made(overrides={"tail.taper": "none"}, model="rft")
     gaps = []
     for steady, links, _ in (curve, helix):
         own = links.stations[np.argmin(links.stations[:, contacts.STATION_XI])]

@@ -206,10 +206,11 @@ def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
     (tmp_path / "o.csv").write_text("\n".join([header, *rows]) + "\n")
     options = {"method": "least-squares", "free": "body_drag", "output": tmp_path / "c"}
     from spirillum.results import calibration
+    from spirillum.view.figures import style
 
-    drawn = calibration.save
-    monkeypatch.setattr(calibration, "calibration_figures", lambda _found: dict.fromkeys(("residuals", "profiles")))
-    monkeypatch.setattr(calibration, "save", _stopped_at_the_second(drawn))
+    figures = "spirillum.view.figures.calibration.calibration_figures"
+    monkeypatch.setattr(figures, lambda _found: dict.fromkeys(("residuals", "profiles")))
+    monkeypatch.setattr(style, "save", _stopped_at_the_second(style.save))
     with pytest.raises(KeyboardInterrupt):
         sp.calibrate(tmp_path / "o.csv", WIDE, **options)
     first = (tmp_path / "c" / "calibration.toml").read_bytes()

@@ -61,7 +61,7 @@ def test_a_film_that_breaks_off_says_so(filmed, tmp_path):
                 target.mux(packet)
     content = copied.read_bytes()
     broken.write_bytes(content[: len(content) * 2 // 3])
-    found = track(broken, setup_of(filmed), pace="fast", learn=2.0)
+    found = track(broken, setup_of(filmed), pace="fast", learn=2.4)
     assert any("could not be read to its end" in line for line in found.warnings), found.warnings
 
 

@@ -24,8 +24,6 @@ from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
-from spirillum.view.figures.calibration import calibration_figures
-from spirillum.view.figures.style import save
 
 
 def _number(value: float) -> str:
@@ -333,6 +331,9 @@ def _gone(paths: Sequence[Path]) -> str:
 
 def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
     tell = progress or (lambda _what, _done, _total: None)
+    from spirillum.view.figures.calibration import calibration_figures
+    from spirillum.view.figures.style import save
+
     tell("figures", 0, 1)
     inside = output_folder(folder / "figures", folder)
     written: list[Path] = []
