@@ -141,6 +141,10 @@ CAUTIONS = {
         "are signed about the same axis."
     ),
     "robot-file-doubtful": "Fields of the robot file contradict each other, or no robot can have them. Check the file.",
+    "curve-smoothed": (
+        "Smoothing by `tail.curve_tolerance` changes the centre line by more than noise. Thrust goes with the square "
+        "of its radius. Lower the tolerance, or leave it out."
+    ),
     "design-at-limit": "The best design lies at an end of a range, or a better one lies outside. Widen the range.",
     "design-tie": (
         "The lead of the best design is smaller than the error of its objective, or a field has no effect. Choose by "

@@ -136,6 +136,18 @@ def test_smoothing_stays_within_its_tolerance() -> None:
     assert np.sqrt(np.mean(apart**2)) < 0.03
 
 
+@pytest.mark.parametrize(("tolerance", "loss"), [("0.05 mm", 0.0), ("0.5 mm", 0.12)])
+def test_smoothing_that_takes_shape_away_says_how_much(tolerance: str, loss: float) -> None:
+    noisy = np.array(points_of_helix(121))
+    noisy[:, 1:] += np.random.default_rng(58).normal(0.0, 0.05, (121, 2))
+    robot = load("biorob2012-wide", tail={"curve": noisy.tolist(), "curve_tolerance": tolerance})
+    notes = [note for note in robot.warnings if note.code == "curve-smoothed"]
+    assert len(notes) == (loss > 0.0)
+    exact, smooth = tail("rft", {"curve": points_of_helix(121)}), resistance(robot, model="rft", part="tail").matrix
+    assert smooth[0, 3] / exact[0, 3] == pytest.approx(1.0 - loss, abs=0.03)
+    assert all("mean radius by -6.6 %" in note for note in notes)
+
+
 def test_lighthills_theory_refuses_what_it_does_not_describe() -> None:
     for form, said in (({"starts": 2}, "tail.starts = 2"), ({"curve": points_of_helix(61)}, "no helix of one size")):
         with pytest.raises(InputError, match=said):

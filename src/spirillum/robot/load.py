@@ -19,7 +19,7 @@ from spirillum.notes import Note
 from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Derived, Robot
-from spirillum.robot.shape_input import DISPLACED, FILES, with_points_of_files
+from spirillum.robot.shape_input import DISPLACED, FILES, smoothing_notes, with_points_of_files
 from spirillum.units import show
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -381,6 +381,7 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[Note, ...]) -> 
     if isinstance(problems, Robot):
         derived = problems.derived()  # once: it integrates the solids
         doubts = (*_floating(derived), *_displaced(problems), *_too_dense(problems, derived), *_too_smooth(problems))
+        doubts += smoothing_notes(problems.tail.form)
         problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)

@@ -15,8 +15,9 @@ from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.files.limits import MOST_POINTS
 from spirillum.files.reading import csv_rows, number_in
+from spirillum.notes import Note
 from spirillum.robot.fields import refuse
-from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, centre_line, mean_of_inverse
+from spirillum.robot.tail_form import Along, CentreLine, CurvePoints, TailForm, centre_line, mean_of_inverse
 from spirillum.scalars import is_number
 from spirillum.units import KINDS, parse_quantity, show
 
@@ -32,6 +33,8 @@ DISPLACED = {
 """Fields of the layer below that a field of a layer replaces."""
 _COLUMN = re.compile(r"(\w+?)(?:(?:[\s_]+|\s*(?=[\[(]))[\[(]?([a-zµμ]+)[\])]?)?")
 """The name of a column and the unit behind it."""
+_SMOOTHED = {"spread": 0.02, "amplitude": 0.05, "length": 0.05}
+"""Largest relative changes by smoothing without a caution, of `CentreLine`."""
 _TURNED = 0.5
 """Cosine of the largest angle between neighbouring chords of a centre line."""
 
@@ -220,6 +223,25 @@ def _read_curve(table: dict[str, Any]) -> dict[str, Any]:
     if table.get("taper", "none") not in (None, "none"):
         raise refuse(f"tail.taper = {str(table['taper'])[:40]} with tail.curve; allowed: leave it out")
     return {**table, **follows, "curve": points, "taper": "none"}
+
+
+def smoothing_notes(form: TailForm) -> tuple[Note, ...]:
+    """Warn where smoothing changes the shape of a centre line by more than the removal of noise does.
+
+    Noise leaves the radius as it is, to the square of its share, but makes a wire longer.
+    """
+    if not form.tolerance:
+        return ()
+    smooth, exact = form.centre, centre_line(form.curve, 0.0)
+    changes = {name: getattr(smooth, name) / getattr(exact, name) - 1.0 for name in _SMOOTHED}
+    if all(abs(change) <= _SMOOTHED[name] for name, change in changes.items()):
+        return ()
+    radius, amplitude, length = (f"{100.0 * change:+.2g} %" for change in changes.values())
+    words = (
+        f"tail.curve_tolerance = {show(form.tolerance, 'mm')} changes the curve's mean radius by {radius}, amplitude "
+        f"by {amplitude}, length by {length}: lower it"
+    )
+    return (Note("curve-smoothed", words, ("tail.curve_tolerance", "tail.curve")),)
 
 
 def _sizes_of(line: CentreLine) -> dict[str, str]:

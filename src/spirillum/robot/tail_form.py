@@ -152,6 +152,8 @@ class CentreLine:
         """Largest curvature, 1/m."""
         self.amplitude = float(np.max(np.hypot(self.samples[:, 1], self.samples[:, 2])))
         """Largest distance from the axis, m."""
+        self.spread = float(np.sqrt(np.sum(np.var(self.samples[:, 1:], axis=0))))
+        """Root mean square distance across from its mean position, m."""
         self.reach = float(np.max(self.samples[:, 0]))
         """Largest axial distance from the root, m."""
         self.nearest = float(np.min(self.samples[:, 0]))
