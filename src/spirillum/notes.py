@@ -146,8 +146,8 @@ CAUTIONS = {
     ),
     "robot-file-doubtful": "Fields of the robot file contradict each other, or no robot can have them. Check the file.",
     "curve-smoothed": (
-        "Smoothing by `tail.curve_tolerance` removes more of the centre line than noise. Thrust goes with the square of "
-        "its radius. Lower the tolerance, or leave it out."
+        "Smoothing by `tail.curve_tolerance` changes the centre line by more than noise. Thrust goes with the square "
+        "of its radius. Lower the tolerance, or leave it out."
     ),
     "design-at-limit": "The best design lies at an end of a range, or a better one lies outside. Widen the range.",
     "design-tie": (

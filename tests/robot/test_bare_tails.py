@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.support.commands import run_command
 
-from spirillum import compare_models, load, predict, prepare, resistance, simulate
+from spirillum import compare_models, load, page, predict, prepare, resistance, simulate
 from spirillum.designs.criteria import Variable
 from spirillum.designs.learned import corrected, solved_at
 from spirillum.errors import InputError
@@ -96,6 +96,8 @@ def test_requests_about_a_body_are_refused(tmp_path: Path) -> None:
         resistance(BARE, part="body")
     with pytest.raises(InputError, match="has no table"):
         prepare(load(BARE))
+    with pytest.raises(InputError, match="the page takes a body"):
+        page(load(BARE), browser=False)
     with pytest.raises(InputError, match="takes a body"):
         simulate(BARE, model="rft", timing={"duration": "1 s"})
     (tmp_path / "bare.toml").write_text(robot_text(load(BARE)))

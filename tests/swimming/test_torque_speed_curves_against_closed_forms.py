@@ -154,3 +154,10 @@ def test_speed_of_ecoli_against_viscosity_misses_the_measured_decay_as_stated() 
         ratio[factor] = thick.forward_velocity / buffer.forward_velocity
         assert 1.0 < ratio[factor] * factor < 1.1
     assert list(ratio.values()) == pytest.approx([0.57, 0.27, 0.09], abs=0.02)
+
+
+def test_the_curve_of_a_preset_can_be_unset() -> None:
+    other = {"drive.kind": "rate", "drive.rate": "100 Hz", "drive.rates": "none", "drive.torques": "none"}
+    drive = sp.load("ecoli", **other).drive
+    assert drive is not None
+    assert (drive.kind, drive.curve) == ("rate", None)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from spirillum.argument_validation import validate_arguments
 from spirillum.errors import InputError, clipped
 from spirillum.optional_dependencies import import_optional
+from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -68,8 +69,9 @@ def page(
         number = int(listening.getsockname()[1])
         guard = Guard(host, number)
         own, first_run = ("biorob2012-wide", None) if run is None else _replay(run)
-        strangers = Strangers()
-        app = application(own if robot is None else robot, guard, strangers=strangers, first_run=first_run)
+        strangers, first = Strangers(), own if robot is None else robot
+        load(first).check_body("the page", "; `show` and `flow` draw this one")
+        app = application(first, guard, strangers=strangers, first_run=first_run)
         shown = f"[{host}]" if ":" in host else host
         if host in ("0.0.0.0", "::"):  # noqa: S104 - it was asked for, and is said
             shown = socket.gethostname()

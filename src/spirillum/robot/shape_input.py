@@ -238,8 +238,8 @@ def smoothing_notes(form: TailForm) -> tuple[Note, ...]:
         return ()
     radius, amplitude, length = (f"{100.0 * change:+.2g} %" for change in changes.values())
     words = (
-        f"tail.curve_tolerance = {show(form.tolerance, 'mm')} changes the curve's mean radius by {radius}, amplitude by "
-        f"{amplitude}, length by {length}: lower it"
+        f"tail.curve_tolerance = {show(form.tolerance, 'mm')} changes the curve's mean radius by {radius}, amplitude "
+        f"by {amplitude}, length by {length}: lower it"
     )
     return (Note("curve-smoothed", words, ("tail.curve_tolerance", "tail.curve")),)
 

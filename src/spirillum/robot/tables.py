@@ -69,9 +69,9 @@ class Drive(Section):
     """For `rate`: rotation rate of the tail about +x in the lab."""
     torque: Annotated[Torque | None, UNSET, NONE] = None
     """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
-    rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"]] = None
+    rates: Annotated[tuple[Rate, ...] | None, KINDS["rate"], UNSET, NONE] = None
     """For `torque-speed`: rates of the tail against the body, 2 to 12 that increase from 0; three give a knee."""
-    torques: Annotated[tuple[Torque, ...] | None, KINDS["torque"]] = None
+    torques: Annotated[tuple[Torque, ...] | None, KINDS["torque"], UNSET, NONE] = None
     """For `torque-speed`: torque at each of these rates, straight between them: from the stall torque down to 0."""
     polarity: Literal["forward", "reverse"] = "forward"
     """For `torque-speed`: `forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
