@@ -1,6 +1,7 @@
 """Films of micrometres along runs of the paper's robot: numbers of docs/contact.md, beside independent solutions.
 
-    python tools/films_of_runs.py      # a minute
+    python tools/films_of_runs.py              # a minute
+    python tools/films_of_runs.py --tails      # trends over sixteen tails at three bounds, ten minutes
 
 Prints means of the runs; their lifts beside Reynolds' equation in two dimensions; and the torques about the body's axis
 over the last turn of a run beside closed forms at the same poses and rates, and beside the closed problem of a level
@@ -227,8 +228,42 @@ def print_balance(run: Any) -> None:
     print(f"    at the poses of the run: {abs(torque / per_rate) / HZ:.4f} Hz, the run: {abs(rates[ROLL]) / HZ:.4f} Hz")
 
 
+TAILS = ([10, 15, 20, 25], [1.5, 2.0, 2.5, 3.5])
+"""Wavelengths and amplitudes, mm, of the paper's study."""
+
+
+def print_trends(bound: str) -> None:
+    """In how many steps over tails each of the paper's trends holds, 12 s after a minute of waiting."""
+    speed, motor, friction = np.empty((3, 2, 4, 4))
+    for place in np.ndindex(2, 4, 4):
+        tube, wavelength, amplitude = ("wide", "narrow")[place[0]], TAILS[0][place[1]], TAILS[1][place[2]]
+        tail = {"tail.wavelength": f"{wavelength} mm", "tail.amplitude": f"{amplitude} mm"}
+        robot = sp.load(f"biorob2012-{tube}", **{"fluid.cavitation_pressure": bound}, **tail)
+        timing = {"duration": "12 s", "samples_per_turn": 20}
+        run = sp.simulate(robot, model="tube", timing=timing, in_tube={"wait": "60 s"})
+        rates = [float(run[f"mean_{part}_rotation_rate"]) for part in ("tail", "body")]
+        load = float(sp.predict(robot, model="rft", tail_rate=rates[0]).tail_torque)
+        speed[place], motor[place] = float(run["mean_forward_velocity_on"]), rates[0] - rates[1]
+        friction[place] = (float(run["motor_torque"][-1]) - load) / motor[place]
+    rising = np.diff(motor, axis=1)
+    trends = {
+        "speed increases with wavelength": np.diff(speed, axis=1),
+        "speed decreases with amplitude but at 25 mm": -np.diff(speed[:, :-1], axis=2),
+        "motor rate decreases with amplitude": -np.diff(motor, axis=2),
+        "motor rate increases with wavelength": rising,
+        "motor rate saturates": -np.diff(rising, axis=1),
+        "B_eff depends on the amplitude": np.std(friction.mean(axis=1), axis=1) - np.std(friction.mean(axis=2), axis=1),
+    }
+    for name, steps in trends.items():
+        print(f"p_c {bound}: {name} in {np.count_nonzero(steps > 0.0)} of {steps.size}")
+
+
 def main() -> None:
     """Print all."""
+    if "--tails" in sys.argv[1:]:
+        for bound in ("none", "100 kPa", "10 kPa"):
+            print_trends(bound)
+        return
     for tube, bound, wait in RUNS:
         print(f"{tube} tube, p_c {bound}, waited {wait}")
         run = simulate(tube, bound, wait)

@@ -124,3 +124,15 @@ def test_a_robot_turned_from_outside_floats_at_the_gap_of_the_closed_problem() -
     rise = (0.5 * length * float(end["wall_yaw"])) ** 2 / (2.0 * (radius - a))  # of the middle over the ends
     assert float(end["wall_gap"]) + 2.0 / 3.0 * rise == pytest.approx(gap, rel=0.1)
     assert float(end["drive_torque"]) == pytest.approx(torque, rel=0.1)
+
+
+@pytest.mark.parametrize(("gap", "cavitates"), [("2 um", True), ("0.5 mm", False)])
+def test_a_held_pose_names_the_gap_below_which_its_film_cavitates(gap: str, cavitates: bool) -> None:
+    robot = sp.load("biorob2012-wide", **{"fluid.cavitation_pressure": "10 kPa"})
+    found = sp.predict(robot, model="tube", placement={"gap": gap}, band=False)
+    words = [note for note in found.warnings if "cavitates" in note]
+    assert bool(words) == cavitates
+    entrainment = 0.5 * 9e-3 * abs(float(found.body_rotation_rate))
+    least = (9 / 4 * np.sqrt(2 / 3) * robot.fluid.viscosity * entrainment * np.sqrt(9e-3 * 20 / 11) / 1e4) ** (2 / 3)
+    if words:
+        assert float(words[0].partition("at least ")[2].split()[0]) == pytest.approx(1e6 * least, rel=1e-3)

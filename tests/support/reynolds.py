@@ -25,7 +25,7 @@ _ROUNDS = 60
 
 @dataclass(frozen=True)
 class ShortCylinder:
-    """A cylinder with flat ends at a pose in a tube; m, rad."""
+    """A cylinder at a pose in a tube, its rear end flat and its front flat or rounded; m, rad."""
 
     radius: float
     length: float
@@ -37,6 +37,8 @@ class ShortCylinder:
     yaw: float = 0.0
     """Nose to +y."""
     cells: tuple[int, int] = (90, 90)
+    rounded: float = 0.0
+    """Radius of the front end beyond the length."""
 
     def __post_init__(self) -> None:
         nx, ny = self.cells
@@ -44,6 +46,9 @@ class ShortCylinder:
         least = self.tube - self.radius - np.hypot(self.offset - np.abs(x * self.pitch), x * self.yaw).max()
         bend = self.radius * self.tube / (self.tube - self.radius)
         width = np.sqrt(2.0 * bend * max(least, 1e-8))
+        if self.rounded > 0.0:
+            beyond = 0.3 * self.rounded * np.linspace(0.0, 1.0, nx // 2 + 1)[1:] ** 3
+            x = np.append(x, x[-1] + beyond)
         far = 0.35 * self.radius
         t = np.linspace(-1.0, 1.0, ny + 1) * np.arcsinh(far / width)
         object.__setattr__(self, "x", x)
@@ -55,7 +60,9 @@ class ShortCylinder:
         below = self.offset - x * self.pitch
         # The nearest line: where the normal of the body points along the axis' own offset.
         y = across + side + self.radius * side / np.hypot(side, below)
-        under = np.sqrt(self.radius**2 - (y - side) ** 2)
+        beyond = np.maximum(x - 0.5 * self.length, 0.0)
+        radius = self.radius - self.rounded + np.sqrt(self.rounded**2 - np.minimum(beyond, self.rounded) ** 2)
+        under = np.sqrt(radius**2 - (y - side) ** 2)
         return np.sqrt(self.tube**2 - y**2) - below - under, -under, y - side
 
     def velocity(self, motion: int, x: np.ndarray, across: np.ndarray) -> np.ndarray:
@@ -170,7 +177,8 @@ def film_of_run(moment: Any, cells: tuple[int, int] = (90, 90)) -> tuple[ShortCy
     rates = np.concatenate([at, turned @ local.T @ spin])
     _, yaw, pitch = np.arcsin(to_middle @ local[:, 0])
     offset = float(np.hypot(*middle[1:]))
-    cylinder = ShortCylinder(0.5 * body.diameter, front + rear, tube, offset, float(pitch), float(yaw), cells)
+    size = (0.5 * body.diameter, front + rear, tube, offset, float(pitch), float(yaw))
+    cylinder = ShortCylinder(*size, cells, body.rounding(body.front_end))
     return cylinder, dict(enumerate(rates.tolist()))
 
 

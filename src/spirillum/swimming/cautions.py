@@ -11,6 +11,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
 from spirillum.swimming.reynolds import reynolds_limits
@@ -28,6 +29,22 @@ NO_WEIGHT = Note(
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
     """What has to hold for the answer to be accurate; each broken one is a warning."""
     return [*model.cautions(batch), *reynolds_limits(batch, result.reynolds_number, result.tail_reynolds_number)]
+
+
+def film_limits(robot: Robot, model: SwimmerModel, batch: RobotBatch, result: Swimming) -> list[Limit]:
+    """What has to hold for the linear film under a body that is held near the wall: the liquid does not cavitate.
+
+    Under a turning cylinder the least pressure is -1.837 mu u sqrt(R')/h^1.5, with u = a Omega/2, R' = a R/(R - a).
+    """
+    bound, channel = robot.fluid.cavitation_pressure, robot.channel
+    if not model.placed or bound is None or channel is None or robot.body.diameter >= channel.diameter:
+        return []
+    a, radius = 0.5 * robot.body.diameter, 0.5 * channel.diameter
+    pulled = 0.5 * robot.fluid.viscosity * a * np.abs(result.body_rotation_rate)
+    least = (1.837 * pulled * np.sqrt(a * radius / (radius - a)) / bound) ** (2.0 / 3.0)
+    gap = np.atleast_1d(gap_of(batch.placement, 2.0 * a, radius))
+    why = "the liquid cavitates in thinner films, which motion 'free' counts"
+    return [Limit.of("placement.gap", gap, "at least", least, "um", why, "film-cavitates")]
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[Note]:

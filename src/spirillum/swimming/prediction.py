@@ -28,7 +28,13 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import Band, band_of
-from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, drive_warnings, no_band_warnings
+from spirillum.swimming.cautions import (
+    accuracy_limits,
+    calibration_warnings,
+    drive_warnings,
+    film_limits,
+    no_band_warnings,
+)
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
@@ -339,6 +345,7 @@ def _case_warnings(scenario: Scenario, result: Swimming) -> list[Note]:
     return [
         *(calibration_warnings(robot, model.name) if scenario.calibrated else ()),
         *(limit.caution() for limit in broken(accuracy_limits(batch, model, result))),
+        *(limit.caution() for limit in broken(film_limits(robot, model, batch, result))),
         *drive_warnings(known, model, scenario.friction, result, rate),
         *_free_warnings(robot, scenario.motion),
         *([_IN_A_FLOW] if batch.placement.flow else []),
