@@ -202,7 +202,7 @@ def rank_models(
         sampling: how the posteriors are sampled.
         prepare: compute missing tables of the model `tube`, minutes for each.
         answer: what `tube` is fitted as: `held`, or `trial` (two numbers: friction coefficient and roughness).
-        progress: told what is being done.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a single model, or observations that none of the models explains.

@@ -140,7 +140,7 @@ def suggest(
             amplitude in every robot's channel.
         trials: trials of each candidate.
         answer: motion of which the posterior is: `held`, or `trial`, with some dozens of runs of each candidate.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input.
@@ -148,7 +148,7 @@ def suggest(
     check_range("trials", trials, 1, 10**6)
     check_choice("answer", answer, (HELD, RELEASED))
     known = read_posterior(posterior, answer=answer)
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
@@ -157,7 +157,7 @@ def suggest(
     left_out = []
     numbers, names = _numbers(known)
     for place, robot in enumerate(listed):
-        tell("candidates", place, len(listed))
+        on_progress("candidates", place, len(listed))
         outside = _outside(known, robot, answer)
         if outside:
             left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))

@@ -253,7 +253,7 @@ def predict(
         motion: `held` (lateral motion and tilt constrained) or `free`. Free with `rft` or
             `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
-        progress: told what is being computed, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
     """
     scenario = resolve_scenario(
         robot,

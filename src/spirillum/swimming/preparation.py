@@ -200,7 +200,7 @@ def prepare(
         stage: `straight` (poses without yaw, for constrained motion), `yaw` (for motion after release too), or `fine`
             (more nodes, and the finest resolution of the flow); each takes about four times as long as the one before.
         workers: number of processes.
-        progress: told what is being solved, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
@@ -224,7 +224,7 @@ def prepare_all(
         robots: see `prepare`.
         stage: see `prepare`.
         workers: number of processes.
-        progress: told what is being solved, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a robot that the model `tube` does not know or that has no table, or a folder
