@@ -136,7 +136,7 @@ def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
 
 
 FREE = ("shared_friction", "friction_coefficient", "roughness")
-"""Parameters that a fit of trials may free: where a robot lies follows from the run."""
+"""Parameters that a fit of trials may free: the pose follows from the run."""
 _RUNS = {1: 16, 2: 32, 3: 64}
 """Trials of each robot, by the number of free parameters."""
 _FEWEST = 0.75

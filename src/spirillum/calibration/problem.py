@@ -104,7 +104,7 @@ class Problem:
         """
         values = self._all_values(z)
         found = {name: values[:, places] for name, places in self._places.items()}
-        if "roughness" in found:  # a robot that lies on its asperities
+        if "roughness" in found:  # a robot that rests on its asperities
             found["gap"] = gap_on_asperities(found["roughness"])
         return found
 

@@ -138,7 +138,7 @@ class Ranking(DisplayMixin):
         for name, (values, low, high) in item.fit.predicted.items():
             seen = item.fit.problem.ratio(name).mean
             spread = np.abs(high - low) / (2.0 * 1.96)
-            off = (seen - values) / spread * np.sign(values)  # positive where more was observed, as their ratio says
+            off = (seen - values) / spread * np.sign(values)  # positive where more was observed
             found += [
                 {
                     "tail": experiment.labels()[place],
@@ -282,7 +282,7 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
 
     found = {}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what they warn of is said below, in our words
+        warnings.simplefilter("ignore")  # reported below as notes
         for name, fit in fits.items():
             found[name] = loo(posterior_tree(fit), pointwise=True, var_name="robot")
         order = [str(name) for name in compare(found).index] if len(found) > 1 else list(found)

@@ -1,7 +1,7 @@
 """Which tail or channel to measure next: the expected information gain of each candidate.
 
 Given the draws of a posterior, a new robot's means would be seen with the model's discrepancy and the errors of its
-trials. What they would tell about the fitted numbers is their mutual information. Where draws of the predictions are
+trials. Their information about the fitted numbers is the mutual information. Where draws of the predictions are
 close to normal, as they are once some robots have been observed, it is
 
     I = 1/2 log det(C + N) - 1/2 log det(N)
@@ -87,7 +87,7 @@ class CandidateRobot:
 
 @dataclass(frozen=True, repr=False)
 class Suggestion(DisplayMixin):
-    """Candidates from the most to the least telling."""
+    """Candidates from the most to the least informative."""
 
     posterior: PosteriorFile
     trials: int
@@ -280,7 +280,7 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
 
 
 def _ranked(found: Sequence[tuple[CandidateRobot, Samples]]) -> tuple[CandidateRobot, ...]:
-    """Candidates from the most to the least telling, each with how far it is behind the first."""
+    """Candidates from the most to the least informative, each with how far it is behind the first."""
     ordered = sorted(found, key=lambda pair: -pair[0].gain)
     best, of_best = ordered[0]
     return tuple(

@@ -292,7 +292,7 @@ def _appearance(found: SetupFreeDetection) -> Finding:
 
 
 def _stripes(found: SetupFreeDetection) -> Finding:
-    assert found.known is not None  # noqa: S101 - asked where it is known
+    assert found.known is not None  # noqa: S101 - called where it is known
     stated = found.known.stripes.stripes
     if not stated:
         words = "the robot file names no stripes: without them the body's rotation cannot be seen"

@@ -138,13 +138,13 @@ def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]
     """The pose that the model takes, unless nothing is around the robot; `head` begins the line."""
     if len(placement) == 1:
         return
-    said = [str(placement["kind"])]
+    details = [str(placement["kind"])]
     for name, item in placement.items():
         if isinstance(item, Mapping) and item.get("value") is not None:
-            said.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
+            details.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
         elif name != "kind" and isinstance(item, str):
-            said.append(f"{name.replace('_', ' ')} {item}")
-    yield Detail(f"{head}: {', '.join(said)}")
+            details.append(f"{name.replace('_', ' ')} {item}")
+    yield Detail(f"{head}: {', '.join(details)}")
 
 
 RELEASED = "released at"
@@ -159,12 +159,12 @@ def unsteady(answer: Answer) -> Iterator[str]:
 
 def resting_pose(lying: Answer) -> Iterator[Detail]:
     """Final motion of a free robot; the line before it states its release."""
-    said = []
+    details = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
-            said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
+            details.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
     words = _STATES[lying["state"]].format(time=in_words(lying["followed_time"]))
-    yield Detail(f"{words}: {', '.join(said)}")
+    yield Detail(f"{words}: {', '.join(details)}")
 
 
 _WORDS = {
