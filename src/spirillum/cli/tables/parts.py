@@ -66,8 +66,8 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
-    table = grid(title, "quantity", "held", "band", "trial", "steady", "unit")
-    table.columns[2].max_width = _BAND_WIDTH
+    table = grid(title, "quantity", "held", "band", "trial", "steady")
+    table.columns[0].no_wrap, table.columns[2].max_width = True, _BAND_WIDTH
     for name in answer if only is None else only:
         for row in rows_of(answer, [name]):
             released = (answer[column].get(name) for column in RELEASED_COLUMNS)
@@ -75,7 +75,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
                 "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
             ]
             band = f"{float(row.low):.3g} to {float(row.high):.3g}" if row.low and row.high else "-"
-            table.add_row(row.name, row.value, band, *cells, row.unit)
+            table.add_row(f"{row.name}, {row.unit}" if row.unit else row.name, row.value, band, *cells)
     return table
 
 
