@@ -175,7 +175,7 @@ def map_tasks(
     crew: WorkerPool,
     *,
     besides: str = "",
-    tell: Tell | None = None,
+    on_progress: Tell | None = None,
 ) -> Iterator[tuple[_Task, _Answer]]:
     """Tasks with their answers, in any order but from this process alone."""
     if crew.cluster is None:
@@ -183,7 +183,7 @@ def map_tasks(
         return
     with _client(crew.cluster) as client:
         _workers(client, crew.cluster)
-        yield from _on_cluster(_Hand(client, work, tasks, tell or (lambda _: None)), crew.cluster, besides)
+        yield from _on_cluster(_Hand(client, work, tasks, on_progress or (lambda _: None)), crew.cluster, besides)
 
 
 def _client(address: str) -> Any:
@@ -242,8 +242,10 @@ def _at_worker(work: Callable[[_Task], _Answer], task: _Task, expected: tuple[st
 class _Hand(Generic[_Task, _Answer]):
     """Tasks that are with the workers of a cluster: a few for each of them at a time."""
 
-    def __init__(self, client: Any, work: Callable[[_Task], _Answer], tasks: Iterable[_Task], tell: Tell) -> None:
-        self._client, self._work, self._ahead, self._tell = client, work, iter(tasks), tell
+    def __init__(
+        self, client: Any, work: Callable[[_Task], _Answer], tasks: Iterable[_Task], on_progress: Tell
+    ) -> None:
+        self._client, self._work, self._ahead, self._tell = client, work, iter(tasks), on_progress
         self._waiting: dict[Any, _Task] = {}
         self._room, self._looked, self._deaths = 0, -_LOOK, 0
 

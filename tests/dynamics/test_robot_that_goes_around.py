@@ -17,7 +17,7 @@ from spirillum.swimming.released_motion import State, SteadyState
     ("state", "rate", "words"),
     [
         ("steady", 0.0, "a steady motion was reached"),
-        ("orbits", 0.5 * np.pi, "no steady place was reached: .* orbits the tube's axis in 4 s"),
+        ("orbits", 0.5 * np.pi, "no steady azimuth was reached: .* orbits the tube's axis in 4 s"),
         ("goes around", -np.pi, "no steady motion was reached: .* goes around the tube in 2 s"),
         ("changing", 0.1, "no steady motion was reached: the battery; all values are means over the last turn"),
     ],

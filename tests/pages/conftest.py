@@ -91,10 +91,10 @@ class Tab:
     """A tab that notes what goes wrong in it, and who it asks."""
 
     def __init__(self, page: Any) -> None:
-        self.page, self.wrong, self.asked = page, [], []
+        self.page, self.wrong, self.requested = page, [], []
         page.on("console", self.note)
         page.on("pageerror", lambda error: self.wrong.append(str(error)))
-        page.on("request", lambda request: self.asked.append(request.url))
+        page.on("request", lambda request: self.requested.append(request.url))
 
     def note(self, said: Any) -> None:
         if said.type in ("error", "warning") and READ_BACK not in said.text:

@@ -24,7 +24,7 @@ WHOLE = {
 
 
 @pytest.fixture
-def bench() -> Any:
+def session() -> Any:
     pytest.importorskip("av")
     pytest.importorskip("cv2")
     made = MeasurementSession()
@@ -33,41 +33,41 @@ def bench() -> Any:
     assert not made._folder.exists()
 
 
-def test_a_file_that_is_no_film_is_refused_and_removed(bench: MeasurementSession) -> None:
+def test_a_file_that_is_no_film_is_refused_and_removed(session: MeasurementSession) -> None:
     for kind in ("exe", "mp4/../../x", "m3u8", ""):
         with pytest.raises(InputError, match=r"allowed: \.mp4"):
-            bench.films.room_for(kind, 1)
-    path = bench.films.room_for("mp4", 14)
+            session.films.room_for(kind, 1)
+    path = session.films.room_for("mp4", 14)
     path.write_bytes(b"no film at all")
     with pytest.raises(InputError) as refused:
-        bench.films.add(path)
-    assert str(bench._folder) not in str(refused.value)
+        session.films.add(path)
+    assert str(session._folder) not in str(refused.value)
     assert not path.exists()
-    assert bench.films.told() == []
+    assert session.films.describe() == []
 
 
 def test_films_on_their_way_count_with_all_their_bytes(
-    bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch
+    session: MeasurementSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(films_module, "_LARGEST_ALL", 1000)
-    coming = bench.films.room_for("mp4", 400)
-    bench.films.room_for("mp4", 600).write_bytes(bytes(600))
+    coming = session.films.room_for("mp4", 400)
+    session.films.room_for("mp4", 600).write_bytes(bytes(600))
     with pytest.raises(TooLargeError, match="room on the disk"):
-        bench.films.room_for("mp4", 1)
+        session.films.room_for("mp4", 1)
     coming.unlink()
-    bench.films.room_for("mp4", 400)
+    session.films.room_for("mp4", 400)
     monkeypatch.setattr(films_module, "_LARGEST_FILM", 100)
     with pytest.raises(TooLargeError, match="GB per video"):
-        bench.films.room_for("mp4", 101)
+        session.films.room_for("mp4", 101)
 
 
-def test_the_disk_has_room_for_films_on_their_way(bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_disk_has_room_for_films_on_their_way(session: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
     free = films_module._SPARE + 1000
     monkeypatch.setattr(films_module.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
-    bench.films.room_for("mp4", 700).write_bytes(bytes(200))  # 500 of the free bytes are still to come
+    session.films.room_for("mp4", 700).write_bytes(bytes(200))  # 500 of the free bytes are still to come
     with pytest.raises(TooLargeError, match="room on the disk"):
-        bench.films.room_for("mp4", 501)
-    bench.films.room_for("mp4", 500)
+        session.films.room_for("mp4", 501)
+    session.films.room_for("mp4", 500)
 
 
 @pytest.mark.parametrize(
@@ -83,62 +83,62 @@ def test_the_disk_has_room_for_films_on_their_way(bench: MeasurementSession, mon
         {"robot.stripes": "red\0"},
     ],
 )
-def test_no_field_names_a_file(bench: MeasurementSession, fields: dict[str, Any]) -> None:
+def test_no_field_names_a_file(session: MeasurementSession, fields: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="allowed"):
-        bench.desk.set_fields(fields)
+        session.editor.set_fields(fields)
 
 
-def test_a_dropped_robot_may_not_rest_on_another_file(bench: MeasurementSession, tmp_path: Path) -> None:
+def test_a_dropped_robot_may_not_rest_on_another_file(session: MeasurementSession, tmp_path: Path) -> None:
     (tmp_path / "secret.toml").write_text("secret = 1\n")
     with pytest.raises(InputError, match="allowed on the page") as refused:
-        bench.desk.add_text(f'extends = "{tmp_path / "secret.toml"}"\n')
+        session.editor.add_text(f'extends = "{tmp_path / "secret.toml"}"\n')
     assert "secret = 1" not in str(refused.value)
-    bench.desk.add_text('extends = "biorob2012-wide"\nname = "mine"\n[tail]\nwavelength = "20 mm"\n')
-    assert bench.desk.fields()["robot.file"] == "robot.toml"
-    assert bench.desk.robot_text() == bench.desk.robot_text()
-    assert 'wavelength = "20 mm"' in bench.desk.robot_text()
+    session.editor.add_text('extends = "biorob2012-wide"\nname = "mine"\n[tail]\nwavelength = "20 mm"\n')
+    assert session.editor.fields()["robot.file"] == "robot.toml"
+    assert session.editor.robot_text() == session.editor.robot_text()
+    assert 'wavelength = "20 mm"' in session.editor.robot_text()
 
 
-def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(bench: MeasurementSession, tmp_path: Path) -> None:
+def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(session: MeasurementSession, tmp_path: Path) -> None:
     from spirillum.vision.setup import load_setup
 
-    bench.desk.set_fields(WHOLE)
-    assert bench.desk.checked()["problems"] == []
-    text = bench.desk.setup_text()
-    bench.desk.set_fields({"robot.file": "biorob2012-wide"})
-    assert bench.desk.checked()["problems"]
-    bench.desk.add_text(text)
-    assert bench.desk.setup_text() == text
+    session.editor.set_fields(WHOLE)
+    assert session.editor.checked()["problems"] == []
+    text = session.editor.setup_text()
+    session.editor.set_fields({"robot.file": "biorob2012-wide"})
+    assert session.editor.checked()["problems"]
+    session.editor.add_text(text)
+    assert session.editor.setup_text() == text
     (tmp_path / "setup.toml").write_text(text)
     setup, robot = load_setup(tmp_path / "setup.toml")
     assert setup.camera.height == pytest.approx(0.21)
     assert robot == load("biorob2012-wide")
 
 
-def test_wrong_numbers_get_a_sentence_with_their_field(bench: MeasurementSession) -> None:
-    bench.desk.set_fields({**WHOLE, "tank.index": "oil", "robot.axis_height": "3 km"})
-    problems = bench.desk.checked()["problems"]
+def test_wrong_numbers_get_a_sentence_with_their_field(session: MeasurementSession) -> None:
+    session.editor.set_fields({**WHOLE, "tank.index": "oil", "robot.axis_height": "3 km"})
+    problems = session.editor.checked()["problems"]
     assert any(one.startswith("tank.index") for one in problems)
     assert any(one.startswith("robot.axis_height") for one in problems)
     with pytest.raises(InputError, match="no video"):
-        bench.measure()
+        session.measure()
 
 
 @pytest.mark.parametrize("value", ["nan", "-inf", "1e400", float("nan")])
 @pytest.mark.parametrize("field", ["tank.index", "tank.index_uncertainty", "camera.frames_per_second"])
-def test_numbers_that_json_has_not_are_told_by_their_field(bench: MeasurementSession, field: str, value: Any) -> None:
-    bench.desk.set_fields({**WHOLE, "tank.surface": "60 mm", field: value})
-    assert [one for one in bench.desk.checked()["problems"] if one.startswith(field)]
-    json.dumps(bench.state(), allow_nan=False)
+def test_numbers_that_json_has_not_are_told_by_their_field(session: MeasurementSession, field: str, value: Any) -> None:
+    session.editor.set_fields({**WHOLE, "tank.surface": "60 mm", field: value})
+    assert [one for one in session.editor.checked()["problems"] if one.startswith(field)]
+    json.dumps(session.state(), allow_nan=False)
 
 
-def test_places_are_counted_when_they_are_given(bench: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_are_counted_when_they_are_given(session: MeasurementSession, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(films_module, "_MOST_FILMS", 2)
-    bench.films.room_for("mp4", 1).unlink()
-    bench.films.room_for("mp4", 1)
-    bench.films.room_for("mp4", 1)
+    session.films.room_for("mp4", 1).unlink()
+    session.films.room_for("mp4", 1)
+    session.films.room_for("mp4", 1)
     with pytest.raises(TooLargeError, match="2 videos are uploaded already"):
-        bench.films.room_for("mp4", 1)
+        session.films.room_for("mp4", 1)
 
 
 def test_decimal_commas_are_numbers() -> None:

@@ -243,17 +243,17 @@ def _scenes(live: Any, wanted: Callable[[dict[str, Any]], bool]) -> list[dict[st
 
 def test_numbers_are_never_those_of_what_was_set_before(served: Any, home: str) -> None:
     changes: list[tuple[dict[str, Any], Callable[[dict[str, Any]], bool]]] = [
-        ({"do": "preset", "value": "magnetic-helix"}, lambda lane: lane["robot"] == "magnetic-helix"),
-        ({"do": "preset", "value": "biorob2012-wide"}, lambda lane: lane["robot"] == "biorob2012-wide"),
-        ({"do": "duty", "value": 0.5}, lambda lane: lane["duty"] == 0.5),
-        ({"do": "set", "field": "run.flow", "value": "0.1 mm/s"}, lambda lane: _knob(lane, "run.flow") == 0.1),
+        ({"do": "preset", "value": "magnetic-helix"}, lambda swimmer: swimmer["robot"] == "magnetic-helix"),
+        ({"do": "preset", "value": "biorob2012-wide"}, lambda swimmer: swimmer["robot"] == "biorob2012-wide"),
+        ({"do": "duty", "value": 0.5}, lambda swimmer: swimmer["duty"] == 0.5),
+        ({"do": "set", "field": "run.flow", "value": "0.1 mm/s"}, lambda swimmer: _knob(swimmer, "run.flow") == 0.1),
     ]
     with _socket(served, home, served.base) as live:
-        _scenes(live, lambda lane: bool(lane["numbers"]))
+        _scenes(live, lambda swimmer: bool(swimmer["numbers"]))
         for command, is_set in changes:
             live.send(json.dumps(command))
-            seen = _scenes(live, lambda lane, is_set=is_set: bool(is_set(lane) and lane["numbers"]))  # type: ignore[misc]
-            shown = [lane["numbers"] for lane in seen if is_set(lane)]
+            seen = _scenes(live, lambda swimmer, is_set=is_set: bool(is_set(swimmer) and swimmer["numbers"]))  # type: ignore[misc]
+            shown = [swimmer["numbers"] for swimmer in seen if is_set(swimmer)]
             assert shown[0] is None  # blank first
             assert all(one is None or one == shown[-1] for one in shown)
     half = sp.load("biorob2012-wide", **{"drive.duty": 0.5})
@@ -262,8 +262,8 @@ def test_numbers_are_never_those_of_what_was_set_before(served: Any, home: str) 
     assert abs(flowing.forward_velocity / still.forward_velocity - 1.0) > 0.1
 
 
-def _knob(lane: dict[str, Any], field: str) -> Any:
-    return next(knob["value"] for knob in lane["knobs"] if knob["field"] == field)
+def _knob(swimmer: dict[str, Any], field: str) -> Any:
+    return next(knob["value"] for knob in swimmer["knobs"] if knob["field"] == field)
 
 
 def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> None:
@@ -314,8 +314,8 @@ def test_what_the_bench_cannot_take_gets_a_sentence(served: Any, home: str, path
 def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("av")
     pytest.importorskip("cv2")
-    bench = MeasurementSession()
-    monkeypatch.setattr(server, "MeasurementSession", lambda: bench)
+    session = MeasurementSession()
+    monkeypatch.setattr(server, "MeasurementSession", lambda: session)
     guard = Guard("127.0.0.1", 1)
     where, _, query = path.partition("?")
     named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "content-length": "9"}
@@ -338,8 +338,8 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
 
     asyncio.run(server.application("biorob2012-wide", guard)(scope, receive, send))
     assert sent[0]["status"] == 400
-    assert not list(bench._folder.iterdir())
-    bench.close()
+    assert not list(session._folder.iterdir())
+    session.close()
 
 
 def test_what_is_too_large_gets_a_sentence(served: Any, home: str) -> None:

@@ -119,16 +119,16 @@ def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path:
     kept = tab.page.context.request.get(tab.page.url + "keep/run.html").text()
     (tmp_path / "run.html").write_text(kept, encoding="utf-8")
     context = browser.new_context(viewport={"width": 500, "height": 400}, offline=True)
-    alone, wrong, asked = context.new_page(), [], []
+    alone, wrong, requested = context.new_page(), [], []
     alone.on("pageerror", lambda error: wrong.append(str(error)))
-    alone.on("request", lambda request: asked.append(request.url))
+    alone.on("request", lambda request: requested.append(request.url))
     alone.goto((tmp_path / "run.html").as_uri())
     alone.locator(".stage .scene").wait_for()
     held = json.loads(alone.locator("#run").inner_text())
     assert held["run"]["time"][-1] == tab.value(f"{FRAME}.time")
     assert np.asarray(Image.open(BytesIO(alone.locator(".scene").screenshot())).convert("L")).std() > 5.0
     assert not wrong
-    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in requested)
     context.close()
 
 
@@ -293,7 +293,7 @@ def test_two_robots_start_together(tab: Any) -> None:
     tab.page.keyboard.press("Control+z")
     tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'tail.wavelength' && knob.value == 25)")
     tab.until("spirillum.frame.lanes.every(lane => lane.ready)")
-    tab.command(do="duty", lane=1, value=0.5)
+    tab.command(do="duty", swimmer=1, value=0.5)
     tab.command(do="step")
     tab.until("spirillum.scene.lanes[1].duty == 0.5")
     tab.until("spirillum.frame.lanes[1].time > 0 && spirillum.frame.lanes[0].time == spirillum.frame.lanes[1].time")
@@ -304,5 +304,5 @@ def test_two_robots_start_together(tab: Any) -> None:
 def test_nothing_went_wrong_and_nobody_else_was_asked(tab: Any, served: Any) -> None:
     """The last one: what all the others did."""
     assert not tab.wrong
-    hosts = {url.split("/")[2] for url in tab.asked if url.startswith(("http", "ws"))}
+    hosts = {url.split("/")[2] for url in tab.requested if url.startswith(("http", "ws"))}
     assert hosts == {served.base.removeprefix("http://")}

@@ -19,14 +19,14 @@ from spirillum.swimming import model_choice
 
 
 @pytest.fixture
-def theatre() -> Iterator[SimulationThread]:
+def simulation() -> Iterator[SimulationThread]:
     found = SimulationThread("ecoli", lambda: None)
     yield found
     found.stop()
 
 
-def lane_of(theatre: SimulationThread) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(theatre.scene)["lanes"][0]
+def swimmer_of(simulation: SimulationThread) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(simulation.scene)["lanes"][0]
     return found
 
 
@@ -43,7 +43,7 @@ def until(true: Callable[[], Any], seconds: float = 600.0) -> None:
     [(MemoryError(), "does not fit into memory; allowed: a smaller one"), (RuntimeError("odd"), "RuntimeError: odd")],
 )
 def test_numbers_go_on_after_any_exception(
-    theatre: SimulationThread, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+    simulation: SimulationThread, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
 ) -> None:
     honest = module.build
 
@@ -52,14 +52,14 @@ def test_numbers_go_on_after_any_exception(
         raise error
 
     monkeypatch.setattr(module, "build", failing)
-    theatre.start()
-    until(lambda: said in lane_of(theatre)["trouble"])
-    theatre.ask({"do": "restart"}, lambda _text: None)
-    until(lambda: lane_of(theatre)["numbers"] and not lane_of(theatre)["trouble"])
-    assert lane_of(theatre)["swims_by"] == "slender"
+    simulation.start()
+    until(lambda: said in swimmer_of(simulation)["trouble"])
+    simulation.ask({"do": "restart"}, lambda _text: None)
+    until(lambda: swimmer_of(simulation)["numbers"] and not swimmer_of(simulation)["trouble"])
+    assert swimmer_of(simulation)["swims_by"] == "slender"
 
 
-def test_motion_goes_on_after_any_exception(theatre: SimulationThread, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motion_goes_on_after_any_exception(simulation: SimulationThread, monkeypatch: pytest.MonkeyPatch) -> None:
     honest, refused = PageRobot.set, list[str]()
 
     def failing(self: PageRobot, name: str, value: str) -> None:
@@ -67,38 +67,38 @@ def test_motion_goes_on_after_any_exception(theatre: SimulationThread, monkeypat
         raise MemoryError
 
     monkeypatch.setattr(PageRobot, "set", failing)
-    theatre.start()
-    theatre.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
+    simulation.start()
+    simulation.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
     until(lambda: refused)
     assert "does not fit into memory" in json.loads(refused[0])["sentence"]
-    theatre.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
-    until(lambda: lane_of(theatre)["undo"] == 1)
+    simulation.ask({"do": "set", "field": "fluid.viscosity", "value": "2 mPa.s"}, refused.append)
+    until(lambda: swimmer_of(simulation)["undo"] == 1)
     assert len(refused) == 1
 
 
-def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(theatre: SimulationThread) -> None:
+def test_thin_wires_and_fine_coils_are_refused_and_the_page_goes_on(simulation: SimulationThread) -> None:
     """One message each; the first once took gigabytes, and the page's numbers for good."""
     refused = list[str]()
-    theatre.start()
-    theatre.ask({"do": "set", "field": "tail.wire_diameter", "value": "1 nm"}, refused.append)
-    until(lambda: "stations along the tail" in lane_of(theatre)["trouble"])
-    theatre.ask({"do": "undo"}, refused.append)
-    until(lambda: lane_of(theatre)["swims_by"])
+    simulation.start()
+    simulation.ask({"do": "set", "field": "tail.wire_diameter", "value": "1 nm"}, refused.append)
+    until(lambda: "stations along the tail" in swimmer_of(simulation)["trouble"])
+    simulation.ask({"do": "undo"}, refused.append)
+    until(lambda: swimmer_of(simulation)["swims_by"])
     coil = {"do": "set", "field": "tail.wavelength", "value": "7.2 nm"}
-    theatre.ask(coil, refused.append)
-    until(lambda: refused or lane_of(theatre)["trouble"])
-    theatre.ask({"do": "preset", "value": "ecoli"}, refused.append)
-    until(lambda: lane_of(theatre)["swims_by"] and lane_of(theatre)["numbers"])
+    simulation.ask(coil, refused.append)
+    until(lambda: refused or swimmer_of(simulation)["trouble"])
+    simulation.ask({"do": "preset", "value": "ecoli"}, refused.append)
+    until(lambda: swimmer_of(simulation)["swims_by"] and swimmer_of(simulation)["numbers"])
 
 
 class Made:
     """A table in preparation, as the page sees it."""
 
-    asked: list[Any] = []  # noqa: RUF012 - emptied by the test
+    requested: list[Any] = []  # noqa: RUF012 - emptied by the test
 
     def __init__(self, robot: Any, _tell: Callable[[], None]) -> None:
         self.robot, self.running, self.said = robot, True, {"what": "table"}
-        Made.asked.append(self)
+        Made.requested.append(self)
 
     def progress(self) -> dict[str, Any]:
         return self.said
@@ -108,24 +108,24 @@ class Made:
 
 
 def test_a_robot_without_a_table_swims_provisionally_until_its_table_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model_choice, "has_table", lambda *_: bool(Made.asked) and not Made.asked[-1].running)
+    monkeypatch.setattr(model_choice, "has_table", lambda *_: bool(Made.requested) and not Made.requested[-1].running)
     monkeypatch.setattr(module, "Preparing", Made)
     monkeypatch.setattr(module, "_UNTOUCHED", 0.1)
-    Made.asked.clear()
-    theatre = SimulationThread("biorob2012-wide", lambda: None)
-    theatre.look(True)
-    theatre.start()
+    Made.requested.clear()
+    simulation = SimulationThread("biorob2012-wide", lambda: None)
+    simulation.look(True)
+    simulation.start()
     try:
-        until(lambda: lane_of(theatre)["numbers"] and Made.asked)
-        shown = lane_of(theatre)
+        until(lambda: swimmer_of(simulation)["numbers"] and Made.requested)
+        shown = swimmer_of(simulation)
         assert (shown["provisional"], shown["swims_by"], shown["numbers"]["model"]) == (True, "slender", "slender")
         assert shown["caution"].startswith("provisional, without walls")
-        Made.asked[0].said, Made.asked[0].running = {"done": True}, False
-        until(lambda: lane_of(theatre)["swims_by"] == "tube" and lane_of(theatre)["numbers"])
-        assert not lane_of(theatre)["provisional"]
-        assert len(Made.asked) == 1
+        Made.requested[0].said, Made.requested[0].running = {"done": True}, False
+        until(lambda: swimmer_of(simulation)["swims_by"] == "tube" and swimmer_of(simulation)["numbers"])
+        assert not swimmer_of(simulation)["provisional"]
+        assert len(Made.requested) == 1
     finally:
-        theatre.stop()
+        simulation.stop()
 
 
 @pytest.mark.parametrize(
@@ -146,10 +146,10 @@ def test_a_process_beside_the_page_tells_why_it_failed(
     monkeypatch.setattr("sys.stdin", io.StringIO("{}"))
     with pytest.raises(SystemExit) as left:
         worker(work)
-    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    describe = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert left.value.code == code
-    assert told[0]["what"] == "half"
-    assert said in told[-1]["failed"]
+    assert describe[0]["what"] == "half"
+    assert said in describe[-1]["failed"]
 
 
 def test_a_process_that_was_ended_says_so_and_what_it_prints_besides_is_no_progress(
@@ -168,13 +168,13 @@ def test_trial_and_steady_motion_come_beside_the_held_numbers() -> None:
     page = SimulationThread("biorob2012-wide", lambda: None)
     page.start()
     try:
-        until(lambda: lane_of(page)["numbers"])
-        assert lane_of(page)["numbers"]["columns"] == {"trial": None, "steady": None}  # being computed
-        until(lambda: all(lane_of(page)["numbers"]["columns"].values()))
-        columns = lane_of(page)["numbers"]["columns"]
+        until(lambda: swimmer_of(page)["numbers"])
+        assert swimmer_of(page)["numbers"]["columns"] == {"trial": None, "steady": None}  # being computed
+        until(lambda: all(swimmer_of(page)["numbers"]["columns"].values()))
+        columns = swimmer_of(page)["numbers"]["columns"]
         page.ask({"do": "preset", "value": "ecoli"}, lambda _text: None)
-        until(lambda: (lane_of(page)["numbers"] or {}).get("model") == "slender")
-        assert lane_of(page)["numbers"]["columns"] == {}
+        until(lambda: (swimmer_of(page)["numbers"] or {}).get("model") == "slender")
+        assert swimmer_of(page)["numbers"]["columns"] == {}
     finally:
         page.stop()
     answer = predict("biorob2012-wide", band=False)

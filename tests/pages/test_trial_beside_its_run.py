@@ -45,18 +45,18 @@ def study() -> xr.Dataset:
 
 
 def test_picture_of_a_study_holds_its_speeds(study: xr.Dataset) -> None:
-    told = StudyPicture(study).told()
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    describe = StudyPicture(study).describe()
+    assert json.loads(json.dumps(describe, allow_nan=False)) == describe
     found = study["forward_velocity"].sel(friction="rotor", wavelength=0.025, amplitude=0.0015, model="rft")
-    assert told["speeds"][1][0][0][3] == float(found.isel(channel=1))
+    assert describe["speeds"][1][0][0][3] == float(found.isel(channel=1))
 
 
 def test_a_tail_that_is_pointed_at_swims_as_in_the_study(study: xr.Dataset) -> None:
-    picture, lane = StudyPicture(study), PageRobot.of("biorob2012-wide")
-    lane.swap(*picture.tail({"channel": 1, "wavelength": 3, "amplitude": 0}))
-    found = sp.predict(lane.robot, model="rft", friction="rotor").forward_velocity
-    assert found == pytest.approx(picture.told()["speeds"][1][0][0][3], rel=1e-9)
-    assert lane.settings.source == "biorob2012-narrow"  # a preset keeps its name for the command line
+    picture, swimmer = StudyPicture(study), PageRobot.of("biorob2012-wide")
+    swimmer.swap(*picture.tail({"channel": 1, "wavelength": 3, "amplitude": 0}))
+    found = sp.predict(swimmer.robot, model="rft", friction="rotor").forward_velocity
+    assert found == pytest.approx(picture.describe()["speeds"][1][0][0][3], rel=1e-9)
+    assert swimmer.settings.source == "biorob2012-narrow"  # a preset keeps its name for the command line
     with pytest.raises(InputError, match="allowed: 0 to 3"):
         picture.tail({"channel": 1, "wavelength": 4, "amplitude": 0})
 

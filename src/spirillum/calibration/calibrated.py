@@ -183,7 +183,7 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
 def posterior_tree(found: Calibrated) -> xr.DataTree:
     """Groups `posterior`, `log_likelihood` (robot by robot), `observed_data` and `sample_stats` of a posterior."""
     posterior = found.posterior
-    assert posterior is not None  # noqa: S101 - the caller has asked
+    assert posterior is not None  # noqa: S101 - checked by the caller
     density, problem, experiment = posterior.density, found.problem, found.experiment
     values = posterior.values()
     units = {item.label: item.parameter.unit or "1" for item in problem.coordinates}

@@ -238,7 +238,7 @@ def _check_name(path: Path, item: ObservationRow, robot: Robot, robots: Sequence
 
 
 def _check_signs(path: Path, observations: Sequence[ObservationRow], by_channel: Mapping[float, Robot]) -> None:
-    """A tail turns the way that it is driven, and the body against it."""
+    """A tail turns in the sense in which it is driven, and the body against it."""
     for robot in by_channel.values():
         items = [item for item in observations if by_channel[round(item.channel_diameter, 9)] is robot]
         check_driven(path, items, robot)
@@ -277,7 +277,7 @@ def _copies(items: Sequence[ObservationRow]) -> list[Note]:
 
 
 def _check_direction(path: Path, items: Sequence[ObservationRow]) -> None:
-    """A trial that swims the other way than all others of its tail, and no less fast, has a wrong sign."""
+    """A trial that swims in the direction opposite to all others of its tail, and no less fast, has a wrong sign."""
     speeds = np.array([item.forward_velocity for item in items])
     for place, speed in enumerate(speeds.tolist()):
         others = np.delete(speeds, place)

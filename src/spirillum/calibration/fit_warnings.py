@@ -155,7 +155,7 @@ def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], 
             if size.value > _BEYOND_TRIALS:
                 found.append(Note(code, words, (name,)))
                 code, words = "misfit", _misfit(model, called, size.value, "more than trials err")
-        elif min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT:  # the residuals say so, and not the prior alone
+        elif min(size.value, fit.discrepancy[name]) > _LARGE_MISFIT:  # by the residuals, and not the prior alone
             code, words = "misfit", _misfit(model, called, size.value, "beyond the scatter of trials")
         else:
             continue

@@ -79,12 +79,12 @@ def tube_forward(
     experiment: Experiment,
     batch: RobotBatch,
     free: Sequence[str],
-    tell: Callable[[str, int, int], None],
+    on_progress: Callable[[str, int, int], None],
     *,
     prepare: bool,
 ) -> tuple[Forward, float]:
     """The forward model, and the largest relative error of the robots' tables in speed and body rate."""
-    model = _tables(experiment, batch, tell, prepare=prepare)
+    model = _tables(experiment, batch, on_progress, prepare=prepare)
     level = replace(batch, placement=Placement().model_copy(update={"pitch": 0.0}))
     contact = _contact(experiment, batch) if "friction_coefficient" in free else None
     forward = Forward(TubeResistance.of(level, model), batch.electrics, batch.viscosity, contact=contact)
@@ -93,7 +93,7 @@ def tube_forward(
 
 
 def _tables(
-    experiment: Experiment, batch: RobotBatch, tell: Callable[[str, int, int], None], *, prepare: bool
+    experiment: Experiment, batch: RobotBatch, on_progress: Callable[[str, int, int], None], *, prepare: bool
 ) -> TabledTube:
     """The robots' tables."""
     found = tables_of(batch)
@@ -101,7 +101,11 @@ def _tables(
     if lacking and not prepare:
         otherwise = ", or model 'sbt', which leaves out the walls"
         raise without_tables(experiment, lacking, "model 'tube' asks a table", otherwise)
-    made = [one.table for one in prepare_all(experiment.robots, stage="straight", progress=tell)] if lacking else found
+    made = (
+        [one.table for one in prepare_all(experiment.robots, stage="straight", progress=on_progress)]
+        if lacking
+        else found
+    )
     return TabledTube({table.key: table for table in made if table is not None})
 
 
@@ -134,7 +138,7 @@ def _contact(experiment: Experiment, batch: RobotBatch) -> DryContact:
 
 
 FREE = ("shared_friction", "friction_coefficient", "roughness")
-"""Parameters that a fit of trials may free: where a robot lies follows from the run."""
+"""Parameters that a fit of trials may free: the pose follows from the run."""
 _RUNS = {1: 16, 2: 32, 3: 64}
 """Trials of each robot, by the number of free parameters."""
 _FEWEST = 0.75
@@ -177,14 +181,14 @@ def check_free(free: Sequence[str], model: str) -> None:
 
 
 def trial_surfaces(
-    experiment: Experiment, ends: Ends, tell: Callable[[str, int, int], None], *, prepare: bool
+    experiment: Experiment, ends: Ends, on_progress: Callable[[str, int, int], None], *, prepare: bool
 ) -> TrialSurfaces:
     """Make the trials of all robots and lay surfaces through them."""
-    _check_yaw_tables(experiment, tell, prepare=prepare)
-    return surfaces_of(experiment.robots, ends, tell)
+    _check_yaw_tables(experiment, on_progress, prepare=prepare)
+    return surfaces_of(experiment.robots, ends, on_progress)
 
 
-def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, int], None]) -> TrialSurfaces:
+def surfaces_of(robots: Sequence[Robot], ends: Ends, on_progress: Callable[[str, int, int], None]) -> TrialSurfaces:
     """Make the trials of robots with tables, and lay surfaces through them."""
     names, count = tuple(ends), _RUNS[len(ends)]
     logs = _points(ends, count)
@@ -195,7 +199,7 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, i
         table = table_for(RobotBatch.of(robot))
         with ThreadPoolExecutor(thread_count()) as pool:  # the compiled loops release the GIL
             for number, measured in enumerate(pool.map(partial(_measured, robot, table), values)):
-                tell("trials of the robots", place * count + number, len(robots) * count)
+                on_progress("trials of the robots", place * count + number, len(robots) * count)
                 seen[number] = measured
         known = np.isfinite(seen).all(axis=1)
         if known.mean() < _FEWEST:
@@ -210,14 +214,14 @@ def surfaces_of(robots: Sequence[Robot], ends: Ends, tell: Callable[[str, int, i
     return TrialSurfaces(names, ends, tuple(surfaces), np.array(scales), float(np.max(errors)))
 
 
-def _check_yaw_tables(experiment: Experiment, tell: Callable[[str, int, int], None], *, prepare: bool) -> None:
+def _check_yaw_tables(experiment: Experiment, on_progress: Callable[[str, int, int], None], *, prepare: bool) -> None:
     """Make the tables that are not there, or refuse."""
     known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
     lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
     if lacking and not prepare:
         raise without_tables(experiment, lacking, "a trial asks a table with yawed poses")
     if lacking:
-        prepare_all(experiment.robots, stage="yaw", progress=tell)
+        prepare_all(experiment.robots, stage="yaw", progress=on_progress)
 
 
 def _points(ends: Ends, count: int) -> Samples:

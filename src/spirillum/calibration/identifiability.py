@@ -132,7 +132,7 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     labels = [problem.coordinates[place].label for place in named]
     known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
     if len(named) == 1:
-        if abs(z[named[0]]) > FAR:  # `prior_warnings` says so
+        if abs(z[named[0]]) > FAR:  # `prior_warnings` reports it
             return None
         words = (
             f"{labels[0]} is hardly identifiable: the observations say {known} about it; fix it or state its "
@@ -232,7 +232,7 @@ def torque_error(problem: Problem) -> float | None:
     """Return half of the relative 95 % interval of the model's torque on the tails: the largest error that is known.
 
     That of the wire, as against resolved wires, and of the table. None for a model that leaves the walls of the robots'
-    tubes out: nothing that is observed tells what these do to the torque.
+    tubes out: no observation determines what these do to the torque.
     """
     if not problem.model.placed:
         return None

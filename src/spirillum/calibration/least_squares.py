@@ -35,7 +35,7 @@ _STARTS = 6
 _STEP = 1e-4
 """Step of the central differences, in standard deviations of the prior."""
 _SMALL_STEP = float(np.sqrt(np.finfo(float).eps))
-"""Step of the forward differences on the way to the best fit, relative to coordinates above one."""
+"""Step of the forward differences during the fit, relative to coordinates above one."""
 _BLIND = 1e-8
 """Relative change of a prediction by one standard deviation of a prior that is none but rounding."""
 LARGEST = 12.0

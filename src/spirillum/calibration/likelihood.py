@@ -5,7 +5,7 @@ For robot j and quantity q (advance, turning, motor rate) with the mean y over n
     y = f (1 + tau_q d) + sigma_q |y| e/sqrt(n),   d, e ~ N(0, 1)
 
 tau_q is the model's discrepancy: what it gets wrong from robot to robot, however many trials are made. sigma_q is the
-relative error of a trial, which the scatter of repeated trials tells; it is no less than what the trial itself states
+relative error of a trial, which the scatter of repeated trials gives; it is no less than what the trial itself states
 of its measurement. Both have half-normal priors and are integrated
 over with the rest. Errors of advance and turning within a robot are correlated, since both are divided by the same tail
 rate; their correlation is that of the trials.

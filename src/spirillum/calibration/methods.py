@@ -6,4 +6,4 @@ from typing import Literal, get_args
 
 Method = Literal["posterior", "least-squares", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)
-"""Draws of the posterior, its most probable values, or the paper's own way."""
+"""Draws of the posterior, its most probable values, or the paper's own method."""

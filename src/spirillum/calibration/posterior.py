@@ -105,7 +105,7 @@ def sampled(
 ) -> Posterior:
     """Draw from the posterior."""
     how = sampling or Sampling()
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     density = Density(problem)
     walkers = how.walkers or max(24, 4 * density.size)
     rng = np.random.default_rng(how.seed)
@@ -114,7 +114,7 @@ def sampled(
     steps, total, warm_up = how.steps, 0, how.warm_up
     for doubling in range(how.doublings + 1):
         for number, (sampler, chain) in enumerate(zip(samplers, chains, strict=True)):
-            tell(f"sampling, {total + steps} steps", number, len(samplers))
+            on_progress(f"sampling, {total + steps} steps", number, len(samplers))
             chain.append(sampler.run(steps, warm_up))
         warm_up = 0
         total += steps
@@ -122,7 +122,7 @@ def sampled(
         found = _thinned(density, [np.concatenate(chain) for chain in chains], samplers, how.kept)
         if found.converged or doubling == how.doublings:
             break
-    tell("sampling", 1, 1)
+    on_progress("sampling", 1, 1)
     return found
 
 

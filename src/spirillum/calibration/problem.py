@@ -104,7 +104,7 @@ class Problem:
         """
         values = self._all_values(z)
         found = {name: values[:, places] for name, places in self._places.items()}
-        if "roughness" in found:  # a robot that lies on its asperities
+        if "roughness" in found:  # a robot that rests on its asperities
             found["gap"] = gap_on_asperities(found["roughness"])
         return found
 
@@ -221,14 +221,14 @@ def posed(
         check_free(free, chosen.name)
     _check_motor(experiment, free, batch)
     parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     ranges: Ranges = {}
     if chosen.placed:
         ranges = place_ranges(batch, chosen, [name for name in free if name in ("gap", "pitch", "roughness")])
         bound = () if answer == RELEASED else free  # in a trial the run has the dry friction
-        forward, error = tube_forward(experiment, batch, bound, tell, prepare=prepare)
+        forward, error = tube_forward(experiment, batch, bound, on_progress, prepare=prepare)
     else:
-        forward, error = _forward(experiment, chosen, batch, parameters, tell)
+        forward, error = _forward(experiment, chosen, batch, parameters, on_progress)
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     friction = np.where(np.isnan(batch.effective_friction), rotor, batch.effective_friction)
     problem = Problem(
@@ -249,7 +249,7 @@ def posed(
     problem = replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
     if answer == HELD:
         return problem
-    trials = trial_surfaces(experiment, _ends(problem), tell, prepare=prepare)
+    trials = trial_surfaces(experiment, _ends(problem), on_progress, prepare=prepare)
     return replace(problem, trials=trials, interpolation_error=max(error, trials.error))
 
 
@@ -305,7 +305,11 @@ def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch)
 
 
 def _forward(
-    experiment: Experiment, model: SwimmerModel, batch: RobotBatch, parameters: Sequence[FitParameter], tell: Progress
+    experiment: Experiment,
+    model: SwimmerModel,
+    batch: RobotBatch,
+    parameters: Sequence[FitParameter],
+    on_progress: Progress,
 ) -> tuple[Forward, float]:
     """Resistances, over a table where the wire is free, and the largest error of its interpolation."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
@@ -315,10 +319,12 @@ def _forward(
     def over(there: RobotBatch, wires: Samples | None = None) -> Forward:
         def told(done: int, total: int) -> None:
             words = "" if wires is None else f", wire of {wires[done] * 1e3:.3g} mm"
-            tell(f"{model.name}, {experiment.size} robots{words}", done, total)
+            on_progress(f"{model.name}, {experiment.size} robots{words}", done, total)
 
         silent = wires is None and model.closed_form
-        table = AxialTable.of(there, model, wires=wires, coefficients=coefficients, tell=None if silent else told)
+        table = AxialTable.of(
+            there, model, wires=wires, coefficients=coefficients, on_progress=None if silent else told
+        )
         return Forward(table, batch.electrics, batch.viscosity, body_axial(there), factors)
 
     if not any(item.name == "wire_diameter" for item in parameters):

@@ -138,7 +138,7 @@ class Ranking(DisplayMixin):
         for name, (values, low, high) in item.fit.predicted.items():
             seen = item.fit.problem.ratio(name).mean
             spread = np.abs(high - low) / (2.0 * 1.96)
-            off = (seen - values) / spread * np.sign(values)  # positive where more was observed, as their ratio says
+            off = (seen - values) / spread * np.sign(values)  # positive where more was observed
             found += [
                 {
                     "tail": experiment.labels()[place],
@@ -202,7 +202,7 @@ def rank_models(
         sampling: how the posteriors are sampled.
         prepare: compute missing tables of the model `tube`, minutes for each.
         answer: what `tube` is fitted as: `held`, or `trial` (two numbers: friction coefficient and roughness).
-        progress: told what is being done.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a single model, or observations that none of the models explains.
@@ -282,7 +282,7 @@ def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
 
     found = {}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what they warn of is said below, in our words
+        warnings.simplefilter("ignore")  # reported below as notes
         for name, fit in fits.items():
             found[name] = loo(posterior_tree(fit), pointwise=True, var_name="robot")
         order = [str(name) for name in compare(found).index] if len(found) > 1 else list(found)

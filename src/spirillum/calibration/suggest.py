@@ -1,7 +1,7 @@
 """Which tail or channel to measure next: the expected information gain of each candidate.
 
 Given the draws of a posterior, a new robot's means would be seen with the model's discrepancy and the errors of its
-trials. What they would tell about the fitted numbers is their mutual information. Where draws of the predictions are
+trials. Their information about the fitted numbers is the mutual information. Where draws of the predictions are
 close to normal, as they are once some robots have been observed, it is
 
     I = 1/2 log det(C + N) - 1/2 log det(N)
@@ -87,7 +87,7 @@ class CandidateRobot:
 
 @dataclass(frozen=True, repr=False)
 class Suggestion(DisplayMixin):
-    """Candidates from the most to the least telling."""
+    """Candidates from the most to the least informative."""
 
     posterior: PosteriorFile
     trials: int
@@ -140,7 +140,7 @@ def suggest(
             amplitude in every robot's channel.
         trials: trials of each candidate.
         answer: motion of which the posterior is: `held`, or `trial`, with some dozens of runs of each candidate.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input.
@@ -148,7 +148,7 @@ def suggest(
     check_range("trials", trials, 1, 10**6)
     check_choice("answer", answer, (HELD, RELEASED))
     known = read_posterior(posterior, answer=answer)
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     given = _papers_robots(known) if robots is None else given_robots(robots)
     _check_channels(given)
     loaded = [known.central(robot) for robot in given]
@@ -157,7 +157,7 @@ def suggest(
     left_out = []
     numbers, names = _numbers(known)
     for place, robot in enumerate(listed):
-        tell("candidates", place, len(listed))
+        on_progress("candidates", place, len(listed))
         outside = _outside(known, robot, answer)
         if outside:
             left_out.append(Note("without-answer", f"{tail_words(robot)} is left out: {outside}"))
@@ -280,7 +280,7 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
 
 
 def _ranked(found: Sequence[tuple[CandidateRobot, Samples]]) -> tuple[CandidateRobot, ...]:
-    """Candidates from the most to the least telling, each with how far it is behind the first."""
+    """Candidates from the most to the least informative, each with how far it is behind the first."""
     ordered = sorted(found, key=lambda pair: -pair[0].gain)
     best, of_best = ordered[0]
     return tuple(

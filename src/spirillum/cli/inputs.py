@@ -60,10 +60,12 @@ RULES: dict[str, tuple[Rule, ...]] = {
         Rule(
             "run",
             ("robot", "tail_rate", "friction", "settings", "phase", *_FIELDS, "flow"),
-            "together with a run, which says it; allowed: --run and --time alone",
+            "together with a run, which states it; allowed: --run and --time alone",
         ),
         Rule(
-            "run with another model", ("model",), "together with a run, which says it; allowed: --run and --time alone"
+            "run with another model",
+            ("model",),
+            "together with a run, which states it; allowed: --run and --time alone",
         ),
     ),
     "measure": (

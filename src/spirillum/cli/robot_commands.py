@@ -105,13 +105,13 @@ def prepare(
         raise InputError("no robot; allowed: a preset's name or a robot file, several of them, or --study FILE")
     if fine and stage is not None:
         raise InputError("--fine and --stage are mutually exclusive; allowed: one of them")
-    asked = [loaded_robot(robot, settings) for robot in robots or []]
+    requested = [loaded_robot(robot, settings) for robot in robots or []]
     if study is not None:
         loaded = load_study(study_of(study), overrides_from(settings))
-        asked += [loaded.robot_at(index) for index in range(loaded.count)]
+        requested += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
         found = prepare_all(
-            asked, stage="fine" if fine else "yaw" if stage is None else stage, workers=workers, progress=progress
+            requested, stage="fine" if fine else "yaw" if stage is None else stage, workers=workers, progress=progress
         )
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)
 

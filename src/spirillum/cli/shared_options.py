@@ -13,7 +13,7 @@ from typer.core import TyperCommand
 
 MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
-PLACE_PANEL = "Place in the channel (model tube)"
+PLACE_PANEL = "Pose in the channel (model tube)"
 """Panel of the help: pose of the robot in its channel."""
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"

@@ -163,8 +163,8 @@ def flow(
     fineness = request.arguments.get("resolution")
     if run is None:
         if request.named_robot is None or time is not None:
-            said = "no robot" if request.named_robot is None else f"time = {time} without a run"
-            raise InputError(f"{said}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
+            problem = "no robot" if request.named_robot is None else f"time = {time} without a run"
+            raise InputError(f"{problem}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
         loaded = request.robot
         seat = seat_in_tube(loaded, model, request.arguments.get("placement"), fineness)
     else:

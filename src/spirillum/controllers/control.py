@@ -250,7 +250,7 @@ def control(
         live: run in real time.
         bench: makes camera, meter and remote of the run from plant, lab and seed in place of the modelled ones, such as
             `spirillum.Bench`: pictures, tracker and a remote at a port. Scores are of the modelled ones.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Returns:
         The run and the scores; with an interrupt what was done until then. The drive is off at the end of every run.

@@ -90,7 +90,7 @@ class _Watching(Controller):
 
 
 class KeepCourse(_Watching):
-    """A course at a set speed, by PWM; on a leash it holds the speed and lets go of a way that a pulse of flow took."""
+    """A course at a set speed, by PWM; bounded, it holds the speed and gives up what a pulse of flow took."""
 
     def __init__(
         self,
@@ -178,10 +178,10 @@ class _CourseTask(Task):
     """What the tasks of speed share."""
 
     leash: ClassVar[float] = np.inf
-    """See `KeepCourse`: whether the way that a pulse of flow took is made up for."""
+    """See `KeepCourse`: whether the displacement by a pulse of flow is recovered."""
 
     speed: Annotated[Velocity, AfterValidator(_check_forward)] | None = None
-    """Speed along the robot's way. It has to be given."""
+    """Speed along the robot's path. It has to be given."""
 
     @property
     def set_speed(self) -> float:
@@ -280,7 +280,7 @@ class RideOutTask(_CourseTask):
 
 
 class SaveBatteryTask(RideOutTask):
-    """Go a way in a time with as little from the battery as a remote that knows on and off allows.
+    """Cover a distance in a time with as little from the battery as a remote that knows on and off allows.
 
     A run is good if the robot has come as far as the course, within the tolerance; further does not count against it.
     """

@@ -87,7 +87,7 @@ class Meter(Options):
 
 
 class Remote(Options):
-    """What carries commands to the robot: one way, repeated, and some are lost.
+    """What carries commands to the robot: unidirectional, repeated, and some are lost.
 
     The defaults are those of common infrared remotes: a message lasts 68 ms and is repeated every 108 ms (NEC code).
     """

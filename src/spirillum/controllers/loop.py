@@ -260,7 +260,7 @@ def run_loop(
         senses: camera, meter and remote of this run; None: those of the lab. They are closed at its end.
         flow: the pulse of flow of this run; None: none.
         pace: told the time of each decision before it is taken, s; it may wait.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Returns:
         The run; with an interrupt, an end of the channel or a wrong command what was done until then. The drive is off

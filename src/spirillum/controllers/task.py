@@ -50,7 +50,7 @@ class Brief:
     schedule: tuple[float, float]
     """Of the open loop: until when it is on, s, and at which duty."""
     carried: float
-    """Way of the robot over the way of the mean flow that carries it."""
+    """Displacement of the robot over that of the mean flow that carries it."""
 
     @property
     def way(self) -> float:

@@ -39,7 +39,7 @@ _MOST_OF_STEP_OUT = 0.95
 _STATED_SEED = 7919
 """Added to the seed for the draws of what is stated."""
 
-Tell = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 
 
 def design(
@@ -55,7 +55,7 @@ def design(
     bench: Manufacturability | Mapping[str, Any] | None = None,
     model: str = AUTO,
     tail_rate: str | float | None = None,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
 ) -> Design:
     """Find the best values of some numeric fields of a robot.
 
@@ -86,7 +86,7 @@ def design(
             be learned.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the
             robot's own drive.
-        progress: told what is being done, how much of it, and of how much.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, or where no design can be wound and keeps all conditions.
@@ -114,24 +114,24 @@ def design(
         return Evaluation(space, chosen, objectives, conditions, wound, drawn, options.confidence, rate)
 
     searched = under(unknowns.draws(options.draws, options.seed))
-    archive, tell = Archive(), progress or (lambda _what, _done, _total: None)
+    archive, on_progress = Archive(), progress or (lambda _what, _done, _total: None)
     learned = None
     if is_learned(chosen, space, unknowns):
-        searched, archive, best, learned = learned_best(searched, unknowns, choice.model, options.seed, tell)
+        searched, archive, best, learned = learned_best(searched, unknowns, choice.model, options.seed, on_progress)
     else:
-        best = best_design(searched, archive, seed=options.seed, tell=tell)
+        best = best_design(searched, archive, seed=options.seed, on_progress=on_progress)
     if not best.possible:
         raise InputError(_none_is_possible(searched, best.shares, archive))
     front = None
     if len(objectives) > 1:
-        front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, tell=tell)
+        front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, on_progress=on_progress)
     drawn = unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED, _SETS)
     stated = replace(searched, drawn=drawn)
     answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
     answer = replace(answer, learned=learned, model_reason=choice.reason)
     if choice.model == WALLED and rate is None and posterior is None:
         built = [(shares, _built(given, space, shares)) for shares in answer.leading]
-        answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=tell))
+        answer = replace(answer, confirmed=confirmed(built, make_tables=options.confirm, progress=on_progress))
     elif options.confirm:
         raise InputError("confirm = True, but trials follow from the drive in the tube; allowed: model 'tube' alone")
     return replace(answer, warnings=(*answer.warnings, *lead_warnings(answer)))

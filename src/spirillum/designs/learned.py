@@ -22,7 +22,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.designs.criteria import TURNS, Space, Variable
 from spirillum.designs.design_result import Learned
 from spirillum.designs.evaluation import Evaluation, Unknowns
-from spirillum.designs.search import Archive, Found, Tell, best_design
+from spirillum.designs.search import Archive, Found, Progress, best_design
 from spirillum.errors import InputError
 from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import SwimmerModel
@@ -284,7 +284,7 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 
 
 def learned_best(
-    blank: Evaluation, unknowns: Unknowns, name: str, seed: int, tell: Tell, solve: Solve | None = None
+    blank: Evaluation, unknowns: Unknowns, name: str, seed: int, on_progress: Progress, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
     """The best design by a model that solves for the flow.
 
@@ -295,16 +295,16 @@ def learned_best(
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
     empty = replace(blank, model=corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))
     first = _first_designs(empty, own, seed)
-    points = _solved(empty, first, own, solving, tell, None)
+    points = _solved(empty, first, own, solving, on_progress, None)
     last = 1.0
     for number in range(_ROUNDS):
         evaluation, archive = replace(blank, model=corrected(name, points)), Archive()
-        best = best_design(evaluation, archive, seed=seed, tell=tell)
+        best = best_design(evaluation, archive, seed=seed, on_progress=on_progress)
         if not best.possible or last <= _AGREES:
             break
         before = _objective(evaluation, best.shares)
         more = [best.shares, *_runner_up(evaluation, archive, best.shares, number)]
-        points = _solved(empty, np.stack(more), own, solving, tell, points)
+        points = _solved(empty, np.stack(more), own, solving, on_progress, points)
         after = _objective(replace(blank, model=corrected(name, points)), best.shares)
         last = abs(before / after - 1.0) if after else abs(before - after)
     return evaluation, archive, best, Learned(len(points.features), last, _left_out(evaluation, name, points))
@@ -342,7 +342,12 @@ def _first_designs(empty: Evaluation, own: tuple[Variable, ...], seed: int) -> S
 
 
 def _solved(
-    empty: Evaluation, shares: Samples, own: tuple[Variable, ...], solving: Solve, tell: Tell, points: Points | None
+    empty: Evaluation,
+    shares: Samples,
+    own: tuple[Variable, ...],
+    solving: Solve,
+    on_progress: Progress,
+    points: Points | None,
 ) -> Points:
     """Solve for designs one by one, first of all for today's, and add what they teach."""
     batches = [block for _, block in empty.space.batch(shares).blocks(1)] if len(shares) else []
@@ -350,7 +355,7 @@ def _solved(
         today = RobotBatch.of(empty.space.robot)
         batches = [*([today] if bool(np.all(all_hold(empty.limits(None)))) else []), *batches]
     for number, batch in enumerate(batches):
-        tell("tails that are solved for", number, len(batches))
+        on_progress("tails that are solved for", number, len(batches))
         more = solving(batch, own)
         points = more if points is None else points.joined(more)
     assert points is not None  # noqa: S101 - there is a design

@@ -22,7 +22,7 @@ from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.preparation import prepare_all
 from spirillum.swimming.released_motion import ReleasedMotion
 
-Tell = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 _GENERATIONS = 60
 _POPULATION = 12
 """Designs of a generation for each variable."""
@@ -83,12 +83,12 @@ def best_design(
     objective: int = 0,
     above: tuple[int, float] | None = None,
     start: Samples | None = None,
-    tell: Tell | None = None,
+    on_progress: Progress | None = None,
 ) -> Found:
     """Minimise the cost of one objective."""
     from scipy.optimize import Bounds, differential_evolution, minimize
 
-    size, say = evaluation.space.size, tell or (lambda _what, _done, _total: None)
+    size, notify = evaluation.space.size, on_progress or (lambda _what, _done, _total: None)
     done = [0]
 
     def costs(shares: Samples) -> Samples:
@@ -106,7 +106,7 @@ def best_design(
 
     def generation(intermediate_result: Any) -> bool:
         done[0] += 1
-        say("designs", min(done[0], _GENERATIONS), _GENERATIONS)
+        notify("designs", min(done[0], _GENERATIONS), _GENERATIONS)
         energies = np.asarray(intermediate_result.population_energies)
         # SciPy's own criterion is relative to the mean, which is large as long as designs are refused.
         return bool(energies.max() < BROKEN and np.ptp(energies) <= _CONVERGED * abs(energies.min()))
@@ -158,27 +158,26 @@ def _over(excess: Samples) -> Samples:
     return np.minimum(BROKEN + excess, 0.5 * REFUSED)
 
 
-def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points: int, tell: Tell) -> Samples:
+def pareto_front(evaluation: Evaluation, archive: Archive, *, seed: int, points: int, on_progress: Progress) -> Samples:
     """Designs of which none is better in both objectives, (points, variables), from one extreme to the other.
 
     The best of the first objective is sought with the second bounded (epsilon-constraint method, Haimes et al. 1971),
     for bounds that lie evenly between the extremes. Each search begins where all before it have been.
     """
-    say = tell
-    say("designs on the front", 0, points)
+    on_progress("designs on the front", 0, points)
     ends = [best_design(evaluation, archive, seed=seed, objective=n) for n in (0, 1)]
     if not all(end.possible for end in ends):
         return np.stack([end.shares for end in ends])
     costs = [evaluation.scores(end.shares[None]).cost[1, 0] for end in ends]
     found = [ends[0].shares]
     for number in range(1, points - 1):
-        say("designs on the front", number, points)
+        on_progress("designs on the front", number, points)
         bound = float(costs[0] + (costs[1] - costs[0]) * number / (points - 1))
         start = _nearest(evaluation, archive, bound)
         one = best_design(evaluation, archive, seed=seed + number, above=(1, bound), start=start)
         found.append(one.shares)
     found.append(ends[1].shares)
-    say("designs on the front", points, points)
+    on_progress("designs on the front", points, points)
     return _undominated(evaluation, np.stack(found))
 
 

@@ -279,7 +279,7 @@ def compare_models(
         calibration: calibration file whose factors replace the robot's.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.
-        progress: told what is being computed, how many models are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, or if no model answers.

@@ -124,7 +124,7 @@ def free_motion(
         in_tube: azimuth of the start and coefficient of dry friction.
         until: gap that it has to reach, m; None: no such gap.
         turns_shown: of the tail in the path at least.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
     """
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])

@@ -81,7 +81,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             centre of mass, effective friction, cavitation pressure): 64 runs.
         beyond_stokes: answer at Reynolds numbers above 10 too, where inertia dominates and these models
             are wrong, as the robot's option `model.beyond_stokes`.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a

@@ -191,7 +191,7 @@ def magnetic_sweep(
         turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
             at most 25, and the last is averaged, over whole slips where the robot slips.
         resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.
-        progress: told what is being computed, how many rates are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Returns:
         Dataset over `field_rate` (rad/s): `forward_velocity` along the field's axis, `tail_rotation_rate` about it,

@@ -261,7 +261,7 @@ def settle(
         in_tube: `azimuth` of the start and `friction_coefficient`, see `spirillum.simulate`.
         until: gap at the end of the drainage time, with its unit or a float in m; None: a fifth of that at
             the start.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a motion that cannot be followed.

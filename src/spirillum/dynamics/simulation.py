@@ -98,7 +98,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             `continued`, see `InTube`; its placement may have yaw, ends and a constant flow, too.
         field: `yaw` and `pitch` of the axis about which the field turns a free robot with a magnet, with their units or
             floats in rad, up to 45 degrees; None: along +x.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
 
     Returns:
         Dataset over `time`: position, attitude, angles, rates, current, torques, powers, energies; averages over the

@@ -105,7 +105,7 @@ def long_run(
         sign: sense in which its tail turns.
         heavy: whether weight or buoyancy tells one azimuth from another.
         until: gap that the run has to reach before anything is looked for, m; None: no such gap.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
         turns_shown: of the path at least, where a steady motion is found.
     """
     turns, path = ReturnMap(robot, sign), Path()

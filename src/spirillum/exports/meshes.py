@@ -140,7 +140,7 @@ def is_watertight_file(data: bytes) -> bool:
     """Whether an STL file is watertight as programs read it: in single precision, close vertices taken as one."""
     corners = np.frombuffer(data, _RECORD, offset=_HEAD + 4)["corners"].reshape(-1, 3).astype(float)
     faces = np.arange(len(corners)).reshape(-1, 3)
-    grids = (np.floor(corners / _READ_AS_ONE + shift) for shift in (0.0, 0.5))  # a program rounds one way or the other
+    grids = (np.floor(corners / _READ_AS_ONE + shift) for shift in (0.0, 0.5))  # a program rounds down or up
     return all(_is_closed(grid, faces) for grid in grids)
 
 

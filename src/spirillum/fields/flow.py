@@ -183,7 +183,7 @@ class Flow(DisplayMixin):
             extent: how far the plane reaches beyond the robot on every side, with its unit or a float in m;
                 None: a little more than the robot's largest diameter. In a tube it ends at the glass.
             resolution: points along the plane's longer side.
-            progress: told what is being computed, how many points are done, and of how many.
+            progress: called with stage, number done, and total.
 
         Returns:
             Dataset over two of `x`, `y`, `z` (m; the third is a scalar) with `velocity_x`, `velocity_y`,

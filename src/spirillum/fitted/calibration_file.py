@@ -186,7 +186,7 @@ def read_calibration(path: str | Path) -> CalibrationFile:
         return checked
     tables = table.get("calibration")
     single = [name for name, entry in tables.items() if isinstance(entry, Mapping)] if isinstance(tables, dict) else []
-    for name in single:  # the file says [calibration.sbt], not the first of a list
+    for name in single:  # the file has [calibration.sbt], not the first of a list
         checked = [problem.replace(f"calibration.{name}.0.", f"calibration.{name}.") for problem in checked]
     raise refused_table(checked, str(path))
 

@@ -131,7 +131,7 @@ class PosteriorFile:
         diameter = robot.channel.diameter if robot.channel else np.inf
         own = [place for place, fitted in enumerate(self.channels) if np.isclose(diameter, fitted, rtol=1e-6, atol=0.0)]
         found = {name: values[name][..., own[0]] for name in _PLACE if name in values and own}
-        if "roughness" in values and robot.channel is not None:  # a robot that lies on its asperities
+        if "roughness" in values and robot.channel is not None:  # a robot that rests on its asperities
             found["gap"] = gap_on_asperities(values["roughness"][..., 0])
         return found
 

@@ -316,7 +316,7 @@ class Following:
 
 
 def _synthetic(video: Video) -> tuple[Flag, ...]:
-    """Note that the pictures are synthetic, where they say so."""
+    """Note that the pictures are synthetic, where they state it."""
     sentence = "the pictures say of themselves that they are synthetic: nothing here is measured"
     return (Flag(SYNTHETIC, sentence),) if says_synthetic(video.words) else ()
 

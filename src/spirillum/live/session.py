@@ -183,7 +183,7 @@ class _Log:
     _clocks: Note | None = None
 
     def run(self, report: OnObservation) -> None:
-        """Look at all frames; what stops it on the way is noted, if anything was looked at.
+        """Track all frames; what interrupts it is noted, if any frame was tracked.
 
         Raises:
             InputError: if the source does not begin.

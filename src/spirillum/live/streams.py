@@ -117,7 +117,7 @@ def source_of(
         address = scheme + word[len(scheme) :]
         options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
         return Source(_without_secrets(word), "stream", options)
-    video = open_video(word, pace, aspect)  # says what is wrong with a video
+    video = open_video(word, pace, aspect)  # raises for a bad video
     return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
 
 

@@ -167,7 +167,7 @@ class LiveTracker:
         if len(self._samples) < _SAMPLES:
             return
         samples, self._samples, self._wanted = self._samples, [], []
-        assert self._size is not None  # noqa: S101 - a frame has told
+        assert self._size is not None  # noqa: S101 - set by the first frame
         try:
             self._begin(Video(Path(self.name), self._size, None, None, words=self._words), samples)
         except InputError as error:

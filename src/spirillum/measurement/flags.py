@@ -38,7 +38,7 @@ class Elongation(NamedTuple):
     """Length per pixel, m; NaN without a scale, and so without a known change."""
 
     def error(self) -> float:
-        """Standard error of the robot's way by it, m.
+        """Standard error of the robot's displacement by it, m.
 
         Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
         variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
@@ -126,7 +126,7 @@ _IMPLIED = {
 """Flags that are redundant beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
-"""Flags that are redundant where the robot does not move one way throughout."""
+"""Flags that are redundant where the robot does not move in one direction throughout."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
@@ -159,7 +159,7 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
 
 
 def _mirrored(flags: list[Flag]) -> list[Flag]:
-    """A flag where stripes and tail both run the other way round than they should."""
+    """A flag where stripes and tail both turn in the opposite sense."""
     reversed_order = any(flag.name == "stripe-order" and "reversed" in flag.sentence for flag in flags)
     if not reversed_order or all(flag.name != "handedness" for flag in flags):
         return []

@@ -284,7 +284,7 @@ def measured_trial(
 
 def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: MeasurementRequest) -> Track:
     if asked.track is not None:
-        assert seen.ruled is not None  # noqa: S101 - asked for
+        assert seen.ruled is not None  # noqa: S101 - requested
         assert seen.time_of is not None  # noqa: S101
         found = read_track(asked.track, asked.setup, path.name, seen.ruled, seen.time_of, seen.frame_of)
         doubts = check_track(found, asked.track, path, asked.setup, asked.robot, asked.folder)

@@ -300,7 +300,7 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
 
 _TEMPLATE = """\
 # Observed speeds and rates, one row for each trial. Lines that start with # are comments.
-# robot: its name, for people. The channel, wavelength and amplitude of the tail say which robot a row belongs to.
+# robot: its name, for people. The channel, wavelength and amplitude of the tail identify the robot of a row.
 # channel_diameter_mm, wavelength_mm, amplitude_mm: needed. amplitude is the radius of the wire's centreline.
 # trial: its number; a trial of a tail stands once.
 # forward_velocity_mm_s, tail_rate_Hz, body_rate_Hz, motor_rate_Hz: what was measured; leave empty what was not.

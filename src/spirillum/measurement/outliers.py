@@ -43,7 +43,7 @@ def outlying_frames(
         values: the series, (n,); NaN where it was not measured.
         error: standard error of frames that are known to be less sure than their neighbours, such as those read by
             hand, (n,); NaN of others. Such a frame is an outlier only beyond six of it.
-        straight: whether the series may be compared with a line at all; else its neighbours alone tell an outlier.
+        straight: whether the series may be compared with a line at all; else its neighbours alone show an outlier.
 
     Returns:
         Truth values, (n,).

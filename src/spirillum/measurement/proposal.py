@@ -124,7 +124,7 @@ def propose_setup(
         spacing: distance of the ruler's lines, with its unit or a float in m; None: left to be filled in.
         fps: frames a second of a folder of images, or in place of a video's own times.
         overwrite: overwrite a file that is there.
-        progress: told what is looked for, how many looks are done, and how many there are at most.
+        progress: called with stage, number done, and total.
 
     Returns:
         What was found and how sure it is, what is left to be filled in, and the text of the file.
@@ -292,7 +292,7 @@ def _appearance(found: SetupFreeDetection) -> Finding:
 
 
 def _stripes(found: SetupFreeDetection) -> Finding:
-    assert found.known is not None  # noqa: S101 - asked where it is known
+    assert found.known is not None  # noqa: S101 - called where it is known
     stated = found.known.stripes.stripes
     if not stated:
         words = "the robot file names no stripes: without them the body's rotation cannot be seen"

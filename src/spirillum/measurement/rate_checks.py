@@ -136,7 +136,7 @@ def wrong_signs(values: Samples, expected: float, stated: Samples, groups: Seque
         values: (n,); NaN where nothing was measured.
         expected: sign that they should have.
         stated: standard errors, (n,); NaN where not stated.
-        groups: what tells repeated trials from others, n of them.
+        groups: what distinguishes repeated trials from others, n of them.
     """
     opposite = np.sign(values) * expected < 0
     error = np.where(np.isfinite(stated), stated, _scatter_of_magnitudes(values, groups))

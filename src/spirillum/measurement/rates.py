@@ -429,7 +429,7 @@ def _fitted(blocks: _Blocks, numbers: Sequence[int]) -> list[_Fit]:
 def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
     """Whether the rate changes significantly and by more than a tenth.
 
-    The last coefficient of a parabola, which tells a steady change, or of a cubic is tested against 0. As its standard
+    The last coefficient of a parabola, which shows a steady change, or of a cubic is tested against 0. As its standard
     error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no change.
     """
     if blocks.s.size < _FEWEST_BLOCKS or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():

@@ -26,14 +26,14 @@ def asset(name: str) -> str:
     return (files("spirillum.pages") / "static" / name).read_text(encoding="utf-8")
 
 
-def robot_file(lane: PageRobot) -> str:
+def robot_file(swimmer: PageRobot) -> str:
     """Text of a robot file of the current robot."""
-    return robot_text(lane.predicted(), f"From the page of spirillum {own_version()}.")
+    return robot_text(swimmer.predicted(), f"From the page of spirillum {own_version()}.")
 
 
-def command_line(lane: PageRobot) -> str:
+def command_line(swimmer: PageRobot) -> str:
     """Commands that give the same steady numbers, and a run like the one that is seen."""
-    settings, model = lane.told(), _model(lane)
+    settings, model = swimmer.command_settings(), _model(swimmer)
     words = [_source(settings), "--model", model]
     for field, value in _overrides(settings).items():
         words += ["--set", f"{field}={value}"]
@@ -41,19 +41,19 @@ def command_line(lane: PageRobot) -> str:
     for name, value in placed.items():
         words += [f"{_PLACE[name]}={value}"]
     steady = shlex.join(["spirillum", "predict", *words])
-    end = f"{max(lane.moment.time if lane.moment else 0.0, 1.0):.3g}s"
+    end = f"{max(swimmer.moment.time if swimmer.moment else 0.0, 1.0):.3g}s"
     wait = ["--wait", "0s"] if model == "tube" else []
     return f"{steady}\n{shlex.join(['spirillum', 'simulate', *words, *wait, '--duration', end, '-o', 'run.nc'])}\n"
 
 
-def python_lines(lane: PageRobot) -> str:
+def python_lines(swimmer: PageRobot) -> str:
     """Lines of Python that give the numbers of a robot of the page, by `predict` and `simulate`."""
-    settings, model = lane.told(), _model(lane)
+    settings, model = swimmer.command_settings(), _model(swimmer)
     overrides = ", ".join(f"{field!r}: {value!r}" for field, value in _overrides(settings).items())
     placed = _placed(settings, model)
     where = f", placement={placed!r}" if placed else ""
     load = f"sp.load({_source(settings)!r}" + (f", **{{{overrides}}})" if overrides else ")")
-    end = max(lane.moment.time if lane.moment else 0.0, 1.0)
+    end = max(swimmer.moment.time if swimmer.moment else 0.0, 1.0)
     wait = ", in_tube={'wait': '0 s'}" if model == "tube" else ""
     return (
         f"import spirillum as sp\n\nrobot = {load}\n"
@@ -63,8 +63,8 @@ def python_lines(lane: PageRobot) -> str:
     )
 
 
-def _model(lane: PageRobot) -> str:
-    return lane.built.model if lane.built else lane.settings.model
+def _model(swimmer: PageRobot) -> str:
+    return swimmer.built.model if swimmer.built else swimmer.settings.model
 
 
 def _source(settings: Settings) -> str:

@@ -55,9 +55,9 @@ Tell = Callable[..., None]
 class BackgroundJob:
     """Running module: its last progress message, and its state."""
 
-    def __init__(self, module: str, request: Mapping[str, Any], tell: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, module: str, request: Mapping[str, Any], announce: Callable[[], None] = lambda: None) -> None:
         """Begin."""
-        self._tell, self._stopped = tell, False
+        self._tell, self._stopped = announce, False
         self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
         self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments
             [sys.executable, "-m", module],
@@ -88,8 +88,8 @@ class BackgroundJob:
         with suppress(BrokenPipeError):
             self._process.stdin.write(request)
             self._process.stdin.close()
-        with self._process.stdout as told:
-            for line in told:
+        with self._process.stdout as lines:
+            for line in lines:
                 with suppress(ValueError, TypeError):  # what a library prints is no progress
                     self._said = dict(json.loads(line))
                 self._tell()
@@ -105,7 +105,7 @@ def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Map
     The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
     """
 
-    def tell(**said: Any) -> None:
+    def announce(**said: Any) -> None:
         try:
             sys.stdout.write(json.dumps(said) + "\n")
             sys.stdout.flush()
@@ -114,12 +114,12 @@ def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Map
             sys.exit(1)
 
     def progress(what: str, done: int, total: int) -> None:
-        tell(what=what, done_places=done, places=total)
+        announce(what=what, done_places=done, places=total)
 
     try:
         found = work(json.loads(sys.stdin.read()), progress)
-    except Exception as error:  # whoever waits for it is told why it comes to nothing
+    except Exception as error:  # the client gets the reason
         report_fault(error)
-        tell(failed=failure_sentence(error))
+        announce(failed=failure_sentence(error))
         sys.exit(2 if isinstance(error, (InputError, MemoryError)) else 1)
-    tell(done=True, **found)
+    announce(done=True, **found)

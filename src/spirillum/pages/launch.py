@@ -36,7 +36,7 @@ def page(
     browser: bool = True,
     tell: Callable[[str], None] = print,
 ) -> None:
-    """Show a robot alive in the browser: it swims, its knobs turn, its numbers follow. Ends with Ctrl-C.
+    """Show a robot alive in the browser: it swims, with a control for each field. Ends with Ctrl-C.
 
     Needs the extra `page`. Everything stays on this machine: nothing is loaded from elsewhere.
 
@@ -47,7 +47,7 @@ def page(
         host: address to listen on; any other than the loopback lets others on the network in.
         port: port to listen on; 0: a free one.
         browser: open the page in the browser.
-        tell: what is told the page's address; it holds the key.
+        tell: called with the page's address, which holds the key.
 
     Raises:
         InputError: for a robot or run that cannot be shown, a host that is none, a port that is taken, or a missing
@@ -73,7 +73,7 @@ def page(
         load(first).check_body("the page", "; `show` and `flow` draw this one")
         app = application(first, guard, strangers=strangers, first_run=first_run)
         shown = f"[{host}]" if ":" in host else host
-        if host in ("0.0.0.0", "::"):  # noqa: S104 - it was asked for, and is said
+        if host in ("0.0.0.0", "::"):  # noqa: S104 - requested, and announced
             shown = socket.gethostname()
         address = f"http://{shown}:{number}/?key={guard.key}"
         with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends

@@ -29,24 +29,26 @@ _SHOWN = {"mp4": "video/mp4", "png": "image/png"}
 _Handler = Callable[[Request], Awaitable[Response]]
 
 
-class _Doors:
+class _Endpoints:
     """Handlers of the routes."""
 
-    def __init__(self, bench: MeasurementSession, theatre: SimulationThread, uploads: Uploads) -> None:
-        self._bench, self._theatre, self._uploads = bench, theatre, uploads
+    def __init__(self, session: MeasurementSession, simulation: SimulationThread, uploads: Uploads) -> None:
+        self._session, self._simulation, self._uploads = session, simulation, uploads
         self.acts: dict[str, Callable[[Mapping[str, Any]], Any]] = {
             "state": lambda _message: None,
-            "text": lambda message: bench.desk.add_text(text_of(message, "text", "")),
+            "text": lambda message: session.editor.add_text(text_of(message, "text", "")),
             "robot": self._robot_of_swim,
-            "remove": lambda message: bench.films.remove(text_of(message, "film", "")),
+            "remove": lambda message: session.films.remove(text_of(message, "film", "")),
             "fields": self._fields,
             "click": self._clicked,
-            "look": lambda message: bench.desk.look(text_of(message, "film", "")),
-            "propose": lambda message: bench.desk.propose(text_of(message, "film", "")),
-            "measure": lambda _message: bench.measure(),
-            "beside": lambda message: bench.beside(text_of(message, "trial", "")),
-            "calibrate": lambda message: bench.calibrate(text_of(message, "model", ""), text_of(message, "method", "")),
-            "stop": lambda _message: bench.stop(),
+            "look": lambda message: session.editor.look(text_of(message, "film", "")),
+            "propose": lambda message: session.editor.propose(text_of(message, "film", "")),
+            "measure": lambda _message: session.measure(),
+            "beside": lambda message: session.beside(text_of(message, "trial", "")),
+            "calibrate": lambda message: session.calibrate(
+                text_of(message, "model", ""), text_of(message, "method", "")
+            ),
+            "stop": lambda _message: session.stop(),
         }
 
     def answering(self, act: Callable[[Mapping[str, Any]], Any]) -> _Handler:
@@ -59,23 +61,23 @@ class _Doors:
         return handle
 
     async def _told(self, said: Any) -> Response:
-        return JSONResponse({"said": said, **await run_in_background(self._bench.state)})
+        return JSONResponse({"said": said, **await run_in_background(self._session.state)})
 
     def _robot_of_swim(self, message: Mapping[str, Any]) -> None:
-        lane = self._theatre.lane_number(message.get("lane"))
-        found = self._theatre.recording(lane)
+        swimmer = self._simulation.swimmer_number(message.get("lane"))
+        found = self._simulation.recording(swimmer)
         if found is None:
-            raise InputError(f"lane = {lane}; allowed: a robot that is there")
-        self._bench.desk.take_robot(found[0].predicted())
+            raise InputError(f"lane = {swimmer}; allowed: a robot that is there")
+        self._session.editor.take_robot(found[0].predicted())
 
     def _fields(self, message: Mapping[str, Any]) -> None:
         given = message.get("fields")
-        self._bench.desk.set_fields(given if isinstance(given, dict) else {})
+        self._session.editor.set_fields(given if isinstance(given, dict) else {})
 
     def _clicked(self, message: Mapping[str, Any]) -> str:
         points = message.get("points")
         pairs = points if isinstance(points, list) and len(points) <= _MOST_POINTS else []
-        return self._bench.desk.click(
+        return self._session.editor.click(
             text_of(message, "what", ""),
             text_of(message, "film", ""),
             _number(message.get("time")),
@@ -85,22 +87,22 @@ class _Doors:
 
     async def film(self, request: Request) -> Response:
         """A film is sent."""
-        return await self._told(await _received(request, self._bench))
+        return await self._told(await _received(request, self._session))
 
     async def picture(self, request: Request) -> Response:
         """A frame of a film."""
         name, time = request.query_params.get("film", ""), _number(request.query_params.get("time"))
-        content = await run_in_background(self._bench.films.picture, name, time)
+        content = await run_in_background(self._session.films.picture, name, time)
         return Response(content, media_type="image/jpeg")
 
     async def file(self, request: Request) -> Response:
-        """A file of the bench, by its name among those that there are."""
+        """A file of the measurement session, by its name."""
         name = request.query_params.get("name", "")
-        texts = {"setup.toml": self._bench.desk.setup_text, "robot.toml": self._bench.desk.robot_text}
+        texts = {"setup.toml": self._session.editor.setup_text, "robot.toml": self._session.editor.robot_text}
         if name in texts:
             text = await run_in_background(texts[name])
             return Response(text, media_type="text/plain", headers=_attached(name))
-        path = self._bench.kept(name)
+        path = self._session.kept(name)
         if path is None:
             raise InputError(f"file {name[:60]!r}; allowed: one of the results")
         kind = _SHOWN.get(path.suffix[1:])
@@ -109,26 +111,26 @@ class _Doors:
         return FileResponse(path, media_type="application/octet-stream", headers=_attached(path.name))
 
 
-def bench_routes(bench: MeasurementSession, theatre: SimulationThread, uploads: Uploads) -> list[Route]:
+def session_routes(session: MeasurementSession, simulation: SimulationThread, uploads: Uploads) -> list[Route]:
     """Routes of the measurement page."""
-    doors = _Doors(bench, theatre, uploads)
+    endpoints = _Endpoints(session, simulation, uploads)
     return [
-        *[Route(f"/bench/{name}", doors.answering(act), methods=["POST"]) for name, act in doors.acts.items()],
-        Route("/bench/film", doors.film, methods=["POST"]),
-        Route("/bench/picture", doors.picture),
-        Route("/bench/file", doors.file),
+        *[Route(f"/bench/{name}", endpoints.answering(act), methods=["POST"]) for name, act in endpoints.acts.items()],
+        Route("/bench/film", endpoints.film, methods=["POST"]),
+        Route("/bench/picture", endpoints.picture),
+        Route("/bench/file", endpoints.file),
     ]
 
 
-async def _received(request: Request, bench: MeasurementSession) -> str:
+async def _received(request: Request, session: MeasurementSession) -> str:
     """Store an uploaded video under a name chosen here, in chunks; return its name."""
     kind, size = request.query_params.get("kind", ""), stated_size(request)
-    path: Path = await run_in_background(bench.films.room_for, kind, size)
+    path: Path = await run_in_background(session.films.room_for, kind, size)
     try:
         with path.open("wb") as stream:
             async for piece in request.stream():
                 await asyncio.to_thread(stream.write, piece)
-        return await run_in_background(bench.films.add, path)
+        return await run_in_background(session.films.add, path)
     except BaseException:
         path.unlink(missing_ok=True)
         raise

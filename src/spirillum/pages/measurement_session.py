@@ -282,7 +282,7 @@ class MeasurementSession:
         atexit.register(self._kept.close)  # where the process ends before it has served
         self._lock = threading.RLock()
         self.films = VideoStore(self._folder)
-        self.desk = SetupEditor(self._folder, self.films)
+        self.editor = SetupEditor(self._folder, self.films)
         self._job: BackgroundJob | None = None
         self._kind, self._runs = "", 0
         self._results: dict[str, dict[str, Any]] = {}
@@ -299,10 +299,10 @@ class MeasurementSession:
             films = [str(path) for path in self.films.paths()]
             if not films:
                 raise InputError("no video is uploaded; allowed: at least one")
-            problems = self.desk.checked()["problems"]
+            problems = self.editor.checked()["problems"]
             if problems:
                 raise InputError(problems[0])
-            self._start("measure", {"films": films, "setup": str(self.desk.written())})
+            self._start("measure", {"films": films, "setup": str(self.editor.written())})
 
     def beside(self, name: str) -> dict[str, Any]:
         """A measured trial beside the simulated robot; see `spirillum.pages.replay`."""
@@ -326,9 +326,9 @@ class MeasurementSession:
             if not table.is_file():
                 raise InputError("no trial gave a speed or a rate of a robot in a channel; allowed: to measure first")
             robot = self._folders["measure"] / ROBOT_FILE
-            robot.write_text(self.desk.robot_text(), encoding="utf-8")
-            asked = {"observations": str(table), "robot": str(robot), "model": model, "method": method}
-            self._start("calibrate", asked)
+            robot.write_text(self.editor.robot_text(), encoding="utf-8")
+            requested = {"observations": str(table), "robot": str(robot), "model": model, "method": method}
+            self._start("calibrate", requested)
 
     def _start(self, kind: str, request: dict[str, Any]) -> None:
         if self._job is not None and self._job.running:
@@ -353,12 +353,12 @@ class MeasurementSession:
         with self._lock:
             job = self._progress()
             return {
-                "films": self.films.told(),
+                "films": self.films.describe(),
                 "form": form_list(),
-                "fields": self.desk.fields(),
-                "robots": list(self.desk.robots()),
-                "setup": self.desk.setup_text(),
-                "check": self.desk.checked(),
+                "fields": self.editor.fields(),
+                "robots": list(self.editor.robots()),
+                "setup": self.editor.setup_text(),
+                "check": self.editor.checked(),
                 "job": job,
                 "results": dict(self._results),
                 "models": list(_MODELS),

@@ -39,7 +39,7 @@ class Flowing(BackgroundJob):
     """Pending or completed computation of a flow plane."""
 
     def __init__(
-        self, robot: Robot, model: str, run: Mapping[str, str], phase: float, tell: Callable[[], None]
+        self, robot: Robot, model: str, run: Mapping[str, str], phase: float, announce: Callable[[], None]
     ) -> None:
         """Begin.
 
@@ -48,12 +48,12 @@ class Flowing(BackgroundJob):
             model: model by which it swims.
             run: `gap`, `pitch`, `flow` where they are set.
             phase: of the tail, rad.
-            tell: called from a thread when there is progress.
+            announce: called from a thread when there is progress.
         """
-        asked = {"robot": robot_text(robot), "model": model, "run": dict(run), "phase": phase}
-        super().__init__(__name__, asked, tell)
+        requested = {"robot": robot_text(robot), "model": model, "run": dict(run), "phase": phase}
+        super().__init__(__name__, requested, announce)
 
-    def told(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Progress, without the plane itself."""
         said = self.progress()
         return {name: said[name] for name in ("what", "failed", "done") if name in said}
@@ -138,8 +138,8 @@ def build(settings: Settings, robot: Robot) -> Built:
     placed = settings.placement()
     if robot.drive is None:
         raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
-    asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
-    choice = choose_model(asked, robot, placement=placed)
+    requested = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
+    choice = choose_model(requested, robot, placement=placed)
     in_tube = choice.model == WALLED and robot.channel is not None
     provisional = in_tube and not has_table(RobotBatch.of(robot, placed), "yaw")
     model = UNBOUNDED if provisional else choice.model
@@ -164,7 +164,7 @@ class PageRobot:
     moment: Snapshot | None = None
     numbers: dict[str, Any] | None = None
     """The prediction, as the page shows it."""
-    trouble: str = ""
+    failure: str = ""
     """Why it does not swim, in a sentence."""
     generation: int = 0
     """Counts what was set; what is built for an older one is dropped."""
@@ -227,7 +227,7 @@ class PageRobot:
         """Discard the run; the robot is released again once it is built."""
         self.generation += 1
         self.built = self.moment = None
-        self.trouble = ""
+        self.failure = ""
         self.preparing = None
         self.recording = SampleRecording()
         self.void_numbers()
@@ -238,13 +238,13 @@ class PageRobot:
         self.numbers = None
         self.without_flow()
 
-    def with_flow(self, tell: Callable[[], None]) -> None:
+    def with_flow(self, announce: Callable[[], None]) -> None:
         """Compute the flow around it, with its tail as it is now."""
         if self.built is None or self.moment is None:
             raise InputError("flow: the robot does not swim yet; allowed: one that swims")
         self.without_flow()
         phase = self.moment.pose.tail_phase % (2.0 * math.pi)
-        self.flowing = Flowing(self.predicted(), self.built.model, self.settings.run, phase, tell)
+        self.flowing = Flowing(self.predicted(), self.built.model, self.settings.run, phase, announce)
 
     def without_flow(self) -> None:
         """No flow is shown."""
@@ -254,21 +254,21 @@ class PageRobot:
 
     def take(self, built: Built) -> None:
         """Take over the released robot."""
-        self.built, self.trouble, self.since = built, "", time.monotonic()
+        self.built, self.failure, self.since = built, "", time.monotonic()
         self.moment = built.plant.observe()
         self.recording = SampleRecording()
         self.recording.add(self.moment, self.duty if self.remote else 0.0)
 
     def advance(self, dt: float) -> None:
         """Swim on for a time, s."""
-        if self.built is None or (self.moment is not None and self.moment.ended) or self.trouble:
+        if self.built is None or (self.moment is not None and self.moment.ended) or self.failure:
             return
         duty = self.duty if self.remote else 0.0
         try:
             self.moment = self.built.plant.step(dt, duty=duty)
         except Exception as error:  # the other robots swim on
             report_fault(error)
-            self.trouble = failure_sentence(error)
+            self.failure = failure_sentence(error)
             return
         self.recording.add(self.moment, duty)
 
@@ -311,8 +311,8 @@ class PageRobot:
             return self.robot
         return self.robot.model_copy(update={"drive": drive.model_copy(update={"duty": self.duty})})
 
-    def told(self) -> Settings:
-        """The settings of that robot, as a command line gives them."""
+    def command_settings(self) -> Settings:
+        """Settings of that robot, as a command line gives them."""
         if self.predicted() is self.robot:
             return self.settings
         return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": f"{self.duty:.6g}"})
@@ -336,8 +336,8 @@ class PageRobot:
             "provisional": built.provisional if built else False,
             "roughness": built.plant.roughness if built else None,
             "preparing": self.preparing,
-            "flow": None if self.flowing is None else self.flowing.told(),
-            "trouble": self.trouble,
+            "flow": None if self.flowing is None else self.flowing.describe(),
+            "trouble": self.failure,
             "numbers": self.numbers,
             "quantities": quantity_list(self.numbers["rows"] if self.numbers else None),
             "warnings": list(self.robot.warnings),

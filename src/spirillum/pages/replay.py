@@ -61,13 +61,13 @@ def replay_of_upload(content: bytes) -> dict[str, Any]:
             raise InputError(str(error).replace(str(path), "the file")) from error
 
 
-def replay_of_lane(lane: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
+def replay_of_swimmer(swimmer: PageRobot, run: dict[str, Any]) -> dict[str, Any]:
     """Replay of a robot of the page up to now."""
     return {
-        "robot": lane.robot.name,
-        "model": lane.built.model if lane.built else "",
-        "shape": shape_of(lane.robot),
-        "roughness": lane.built.plant.roughness if lane.built else None,
+        "robot": swimmer.robot.name,
+        "model": swimmer.built.model if swimmer.built else "",
+        "shape": shape_of(swimmer.robot),
+        "roughness": swimmer.built.plant.roughness if swimmer.built else None,
         "samples": len(run["time"]),
         "run": run,
     }

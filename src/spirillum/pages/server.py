@@ -21,9 +21,9 @@ from spirillum.errors import InputError
 from spirillum.pages.downloads import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate, Strangers
 from spirillum.pages.job import run_in_background
-from spirillum.pages.measurement_routes import bench_routes
+from spirillum.pages.measurement_routes import session_routes
 from spirillum.pages.measurement_session import MeasurementSession
-from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
+from spirillum.pages.replay import LARGEST_RUN, replay_of_swimmer, replay_of_upload
 from spirillum.pages.simulation_thread import SimulationThread
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
 from spirillum.pages.video_store import TooLargeError, Uploads
@@ -109,8 +109,8 @@ class _House:
     """Simulation thread and its clients."""
 
     def __init__(self, source: Any) -> None:
-        self.theatre = SimulationThread(source, self._publish)
-        self.bench = MeasurementSession()
+        self.simulation = SimulationThread(source, self._publish)
+        self.session = MeasurementSession()
         self._clients: set[_Client] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -118,12 +118,12 @@ class _House:
     async def open(self, _app: Starlette) -> AsyncIterator[None]:
         """From the first request to the last."""
         self._loop = asyncio.get_running_loop()
-        self.theatre.start()
+        self.simulation.start()
         try:
             yield
         finally:
-            self.theatre.stop()
-            self.bench.close()
+            self.simulation.stop()
+            self.session.close()
 
     def _publish(self) -> None:
         """There is something new; called from the thread of the simulation."""
@@ -136,7 +136,7 @@ class _House:
             client.news.set()
 
     def _count_those_who_look(self) -> None:
-        self.theatre.look(any(client.looks for client in self._clients))
+        self.simulation.look(any(client.looks for client in self._clients))
 
     async def connect(self, socket: WebSocket) -> None:
         """One tab, as long as it is open."""
@@ -147,7 +147,7 @@ class _House:
         client = _Client()
         self._clients.add(client)
         self._count_those_who_look()
-        sender = asyncio.create_task(_tell(socket, client, self.theatre))
+        sender = asyncio.create_task(_tell(socket, client, self.simulation))
         try:
             await self._listen(socket, client)
         except (WebSocketDisconnect, KeyError):  # a message of bytes has no text
@@ -164,7 +164,7 @@ class _House:
             if len(text) > LARGEST_MESSAGE or not rate.allowed():
                 await socket.close(1008, "too much at once")
                 return
-            _heard(text, client, self.theatre, loop)
+            _heard(text, client, self.simulation, loop)
             self._count_those_who_look()
 
 
@@ -176,12 +176,12 @@ def application(
     routes = [
         Route("/", _file("index.html")),
         *[Route(f"/{name}", _file(name)) for name in _OWN],
-        *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
-        *bench_routes(house.bench, house.theatre, uploads),
-        Route("/flow", _flow(house.theatre)),
+        *[Route(f"/keep/{name}", _kept(name, house.simulation)) for name in _KEPT],
+        *session_routes(house.session, house.simulation, uploads),
+        Route("/flow", _flow(house.simulation)),
         Route("/first-run", _first(first_run)),
         Route("/replay", _sent(replay_of_upload, LARGEST_RUN, uploads), methods=["POST"]),
-        Route("/study", _sent(_study(house.theatre), LARGEST_STUDY_SENT, uploads), methods=["POST"]),
+        Route("/study", _sent(_study(house.simulation), LARGEST_STUDY_SENT, uploads), methods=["POST"]),
         WebSocketRoute("/live", house.connect),
     ]
     handlers = dict.fromkeys((InputError, OSError, ClientDisconnect), _said)
@@ -201,24 +201,24 @@ async def _said(request: Request, error: Exception) -> Response:
     return Response(status_code=400)
 
 
-async def _tell(socket: WebSocket, client: _Client, theatre: SimulationThread) -> None:
+async def _tell(socket: WebSocket, client: _Client, simulation: SimulationThread) -> None:
     """Send the newest state whenever there is one; a slow client misses those between."""
     with suppress(WebSocketDisconnect, RuntimeError):
         while True:
             if client.version < 0:
-                await socket.send_text(theatre.past())
-            if client.version != theatre.version:
-                client.version = theatre.version
-                await socket.send_text(theatre.scene)
+                await socket.send_text(simulation.past())
+            if client.version != simulation.version:
+                client.version = simulation.version
+                await socket.send_text(simulation.scene)
             while client.refusals:
                 await socket.send_text(client.refusals.pop(0))
-            if theatre.frame:
-                await socket.send_text(theatre.frame)
+            if simulation.frame:
+                await socket.send_text(simulation.frame)
             await client.news.wait()
             client.news.clear()
 
 
-def _heard(text: str, client: _Client, theatre: SimulationThread, loop: asyncio.AbstractEventLoop) -> None:
+def _heard(text: str, client: _Client, simulation: SimulationThread, loop: asyncio.AbstractEventLoop) -> None:
     """Dispatch a client's command, if it is a JSON object."""
 
     def refuse(sentence: str) -> None:
@@ -239,7 +239,7 @@ def _heard(text: str, client: _Client, theatre: SimulationThread, loop: asyncio.
     elif command.get("do") == "look":
         client.looks = bool(command.get("value"))
     else:
-        theatre.ask(command, refuse)
+        simulation.ask(command, refuse)
 
 
 Handler = Callable[[Request], Awaitable[Response]]
@@ -255,24 +255,24 @@ def _file(name: str) -> Handler:
 _KEPT = ("robot.toml", "commands.txt", "robot.py", "run.html", "run.json", "words.json")
 
 
-def _kept(name: str, theatre: SimulationThread) -> Handler:
+def _kept(name: str, simulation: SimulationThread) -> Handler:
     def made(lane_text: str) -> Response:
-        found = theatre.recording(int(lane_text)) if lane_text in ("0", "1") else None
+        found = simulation.recording(int(lane_text)) if lane_text in ("0", "1") else None
         if found is None:
             raise InputError(f"lane = {lane_text[:20]!r}; allowed: a robot that is there")
-        lane, run = found
+        swimmer, run = found
         if name == "words.json":
-            words = {"commands": command_line(lane), "python": python_lines(lane), "robot": robot_file(lane)}
+            words = {"commands": command_line(swimmer), "python": python_lines(swimmer), "robot": robot_file(swimmer)}
             return JSONResponse(words)
         if name.startswith("run.") and len(run["time"]) < 2:
             raise InputError("the robot has not swum yet; allowed: a run of some steps")
         if name == "run.json":
-            return JSONResponse(replay_of_lane(lane, run))
+            return JSONResponse(replay_of_swimmer(swimmer, run))
         if name == "run.html":
-            text, media = replay_page(replay_of_lane(lane, run)), "text/html"
+            text, media = replay_page(replay_of_swimmer(swimmer, run)), "text/html"
         else:
             maker = {"robot.toml": robot_file, "commands.txt": command_line, "robot.py": python_lines}[name]
-            text, media = maker(lane), "text/plain"
+            text, media = maker(swimmer), "text/plain"
         return Response(text, media_type=media, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
     async def serve(request: Request) -> Response:
@@ -281,10 +281,10 @@ def _kept(name: str, theatre: SimulationThread) -> Handler:
     return serve
 
 
-def _flow(theatre: SimulationThread) -> Handler:
+def _flow(simulation: SimulationThread) -> Handler:
     async def serve(request: Request) -> Response:
-        lane = request.query_params.get("lane", "")
-        found = theatre.flow(int(lane)) if lane in ("0", "1") else None
+        swimmer = request.query_params.get("lane", "")
+        found = simulation.flow(int(swimmer)) if swimmer in ("0", "1") else None
         if found is None:
             return PlainTextResponse("there is no flow", status_code=404)
         return JSONResponse(found)
@@ -301,15 +301,15 @@ def _first(run: dict[str, Any] | None) -> Handler:
     return serve
 
 
-def _study(theatre: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
+def _study(simulation: SimulationThread) -> Callable[[bytes], dict[str, Any]]:
     """Picture of an uploaded study's dataset, or of the paper's."""
 
     def picture(content: bytes) -> dict[str, Any]:
         from spirillum.results.study import study
 
         found = sent_study(content) if content else StudyPicture(study())
-        theatre.show_study(found)
-        return found.told()
+        simulation.show_study(found)
+        return found.describe()
 
     return picture
 

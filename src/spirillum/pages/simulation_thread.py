@@ -25,9 +25,9 @@ from spirillum.swimming.released_motion import ReleasedMotion
 class Preparing(BackgroundJob):
     """Table in preparation; completed nodes are cached when it is cancelled."""
 
-    def __init__(self, robot: Robot, tell: Callable[[], None]) -> None:
+    def __init__(self, robot: Robot, announce: Callable[[], None]) -> None:
         """Begin."""
-        super().__init__(__name__, {"robot": robot_text(robot)}, tell)
+        super().__init__(__name__, {"robot": robot_text(robot)}, announce)
         self.robot = robot
 
 
@@ -76,13 +76,13 @@ class SimulationThread:
         self._work = threading.Condition()
         self._released: dict[int, tuple[int, int, dict[str, Any], Settings, Robot]] = {}
         self._built: queue.Queue[tuple[int, int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
-        self._lanes = [PageRobot.of(self._own)]
+        self._swimmers = [PageRobot.of(self._own)]
         self._preparing: Preparing | None = None
         self._left_off: Robot | None = None
         self._study: StudyPicture | None = None
         self._playing, self._pace, self._looked_at = True, 1.0, False
         self._ending = threading.Event()
-        self._asked: list[int] = []
+        self._requested: list[int] = []
         self._behind = 0.0
         self._lock = threading.Lock()
         self.version, self.scene, self.frame = 0, "", ""
@@ -94,7 +94,7 @@ class SimulationThread:
 
     def start(self) -> None:
         """Begin."""
-        self._tell_scene()
+        self._send_scene()
         for thread in self._threads:
             thread.start()
 
@@ -106,8 +106,8 @@ class SimulationThread:
             self._work.notify_all()
         if self._preparing is not None:
             self._preparing.stop()
-        for lane in self._lanes:
-            lane.without_flow()
+        for swimmer in self._swimmers:
+            swimmer.without_flow()
         for thread in self._threads:
             thread.join(timeout=2.0)
 
@@ -127,22 +127,22 @@ class SimulationThread:
     def past(self) -> str:
         """Past samples of the robots, for a new client."""
         with self._lock:
-            lanes = [{"generation": lane.generation, **lane.recording.past()} for lane in self._lanes]
-        return json.dumps({"t": "past", "lanes": lanes})
+            swimmers = [{"generation": swimmer.generation, **swimmer.recording.past()} for swimmer in self._swimmers]
+        return json.dumps({"t": "past", "lanes": swimmers})
 
-    def lane_number(self, asked: Any) -> int:
+    def swimmer_number(self, requested: Any) -> int:
         """The number of a robot that is there."""
-        if isinstance(asked, bool) or not isinstance(asked, int) or not 0 <= asked < len(self._lanes):
-            raise InputError(f"lane = {str(asked)[:20]}; allowed: 0 to {len(self._lanes) - 1}")
-        return asked
+        if isinstance(requested, bool) or not isinstance(requested, int) or not 0 <= requested < len(self._swimmers):
+            raise InputError(f"lane = {str(requested)[:20]}; allowed: 0 to {len(self._swimmers) - 1}")
+        return requested
 
     def recording(self, index: int) -> tuple[PageRobot, dict[str, Any]] | None:
         """A robot and its run so far; None if there is no such robot or no run."""
         with self._lock:
-            if not 0 <= index < len(self._lanes):
+            if not 0 <= index < len(self._swimmers):
                 return None
-            lane = self._lanes[index]
-            return lane, lane.recording.data()
+            swimmer = self._swimmers[index]
+            return swimmer, swimmer.recording.data()
 
     def show_study(self, study: StudyPicture) -> None:
         """Let its tails be pointed at."""
@@ -151,14 +151,14 @@ class SimulationThread:
     def flow(self, index: int) -> dict[str, Any] | None:
         """The plane of the flow around a robot; None if there is none."""
         with self._lock:
-            flowing = self._lanes[index].flowing if 0 <= index < len(self._lanes) else None
+            flowing = self._swimmers[index].flowing if 0 <= index < len(self._swimmers) else None
         plane: dict[str, Any] | None = None if flowing is None else flowing.progress().get("plane")
         return plane
 
     # the thread of the simulation
 
     def _run(self) -> None:
-        for index in range(len(self._lanes)):
+        for index in range(len(self._swimmers)):
             self._want(index)
         last = time.perf_counter()
         while not self._ending.is_set():
@@ -170,7 +170,7 @@ class SimulationThread:
 
     def _go_on(self, last: float) -> float:
         """Process commands, move and publish once; return the time of the last motion."""
-        moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
+        moving = self._playing and self._looked_at and any(self._moves(swimmer) for swimmer in self._swimmers)
         changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
         now = time.perf_counter()
         if moving and now - last >= 0.9 / RATE:
@@ -183,8 +183,8 @@ class SimulationThread:
             self._tell_frame()
         return last
 
-    def _moves(self, lane: PageRobot) -> bool:
-        return lane.built is not None and not lane.trouble and not (lane.moment and lane.moment.ended)
+    def _moves(self, swimmer: PageRobot) -> bool:
+        return swimmer.built is not None and not swimmer.failure and not (swimmer.moment and swimmer.moment.ended)
 
     def _advance(self, elapsed: float) -> None:
         """All robots by the same time, so that they stay together."""
@@ -193,12 +193,12 @@ class SimulationThread:
         if not self._all_ready():
             return
         with self._lock:
-            for lane in self._lanes:
-                lane.advance(dt)
+            for swimmer in self._swimmers:
+                swimmer.advance(dt)
 
     def _all_ready(self) -> bool:
         """Those who are ready wait for those who are not."""
-        return all(lane.built is not None or lane.trouble for lane in self._lanes)
+        return all(swimmer.built is not None or swimmer.failure for swimmer in self._swimmers)
 
     def _listen(self, wait: float) -> bool:
         """Process pending commands; block if there is nothing to do."""
@@ -220,55 +220,55 @@ class SimulationThread:
                 item = self._inbox.get_nowait()
             except queue.Empty:
                 break
-        for index, lane in enumerate(self._lanes):
-            if self._asked[index : index + 1] != [lane.revision]:
+        for index, swimmer in enumerate(self._swimmers):
+            if self._requested[index : index + 1] != [swimmer.revision]:
                 self._want(index)
-        self._tell_scene()
+        self._send_scene()
         return changed
 
     def _do(self, command: Mapping[str, Any]) -> None:
         what = command.get("do")
-        lane = self._lanes[self.lane_number(command.get("lane", 0))]
+        swimmer = self._swimmers[self.swimmer_number(command.get("lane", 0))]
         action = _ACTIONS.get(str(what))
         if action is None:
             raise InputError(f"do = {str(what)[:40]!r}; allowed: {', '.join(_ACTIONS)}")
-        action(self, lane, command)
+        action(self, swimmer, command)
 
-    def _set(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+    def _set(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         name, value = text_of(command, "field"), text_of(command, "value")
-        if name != "run.flow" or not lane.flow(value):
-            lane.set(name, value)
+        if name != "run.flow" or not swimmer.flow(value):
+            swimmer.set(name, value)
 
-    def _preset(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
-        lane.preset(text_of(command, "value"), self._own)
-        lane.set_duty()
+    def _preset(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
+        swimmer.preset(text_of(command, "value"), self._own)
+        swimmer.set_duty()
 
-    def _tail(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+    def _tail(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         if self._study is None:
             raise InputError("tail: no study is shown; allowed: a study first")
-        lane.swap(*self._study.tail(command))
+        swimmer.swap(*self._study.tail(command))
 
-    def _undo(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
-        lane.undo()
+    def _undo(self, swimmer: PageRobot, _command: Mapping[str, Any]) -> None:
+        swimmer.undo()
 
-    def _redo(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
-        lane.undo(forward=True)
+    def _redo(self, swimmer: PageRobot, _command: Mapping[str, Any]) -> None:
+        swimmer.undo(forward=True)
 
     def _restart(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
-        for lane in self._lanes:
-            lane.start_anew()
+        for swimmer in self._swimmers:
+            swimmer.start_anew()
 
-    def _remote(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
-        lane.remote = bool(command.get("value"))
+    def _remote(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
+        swimmer.remote = bool(command.get("value"))
 
-    def _duty(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
-        lane.set_duty(number_of(command, 0.0, 1.0))
+    def _duty(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
+        swimmer.set_duty(number_of(command, 0.0, 1.0))
 
-    def _flow(self, lane: PageRobot, command: Mapping[str, Any]) -> None:
+    def _flow(self, swimmer: PageRobot, command: Mapping[str, Any]) -> None:
         if command.get("value"):
-            lane.with_flow(self._wake_up)
+            swimmer.with_flow(self._wake_up)
         else:
-            lane.without_flow()
+            swimmer.without_flow()
 
     def _play(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
         self._playing = bool(command.get("value"))
@@ -276,8 +276,8 @@ class SimulationThread:
     def _step(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
         self._playing = False
         if self._all_ready():
-            for lane in self._lanes:
-                lane.advance(self._pace / RATE)
+            for swimmer in self._swimmers:
+                swimmer.advance(self._pace / RATE)
 
     def _set_pace(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
         self._pace = number_of(command, SLOWEST_PACE, FASTEST_PACE)
@@ -287,19 +287,19 @@ class SimulationThread:
 
     def _compare(self, _lane: PageRobot, command: Mapping[str, Any]) -> None:
         if not command.get("value"):
-            for lane in self._lanes[1:]:
-                lane.without_flow()
-            del self._lanes[1:]
-        elif len(self._lanes) == 1:
-            first = self._lanes[0]
+            for swimmer in self._swimmers[1:]:
+                swimmer.without_flow()
+            del self._swimmers[1:]
+        elif len(self._swimmers) == 1:
+            first = self._swimmers[0]
             second = PageRobot(first.settings, first.robot, first.remote, first.duty)
             first.start_anew()
-            self._lanes.append(second)
+            self._swimmers.append(second)
 
-    def _prepare(self, lane: PageRobot, _command: Mapping[str, Any]) -> None:
+    def _prepare(self, swimmer: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None and self._preparing.running:
             raise InputError("another table is being computed; allowed: one at a time")
-        self._preparing, self._left_off = Preparing(lane.robot, self._wake_up), None
+        self._preparing, self._left_off = Preparing(swimmer.robot, self._wake_up), None
 
     def _leave_off(self, _lane: PageRobot, _command: Mapping[str, Any]) -> None:
         if self._preparing is not None:
@@ -311,12 +311,12 @@ class SimulationThread:
     # the thread of the numbers
 
     def _want(self, index: int) -> None:
-        lane = self._lanes[index]
-        self._asked[index:] = [lane.revision]
+        swimmer = self._swimmers[index]
+        self._requested[index:] = [swimmer.revision]
         with self._work:
-            known = "" if lane.built is None else lane.built.model
-            robots = lane.robot, lane.predicted()
-            self._wanted[index] = (lane.generation, lane.revision, known, lane.settings, *robots)
+            known = "" if swimmer.built is None else swimmer.built.model
+            robots = swimmer.robot, swimmer.predicted()
+            self._wanted[index] = (swimmer.generation, swimmer.revision, known, swimmer.settings, *robots)
             self._work.notify_all()
 
     def _build(self) -> None:
@@ -378,7 +378,7 @@ class SimulationThread:
         from spirillum.dynamics.prediction import predict
 
         def check(_what: str, _done: int, _total: int) -> None:
-            if self._ending.is_set() or self._asked[index : index + 1] != [revision]:
+            if self._ending.is_set() or self._requested[index : index + 1] != [revision]:
                 raise _OutdatedError
 
         self._ending.wait(_COLUMNS_AFTER)
@@ -394,60 +394,60 @@ class SimulationThread:
         changed = False
         while True:
             try:
-                index, generation, revision, built, numbers, trouble = self._built.get_nowait()
+                index, generation, revision, built, numbers, failure = self._built.get_nowait()
             except queue.Empty:
                 break
-            if index >= len(self._lanes) or self._lanes[index].generation != generation:
+            if index >= len(self._swimmers) or self._swimmers[index].generation != generation:
                 continue
-            lane = self._lanes[index]
+            swimmer = self._swimmers[index]
             with self._lock:
                 if built is not None:
-                    lane.take(built)
-                if numbers is not None and revision == lane.revision:
-                    lane.numbers = numbers
-                if trouble and revision == lane.revision:
-                    lane.trouble, lane.numbers = trouble, None
+                    swimmer.take(built)
+                if numbers is not None and revision == swimmer.revision:
+                    swimmer.numbers = numbers
+                if failure and revision == swimmer.revision:
+                    swimmer.failure, swimmer.numbers = failure, None
             changed = True
         if self._preparing is not None:
             changed = self._look_at_table(self._preparing) or changed
         elif self._looked_at:
             self._make_table()
         if changed:
-            self._tell_scene()
+            self._send_scene()
         return changed
 
     def _make_table(self) -> None:
         """Start the table of a robot that swims provisionally and is left as it is, unless it was left off."""
         now = time.monotonic()
-        for lane in self._lanes:
-            untouched = lane.built is not None and lane.built.provisional and now - lane.since > _UNTOUCHED
-            if untouched and lane.robot != self._left_off:
-                self._preparing = Preparing(lane.robot, self._wake_up)
+        for swimmer in self._swimmers:
+            untouched = swimmer.built is not None and swimmer.built.provisional and now - swimmer.since > _UNTOUCHED
+            if untouched and swimmer.robot != self._left_off:
+                self._preparing = Preparing(swimmer.robot, self._wake_up)
                 return
 
     def _look_at_table(self, preparing: Preparing) -> bool:
         """Publish the progress of a table to the robots that it is for; whether it has changed."""
         said, running = preparing.progress(), preparing.running
-        before = [lane.preparing for lane in self._lanes]
-        for index, lane in enumerate(self._lanes):
-            own = lane.robot == preparing.robot
-            lane.preparing = said if own else None
+        before = [swimmer.preparing for swimmer in self._swimmers]
+        for index, swimmer in enumerate(self._swimmers):
+            own = swimmer.robot == preparing.robot
+            swimmer.preparing = said if own else None
             if own and said.get("done") and not running:
-                lane.start_anew()
+                swimmer.start_anew()
                 self._want(index)
         if not running:
             self._preparing = None
             self._left_off = None if said.get("done") else preparing.robot
-        elif all(lane.robot != preparing.robot for lane in self._lanes):
+        elif all(swimmer.robot != preparing.robot for swimmer in self._swimmers):
             preparing.stop()
-        return before != [lane.preparing for lane in self._lanes]
+        return before != [swimmer.preparing for swimmer in self._swimmers]
 
-    # what is told
+    # messages to the clients
 
-    def _tell_scene(self) -> None:
+    def _send_scene(self) -> None:
         scene = {
             "t": "scene",
-            "lanes": [lane.scene() for lane in self._lanes],
+            "lanes": [swimmer.scene() for swimmer in self._swimmers],
             "quantities": quantity_list(),
             "presets": list(preset_names()),
             "own": self._own if isinstance(self._own, str) else "own",
@@ -461,8 +461,8 @@ class SimulationThread:
         self._tell_frame()
 
     def _tell_frame(self) -> None:
-        lanes = [lane.frame() for lane in self._lanes]
-        self.frame = json.dumps({"t": "frame", "lanes": lanes, "playing": self._playing, "behind": self._behind})
+        swimmers = [swimmer.frame() for swimmer in self._swimmers]
+        self.frame = json.dumps({"t": "frame", "lanes": swimmers, "playing": self._playing, "behind": self._behind})
         self._publish()
 
 

@@ -52,7 +52,7 @@ class StudyPicture:
             raise InputError(f"this study does not name a robot for each channel; allowed: {_WHAT}")
         self.title = str(dataset.attrs.get("title", "A study"))[:200]
 
-    def told(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """The picture's numbers: speeds by channel, model, amplitude and wavelength, m/s, None where there is none."""
         values = self._speed.transpose("channel", "model", "amplitude", "wavelength").values
         return {

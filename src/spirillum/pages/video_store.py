@@ -181,7 +181,7 @@ class VideoStore:
         with self._lock:
             return [film.path for film in self._films.values()]
 
-    def told(self) -> list[dict[str, Any]]:
+    def describe(self) -> list[dict[str, Any]]:
         """Videos as the page lists them."""
         with self._lock:
             return [

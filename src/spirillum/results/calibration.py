@@ -259,7 +259,7 @@ def calibrate(  # noqa: PLR0913 - the options of the command
         answer: what is fitted: `held`, or `trial`, released in the tube as `predict` has it (free:
             `friction_coefficient`, `shared_friction`, `roughness`); a second for each of 32 trials of a robot.
         figures: draw figures, which takes some seconds.
-        progress: told what is being done.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, or observations that cannot tell what is asked, or a folder that cannot be
@@ -330,16 +330,16 @@ def _gone(paths: Sequence[Path]) -> str:
 
 
 def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
-    tell = progress or (lambda _what, _done, _total: None)
     from spirillum.view.figures.calibration import calibration_figures
     from spirillum.view.figures.style import save
 
-    tell("figures", 0, 1)
+    on_progress = progress or (lambda _what, _done, _total: None)
+    on_progress("figures", 0, 1)
     inside = output_folder(folder / "figures", folder)
     written: list[Path] = []
     for name, figure in calibration_figures(found).items():
         written += save(figure, inside / name)
-    tell("figures", 1, 1)
+    on_progress("figures", 1, 1)
     return written
 
 

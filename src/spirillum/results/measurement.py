@@ -42,7 +42,10 @@ if TYPE_CHECKING:
 
 
 def write_measurement_report(
-    measurement: Measurement, folder: Path, thumbnails: Mapping[str, bytes], tell: Callable[[str, int, int], None]
+    measurement: Measurement,
+    folder: Path,
+    thumbnails: Mapping[str, bytes],
+    on_progress: Callable[[str, int, int], None],
 ) -> list[str]:
     """Write `figures/` (PNG and SVG) and `report.html`, each whole or not at all.
 
@@ -53,9 +56,9 @@ def write_measurement_report(
 
     pictures = measurement_figures(measurement)
     steps = len(pictures) + 1
-    embedded = draw_pictures(pictures, folder, lambda _name, done: tell("figures and report", done, steps))
+    embedded = draw_pictures(pictures, folder, lambda _name, done: on_progress("figures and report", done, steps))
     write_text(folder / "report.html", _page(measurement, embedded, thumbnails))
-    tell("figures and report", steps, steps)
+    on_progress("figures and report", steps, steps)
     return [*(name for picture in embedded for name in picture.files), "report.html"]
 
 
@@ -177,14 +180,14 @@ def measure(
     asked = check_request(
         videos, setup, marks=marks, track=track, tracking=tracking, start=start, end=end, overrides=overrides
     )
-    tell: Progress = progress or (lambda _what, _done, _total: None)
+    on_progress: Progress = progress or (lambda _what, _done, _total: None)
     if output is None:
-        return _measured(asked, None, tell)
+        return _measured(asked, None, on_progress)
     inputs = (*asked.videos, setup, marks, track, asked.folder / asked.setup.robot.file)
     with results_folder(output) as path, guard_inputs(*inputs):
         folder = _Folder(path, annotated=annotated, figures=figures)
         folder.check(asked)
-        return _measured(asked, folder, tell)
+        return _measured(asked, folder, on_progress)
 
 
 _ENDINGS = ("nc", "movement.nc")
@@ -213,7 +216,7 @@ class _Folder:
             check_replaceable(self.path / name)
 
 
-def _measured(asked: MeasurementRequest, folder: _Folder | None, tell: Progress) -> Measurement:
+def _measured(asked: MeasurementRequest, folder: _Folder | None, on_progress: Progress) -> Measurement:
     """Measure one video after the other; what is finished is written even if the next ones cannot be."""
     trials: list[Trial] = []
     failures: list[tuple[str, str]] = []
@@ -221,11 +224,11 @@ def _measured(asked: MeasurementRequest, folder: _Folder | None, tell: Progress)
     for number, path in enumerate(asked.videos):
         words = path.name if count == 1 else f"{path.name} ({number + 1} of {count})"
         try:
-            trials.append(_trial(asked, number, folder, _frames_told(tell, words)))
+            trials.append(_trial(asked, number, folder, _frames_told(on_progress, words)))
         except (KeyboardInterrupt, OSError):
             with suppress(OSError):  # as far as there is room for it
                 if trials:
-                    _finished(asked, trials, failures, folder, tell, interrupted=True)
+                    _finished(asked, trials, failures, folder, on_progress, interrupted=True)
             raise
         except InputError as error:
             failures.append((str(path), str(error)))
@@ -233,24 +236,24 @@ def _measured(asked: MeasurementRequest, folder: _Folder | None, tell: Progress)
         sentences = [sentence for _, sentence in failures]
         more = "" if count == 1 else f" (and {count - 1} more)"
         raise InputError(f"{sentences[0]}{more}", sentences)
-    return _finished(asked, trials, failures, folder, tell, interrupted=False)
+    return _finished(asked, trials, failures, folder, on_progress, interrupted=False)
 
 
-def _frames_told(tell: Progress, words: str) -> Callable[[int, int | None], None]:
-    return lambda done, frames: tell(words, done, max(done, frames or 0))
+def _frames_told(on_progress: Progress, words: str) -> Callable[[int, int | None], None]:
+    return lambda done, frames: on_progress(words, done, max(done, frames or 0))
 
 
 def _trial(
-    asked: MeasurementRequest, number: int, folder: _Folder | None, tell: Callable[[int, int | None], None]
+    asked: MeasurementRequest, number: int, folder: _Folder | None, on_progress: Callable[[int, int | None], None]
 ) -> Trial:
     """Measure one video and write what belongs to it alone."""
     path, name = asked.videos[number], asked.names[number]
     if folder is None:
-        return measured_trial(asked, number, path, progress=tell)
+        return measured_trial(asked, number, path, progress=on_progress)
     if folder.annotated and asked.tracking and asked.track is None:
-        trial = _annotated_trial(asked, number, folder, tell)
+        trial = _annotated_trial(asked, number, folder, on_progress)
     else:
-        trial = measured_trial(asked, number, path, progress=tell)
+        trial = measured_trial(asked, number, path, progress=on_progress)
     for ending, arrays in zip(_ENDINGS, (series_of(trial, asked.robot), movement_of(trial, asked.robot)), strict=True):
         arrays.write(folder.path / f"{name}.{ending}")
         folder.files.append(f"{name}.{ending}")
@@ -258,7 +261,7 @@ def _trial(
 
 
 def _annotated_trial(
-    asked: MeasurementRequest, number: int, folder: _Folder, tell: Callable[[int, int | None], None]
+    asked: MeasurementRequest, number: int, folder: _Folder, on_progress: Callable[[int, int | None], None]
 ) -> Trial:
     path, name = asked.videos[number], asked.names[number]
 
@@ -273,7 +276,7 @@ def _annotated_trial(
     period = pattern_period(stripes_of(asked.setup, asked.robot))
     film = partial(annotated_film, robot=asked.robot, words=words, period=period, waiting=video.waiting)
     with atomic_write(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
-        trial = measured_trial(asked, number, video, progress=tell, on_frame=on_frame)
+        trial = measured_trial(asked, number, video, progress=on_progress, on_frame=on_frame)
     if (flag := _flag_with_frame(trial)) is not None and flag.frame is not None:
         folder.thumbnails[name] = frame_of_film(target, flag.frame) or folder.thumbnails.get(name, b"")
     folder.files.append(target.name)
@@ -285,7 +288,7 @@ def _finished(
     trials: Sequence[Trial],
     failures: Sequence[tuple[str, str]],
     folder: _Folder | None,
-    tell: Progress,
+    on_progress: Progress,
     *,
     interrupted: bool,
 ) -> Measurement:
@@ -301,5 +304,5 @@ def _finished(
     found = replace(found, files=tuple(folder.files), left=tuple(left))
     if not folder.figures:
         return found
-    more = write_measurement_report(found, folder.path, folder.thumbnails, tell)
+    more = write_measurement_report(found, folder.path, folder.thumbnails, on_progress)
     return replace(found, files=(*found.files, *more))

@@ -32,7 +32,7 @@ class EmbeddedPicture:
 
 
 def draw_pictures(
-    pictures: Mapping[str, Picture], folder: Path, tell: Callable[[str, int], None], *, largest_svg: int = 0
+    pictures: Mapping[str, Picture], folder: Path, on_progress: Callable[[str, int], None], *, largest_svg: int = 0
 ) -> list[EmbeddedPicture]:
     """Write `figures/` (PNG and SVG), each file whole or not at all."""
     from spirillum.view.figures.style import save
@@ -40,7 +40,7 @@ def draw_pictures(
     figures = output_folder(folder / "figures", folder)
     found = []
     for done, (name, picture) in enumerate(pictures.items()):
-        tell(name, done)
+        on_progress(name, done)
         png, svg = save(picture.figure(), figures / name)
         if svg.stat().st_size <= largest_svg:
             source = data_uri(svg.read_bytes(), "svg+xml")

@@ -79,14 +79,14 @@ _LARGEST_SVG = 2_000_000
 """A larger vector picture is embedded as pixels, bytes."""
 
 
-def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, int], None]) -> None:
+def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
     """Write `figures/` (PNG and SVG), `claims.json`, `ranking.csv` and a self-contained `report.html`."""
     pictures = _pictures(dataset)
     steps = len(pictures) + 1
     embedded = draw_pictures(
-        pictures, folder, lambda name, done: tell(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
+        pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
     )
-    tell("report", len(pictures), steps)
+    on_progress("report", len(pictures), steps)
     claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
     text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
     write_text(folder / "claims.json", text + "\n", replace="any")
@@ -100,7 +100,7 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
         **content(dataset),
     }
     write_text(folder / "report.html", page("report.html.jinja", **names))
-    tell("report", steps, steps)
+    on_progress("report", steps, steps)
 
 
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
@@ -209,24 +209,24 @@ def study(  # noqa: PLR0913 - the options of the command
     observed = observed_arrays(observations, loaded) if observations is not None else None
     crew.check()
     fingerprint = study_fingerprint(loaded, observed)
-    tell = progress or (lambda _what, _done, _total: None)
-    make_tables(loaded, crew, tell)
+    on_progress = progress or (lambda _what, _done, _total: None)
+    make_tables(loaded, crew, on_progress)
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
         with guard_inputs(*inputs):
-            return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, tell))
+            return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, on_progress))
     if output is None:
-        return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, tell, crew))
+        return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, on_progress, crew))
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     with guard_inputs(*inputs), results_folder(output, claim=claim) as folder:
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
-            dataset = computed_study(loaded, observed, fingerprint, parts, tell, crew)
+            dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, crew)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
-        write_report(dataset, folder, tell)
+        write_report(dataset, folder, on_progress)
     return StudyDataset.of(dataset)
 
 

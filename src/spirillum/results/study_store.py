@@ -52,7 +52,7 @@ def stored_study(
     fingerprint: str,
     store: str | Path,
     crew: WorkerPool,
-    tell: Tell,
+    on_progress: Tell,
 ) -> xr.Dataset:
     """Compute what a store lacks of a study, and open it."""
     import_optional("zarr", "a store", "cluster")
@@ -70,7 +70,7 @@ def stored_study(
             _write_headers(plan, folder, {**attributes, "finished": "no"})
         if missing:
             estimate = estimate_of(loaded, observed, plan, len(missing), crew) if is_large(loaded) else None
-            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, tell, estimate)
+            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, on_progress, estimate)
         if outcome is None:
             outcome = _summed(loaded, [_note_of(folder / plan.note(region)) for region in plan.layout.regions()])
         _write_headers(plan, folder, {**attributes, **outcome._asdict(), "finished": "yes"})
@@ -160,7 +160,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _write_regions(
-    work: _Work, missing: Sequence[RobotBlock], crew: WorkerPool, tell: Tell, estimate: CostEstimate | None
+    work: _Work, missing: Sequence[RobotBlock], crew: WorkerPool, on_progress: Tell, estimate: CostEstimate | None
 ) -> None:
     """Compute and write regions; the remaining time is reported once their pace is known."""
     plan, total = work.plan, work.plan.layout.count
@@ -170,18 +170,18 @@ def _write_regions(
     def at_work(words: str) -> None:
         if words != here[0]:
             here[0] = words
-            tell(f"{models}: {words}", done, total)
+            on_progress(f"{models}: {words}", done, total)
 
     pace = None if estimate is None else Pace(sum(region.size for region in missing), estimate.workers)
     jobs = region_jobs(work.loaded, work.observed, plan, _spread(missing))
-    for job, files in map_tasks(encoded_region, jobs, crew, besides="; what was written is kept", tell=at_work):
+    for job, files in map_tasks(encoded_region, jobs, crew, besides="; what was written is kept", on_progress=at_work):
         write_pieces(work.folder, files)
         done += 1
         seconds = None if pace is None or done == total else pace.seconds(job.region.size)
         if estimate is not None and seconds is not None:
-            tell(estimate.words(seconds), 0, 0)
+            on_progress(estimate.words(seconds), 0, 0)
             pace = None
-        tell(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
+        on_progress(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
 
 
 def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:

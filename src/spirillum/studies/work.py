@@ -370,7 +370,7 @@ def _stacked(results: Sequence[Swimming], name: str) -> Values:
 def _at_assumed_rates(task: ModelTask, quick: QuickParts, rates: Sequence[float], readings: Sequence[str]) -> Part:
     """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
     electrics = task.batch.electrics
-    assert electrics is not None  # noqa: S101 - the caller has asked
+    assert electrics is not None  # noqa: S101 - checked by the caller
     driven = np.outer(rates, np.broadcast_to(electrics.polarity, (task.batch.size,)))
     curves = [_curve(quick, reading, driven) for reading in readings]
     return {f"{name}_at_assumed_rate": np.stack([curve[name] for curve in curves], axis=1) for name in AT_RATES}

@@ -1,9 +1,9 @@
 """Answers for an unknown pose in the channel: a band over the possible poses.
 
 Two things decide much of how a robot swims in its channel and are seldom reported: the gap under its body, and how near
-its tail comes to the floor. Where a placement leaves one of them open, the motion is computed at a few places, each a
+its tail comes to the floor. Where a placement leaves one of them open, the motion is computed at a few poses, each a
 steady state of its own, and the least and the largest value of every quantity are its band. A band is no interval of
-confidence: nothing says that one place is likelier than another.
+confidence: no pose is likelier than another.
 
 The gaps are the ends of `GAP_BAND` and their geometric mean, capped by what the channel leaves. The pitches are level,
 the steepest that gap and tail allow, and half of it. At the steepest one the wire's surface, at its lowest point of a
@@ -41,7 +41,7 @@ TOLERANCE = 0.25
 default. At gaps of 0.3, 0.5 and 1 mm the level robot of the paper has its speed within 0.04 %, its body rate within 4 %
 of the default's; pitched by 2.5 degrees at 0.5 mm, within 0.2 % and 0.6 %. A band spans several times as much.
 """
-_SLACK = 1.0 + 1e-6  # rounding must not carry the steepest place out of the domain
+_SLACK = 1.0 + 1e-6  # rounding must not carry the steepest pose out of the domain
 _SWEPT = 129  # rings of what the tail sweeps in a turn
 
 Progress = Callable[[str, int, int], None]
@@ -106,7 +106,7 @@ def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
 def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     """The poses of a robot's band, from wide gaps to narrow ones and from level to steep.
 
-    As many for every robot, so that the places of several robots compare: where a robot has no room, some are the same.
+    As many for every robot, so that the poses of several robots compare: where a robot has no room, some are the same.
 
     Returns:
         `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
@@ -186,7 +186,7 @@ def band_of(
         return None
     found, left_out = [], []
     for done, place in enumerate(places):
-        assert place.gap is not None  # noqa: S101 - every place has both
+        assert place.gap is not None  # noqa: S101 - every pose has both
         assert place.pitch is not None  # noqa: S101
         where = f"gap {show(place.gap, 'mm')}, pitch {show(place.pitch, 'deg')}"
         tell(f"{model.name}, {where}", done + 1, len(places) + 1)

@@ -56,7 +56,7 @@ def calibration_warnings(robot: Robot, model: str) -> list[Note]:
         return []
     entry = robot.calibration.get(model)
     if entry is None:
-        if robot.channel is None:  # nothing to stand for
+        if robot.channel is None:  # no walls to represent
             return []
         return [
             Note(

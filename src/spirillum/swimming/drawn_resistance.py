@@ -85,14 +85,14 @@ class AxialTable:
         *,
         wires: Samples | None = None,
         coefficients: bool = False,
-        tell: Callable[[int, int], None] | None = None,
+        on_progress: Callable[[int, int], None] | None = None,
     ) -> AxialTable:
         """Compute the resistances."""
         found = []
         values = [None] if wires is None else wires.tolist()
         for done, wire in enumerate(values):
-            if tell is not None:
-                tell(done, len(values))
+            if on_progress is not None:
+                on_progress(done, len(values))
             there = batch if wire is None else batch.with_values({"tail.wire_diameter": wire})
             found.append(_parts(there, model, coefficients=coefficients))
         return cls(

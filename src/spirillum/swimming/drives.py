@@ -225,7 +225,7 @@ def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> Drive
 
 
 def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tuple[PerRobot, PerRobot, PerRobot]:
-    """Step-out rate, phase lag and mean rate of a robot held to the axis about which the field turns.
+    """Step-out rate, phase lag and mean rate of a robot constrained to the axis about which the field turns.
 
     The moment's part across the axis, m sin(moment_angle), lags behind the field by an angle with
     m B sin(lag) = load * rate. Beyond step-out the lag grows without end, d(lag)/dt = rate - step_out sin(lag), and

@@ -70,7 +70,7 @@ def intervals_of(
         tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
         friction: reading of the friction.
         posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
-        placement: where the robot lies, for a model that computes the walls; a gap or pitch that it says is not drawn.
+        placement: pose in the tube, for a model that computes the walls; a gap or pitch that it states is not sampled.
     """
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
@@ -190,7 +190,7 @@ def _drawn(
     tables = model if isinstance(model, TabledTube) else tabled(own)
     if tables is None:
         raise InputError(
-            f"{robot.name} has no table of its tube that holds where it lies, which draws of {posterior.source} need; "
+            f"{robot.name} has no table of its tube that is valid at its pose, which draws of {posterior.source} need; "
             "allowed: after `spirillum prepare`, or its calibration.toml as --calibration"
         )
     if placement.gap is not None or placement.eccentricity is not None:

@@ -51,7 +51,7 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
         return ModelChoice(UNBOUNDED, "the robot has no channel")
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
-    if outside and (placement is None or not placement.is_given):  # a place is refused by the model that knows places
+    if outside and (placement is None or not placement.is_given):  # a pose is refused by the model that takes poses
         raise InputError(
             f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}; or model "
             f"'{UNBOUNDED}', which leaves out the walls"

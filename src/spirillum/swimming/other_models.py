@@ -95,13 +95,13 @@ def _statement(found: list[OtherModel], model: SwimmerModel, *, coupled: bool) -
     bare = _times([item for item in found if not item.calibrated])
     lacking = f"{'the coupling and ' if coupled else ''}the flow between body and tail"
     if not model.placed:
-        return f"closed forms say {bare}: they leave out {lacking}"
+        return f"closed forms predict {bare}: they leave out {lacking}"
     fitted = [item for item in found if item.calibrated]
-    more = f"; with calibration factors, which stand for the walls, {_times(fitted)}" if fitted else ""
+    more = f"; with calibration factors, which represent the walls, {_times(fitted)}" if fitted else ""
     names = [name for name in dict.fromkeys(item.model for item in found) if SWIMMER_MODELS[name].closed_form]
     leave = f"{' and '.join(names)} {'leaves' if len(names) == 1 else 'leave'}"
     apart = f" ({leave} out {lacking}, too)" if names else ""
-    return f"models without walls say {bare}{apart}{more}"
+    return f"models without walls predict {bare}{apart}{more}"
 
 
 def _times(items: list[OtherModel]) -> str:

@@ -72,7 +72,7 @@ class Prediction(DisplayMixin):
     band: Band | None = field(default=None, repr=False)
     """Band over the poses that the placement leaves open; None where there are none, or none was requested."""
     motion: Motion = "held"
-    """Lateral motion and tilt held, or released."""
+    """Lateral motion and tilt constrained, or released."""
     interval_of: str = ""
     """Whose the intervals are, in half a sentence; empty without a posterior."""
     lying: SteadyState | None = None
@@ -242,9 +242,9 @@ def predict(
 ) -> Prediction:
     """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
 
-    Where the answer depends on the robot's place in its channel and `placement` leaves its gap or its pitch open, the
+    Where the answer depends on the robot's pose in its channel and `placement` leaves its gap or its pitch open, the
     answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and, where the robot has a table
-    for its tube (`spirillum.prepare`), has a band over the places that are possible, see `spirillum.swimming.band`.
+    for its tube (`spirillum.prepare`), has a band over the poses that are possible, see `spirillum.swimming.band`.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -267,7 +267,7 @@ def predict(
         motion: `held` (lateral motion and tilt constrained) or `free`. Free with `rft` or
             `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
             screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
-        progress: told what is being computed, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
     """
     scenario = resolve_scenario(
         robot,
@@ -371,7 +371,7 @@ def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Pos
     if posterior is None:
         return ""
     if whose == "measured":
-        return "of this robot, which was measured: its own observations say how far the model misses it"
+        return "of this robot, which was measured: its own observations show how far the model misses it"
     if posterior.measured(robot) is None:
         return "of a tail like those that were fitted, which the model may miss by as much as these"
     return (

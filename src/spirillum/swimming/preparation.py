@@ -192,7 +192,7 @@ def prepare(
     """Make the table of a robot in its tube, or read the one that is there, of this stage or a finer one.
 
     With it the model `tube` answers in microseconds, for any viscosity, drive, weight, friction and roughness, and
-    `simulate` moves the robot in its tube. Places that were solved for are kept as they come: an interrupted
+    `simulate` moves the robot in its tube. Poses that were solved for are kept as they come: an interrupted
     preparation goes on where it was. A robot whose mirror image has a table needs none.
 
     Args:
@@ -200,7 +200,7 @@ def prepare(
         stage: `straight` (poses without yaw, for constrained motion), `yaw` (for motion after release too), or `fine`
             (more nodes, and the finest resolution of the flow); each takes about four times as long as the one before.
         workers: number of processes.
-        progress: told what is being solved, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
@@ -224,7 +224,7 @@ def prepare_all(
         robots: see `prepare`.
         stage: see `prepare`.
         workers: number of processes.
-        progress: told what is being solved, how many places are done, and of how many.
+        progress: called with stage, number done, and total.
 
     Raises:
         InputError: for wrong input, a robot that the model `tube` does not know or that has no table, or a folder
@@ -247,7 +247,7 @@ def prepare_all(
 
 def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
     """What decides the table of a robot that has one; named in the sentence of an error where there are several."""
-    # A table holds for all places: a robot is checked on the axis, where a tail wider than its body is off the glass.
+    # A table is valid for all poses: a robot is checked on the axis, where a tail wider than its body is off the glass.
     _, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
     try:
         asked = _asked(batch)
@@ -268,7 +268,7 @@ def check_usual_resolution(options: ModelOptions) -> None:
     """Refuse a resolution of a robot whose table answers."""
     if resolved := options.resolution:
         raise InputError(
-            f"{resolved} of a robot whose table is asked for, which has its own resolution; allowed: only where the "
+            f"{resolved} of a robot whose table is requested, which has its own resolution; allowed: only where the "
             "flow is solved for (predict, or simulate with motion 'held')"
         )
 

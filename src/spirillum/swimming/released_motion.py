@@ -115,13 +115,13 @@ class SteadyState:
     def statement(self) -> str:
         """Whether a steady motion was reached, and what the means are over, a sentence."""
         if self.state == "steady":
-            return "a steady motion was reached: every turn of the tail brings back this place"
+            return "a steady motion was reached: each turn of the tail returns to this pose"
         if self.state == "changing":
             return f"no steady motion was reached: {self.ended}; all values are means over the last turn of the tail"
         circuit = abs(2.0 * math.pi / self.orbit_rate) if self.orbit_rate else math.inf
         if self.state == "orbits":
             around = f"orbits the tube's axis in {circuit:.3g} s" if math.isfinite(circuit) else "keeps any azimuth"
-            return f"no steady place was reached: nothing tells one azimuth from another, and the robot {around}"
+            return f"no steady azimuth was reached: all azimuths are equivalent, and the robot {around}"
         return (
             f"no steady motion was reached: its weight does not hold the robot, which goes around the tube in "
             f"{circuit:.3g} s; all values are means over a circuit"
@@ -146,7 +146,7 @@ class SteadyState:
 
 
 Motion = Literal["held", "free"]
-"""Lateral motion and tilt held, or released."""
+"""Lateral motion and tilt constrained, or released."""
 
 LINKS = np.zeros((12, 7))
 """Twists of body and rotor from the seven rates (U, Omega_b, omega_m), all about the origin in body axes."""
@@ -198,7 +198,7 @@ def check_full(model: SwimmerModel) -> None:
     if model.axial_only:
         why = "knows the entries along and about the motor axis only"
     elif model.placed:
-        why = "answers at one place in the channel, which a free robot leaves"
+        why = "answers at one pose in the channel, which a free robot leaves"
     else:
         return
     raise InputError(f"motion = 'free' with model '{model.name}', which {why}; allowed: motion 'held', or rft, slender")

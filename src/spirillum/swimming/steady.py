@@ -155,7 +155,7 @@ def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bo
 
 
 def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> Matrix12:
-    """R of both parts at phase 0 with calibration factors, for a motion that is not held to the axis."""
+    """R of both parts at phase 0 with calibration factors, for a motion that is not constrained to the axis."""
     return _with_factors(model.resistance(batch, np.zeros(1)), (0, 3), batch, model, calibrated=calibrated)
 
 

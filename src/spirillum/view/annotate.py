@@ -160,7 +160,7 @@ class Annotator:
                 line(np.stack([part, np.full(2, y), np.full(2, 0.0)], axis=1), _POINTER)
 
     def _along(self, seen: AnnotatedFrame) -> float:
-        assert seen.pose is not None  # noqa: S101 - asked only where it was seen
+        assert seen.pose is not None  # noqa: S101 - called only where it was detected
         if self._first is None:
             self._first = seen.pose.x
         return seen.pose.x - self._first
@@ -293,7 +293,7 @@ class _Writer:
         drawn: Callable[[int, np.ndarray, AnnotatedFrame], np.ndarray],
         waiting: int,
     ) -> None:
-        import_optional("av", "an annotated video", "video")  # said here, before any frame is tracked
+        import_optional("av", "an annotated video", "video")  # raises here, before any frame is tracked
         self._path, self._words, self._drawn = path, words, drawn
         self._queue: Queue[_Frame | None] = Queue(waiting)
         self._error: BaseException | None = None

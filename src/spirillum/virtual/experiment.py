@@ -152,7 +152,7 @@ def virtual_experiment(
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         seed: of all random numbers.
         jobs: number of parallel renderings, 1 to 64.
-        progress: told what is done, how many trials are done, and how many there are.
+        progress: called with stage, number done, and total.
 
     Returns:
         What was written.
@@ -369,19 +369,19 @@ def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> 
 
 
 def _render_all(
-    render_one: _Render, missing: list[Planned], total: int, jobs: int, tell: Callable[[str, int, int], None]
+    render_one: _Render, missing: list[Planned], total: int, jobs: int, on_progress: Callable[[str, int, int], None]
 ) -> None:
     """Render what is missing; after an interruption, finished trials stay and no unfinished one is left."""
     stop = threading.Event()
     done = total - len(missing)
-    tell("virtual experiment", done, total)
+    on_progress("virtual experiment", done, total)
     with ThreadPoolExecutor(jobs) as pool:
         labels = {pool.submit(render_one, planned, stop): planned.label for planned in missing}
         try:
             for future in as_completed(labels):
                 future.result()
                 done += 1
-                tell(labels[future], done, total)
+                on_progress(labels[future], done, total)
         except BaseException:
             stop.set()
             for future in labels:

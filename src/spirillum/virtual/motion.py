@@ -128,7 +128,7 @@ def motion_of_trial(
         motion: the friction model; the rates follow from the run.
         trial: duration, and the gap at which the robot is released.
         camera: where the camera stands.
-        progress: told what is being computed, how much is done, and of how much.
+        progress: called with stage, number done, and total.
     """
     from spirillum.dynamics.simulation import simulate
 

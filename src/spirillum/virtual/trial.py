@@ -255,7 +255,7 @@ def render(
         troubles: of a real bench: `Troubles`, or names such as ``"lost-frames,handheld,noise"``.
         setup: the setup file; None: beside the video.
         seed: of all random numbers.
-        progress: told what is done, how many frames are done, and how many there are.
+        progress: called with stage, number done, and total.
 
     Returns:
         What was written.
@@ -315,7 +315,7 @@ def render(
     frames = FrameEncoder(
         painter, disturbances, trajectory, camera.exposure, ViewArtifacts(troubles, seed, camera.size)
     )
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
         guard_inputs(*inputs),
@@ -325,8 +325,8 @@ def render(
         for place, text in beside.items():
             parts[place].write_text(text, encoding="utf-8")
         write_dataset(truth, parts[names["nc"]])
-        _write_frames(writer, frames, (kept, counted), camera.fps, tell)
-        tell("render: writing", len(kept), len(kept))
+        _write_frames(writer, frames, (kept, counted), camera.fps, on_progress)
+        on_progress("render: writing", len(kept), len(kept))
     return written
 
 
@@ -390,14 +390,14 @@ def _write_frames(
     frames: FrameEncoder,
     numbers: tuple[np.ndarray, np.ndarray],
     fps: float,
-    tell: Callable[[str, int, int], None],
+    on_progress: Callable[[str, int, int], None],
 ) -> None:
     """Render frames in parallel with the encoding; `numbers`: as recorded, and as the video counts them."""
     kept, counted = numbers
     with ThreadPoolExecutor(1) as encoder:
         before: Future[None] | None = None
         for done, number in enumerate(kept):
-            tell("render", done, len(kept))
+            on_progress("render", done, len(kept))
             image = frames.image(number / fps)
             if before is not None:
                 before.result()

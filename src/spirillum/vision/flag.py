@@ -14,7 +14,7 @@ class Flag:
     name: str
     """Short, for machines, such as `robot-left-the-view`."""
     sentence: str
-    """One sentence for people: what was seen, when, and what follows for the numbers."""
+    """One sentence for people: finding, time, and effect on the numbers."""
     spoils: tuple[str, ...] = ()
     """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
     frame: int | None = None

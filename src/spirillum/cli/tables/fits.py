@@ -122,11 +122,11 @@ def suggestion(answer: Answer, rows: int = 10) -> Blocks:
         channel, *tail = [f"{1e3 * item[n]['value']:g}" for n in ("channel_diameter", "wavelength", "amplitude")]
         name, share = min(item["narrowing"].items(), key=lambda pair: pair[1]["value"])
         words = name.replace("_", " ").replace("[", " [")  # wraps between words
-        told = f"{words} to {100 * share['value']:.0f} %"
+        remark = f"{words} to {100 * share['value']:.0f} %"
         behind = item["behind_the_best"]
         apart = "-" if item is first else f"{behind['value']:.3f} +- {behind['standard_error']:.2g}"
         information = f"{item['expected_information']['value']:.3f}"
-        found.add_row(channel, " x ".join(tail), information, apart, escape(told))
+        found.add_row(channel, " x ".join(tail), information, apart, escape(remark))
     yield found
     tied = sum(item["tied_with_the_best"] for item in answer["candidates"]) - 1
     if tied > 0:

@@ -224,8 +224,8 @@ def _in_tube(pose: Answer) -> Detail:
     shown = {name: in_words(pose[name]) for name in pose if name != "ends"}
     if pose["wait"]["value"]:
         shown["gap"] += " after the wait, where the run begins"
-    said = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
-    return Detail(f"in the tube: ends {pose['ends']}, {', '.join(said)}")
+    details = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
+    return Detail(f"in the tube: ends {pose['ends']}, {', '.join(details)}")
 
 
 def _averages(title: str, answer: Answer) -> Table:
@@ -338,19 +338,19 @@ def flow(answer: Answer) -> Blocks:
 
 def remote(answer: Answer) -> Blocks:
     """Text of `remote`."""
-    told_it = f"duty {answer['duty']['value']:g} for {answer['time_on']['value']:g} s, now off"
-    yield f"{answer['port']}: {answer['name']}, {told_it}"
+    drive_state = f"duty {answer['duty']['value']:g} for {answer['time_on']['value']:g} s, now off"
+    yield f"{answer['port']}: {answer['name']}, {drive_state}"
 
 
 def control(answer: Answer) -> Blocks:
     """The run of `control`, and the scores of all controllers."""
     task = answer["task"]
-    asked = ", ".join(
+    goals = ", ".join(
         f"{name.replace('_', ' ')} {in_words(item)}"
         for name, item in task.items()
         if name != "kind" and item is not None
     )
-    title = f"{answer['robot']}: {task['kind']}, {asked}; controller {answer['controller']}, seed {answer['seed']}"
+    title = f"{answer['robot']}: {task['kind']}, {goals}; controller {answer['controller']}, seed {answer['seed']}"
     quantities = {answer["error"]["meaning"]: answer["error"]}
     quantities |= {name: answer[name] for name in ("final_position_x", "duration", "time_on", "electrical_energy")}
     yield quantity_grid(title, quantities)
@@ -373,25 +373,27 @@ def control(answer: Answer) -> Blocks:
 
 def _drawn(drawn: Answer) -> str:
     """What the controller did not know."""
-    said = [f"drawn: friction times {drawn['friction_factor']:.3g}"]
+    details = [f"sampled: friction times {drawn['friction_factor']:.3g}"]
     if drawn["gap_factor"] != 1.0:
-        said.append(f"gap times {drawn['gap_factor']:.3g}")
+        details.append(f"gap times {drawn['gap_factor']:.3g}")
     pulse = drawn["pulse"]
     if pulse is None:
-        said.append("no pulse of flow")
+        details.append("no pulse of flow")
     else:
         velocity = in_words(pulse["velocity"])
-        said.append(f"flow of {velocity} from {pulse['start']['value']:.3g} s to {pulse['end']['value']:.3g} s")
-    return ", ".join(said)
+        details.append(f"flow of {velocity} from {pulse['start']['value']:.3g} s to {pulse['end']['value']:.3g} s")
+    return ", ".join(details)
 
 
 def _learnt(learnt: Answer, drawn: Answer) -> str:
     """Factors with their intervals beside the truth."""
-    said = []
+    details = []
     for name, item in learnt.items():
-        words = f"times {item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not told"
-        said.append(f"{name.replace('_factor', '')} {words}, in truth {drawn[name]:.3g}")
-    return "; ".join(said)
+        words = (
+            f"times {item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not identified"
+        )
+        details.append(f"{name.replace('_factor', '')} {words}, in truth {drawn[name]:.3g}")
+    return "; ".join(details)
 
 
 def _scores(scores: Answer, unit: str) -> Blocks:

@@ -66,8 +66,8 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
-    table = grid(title, "quantity", "held", "band", "trial", "steady", "unit")
-    table.columns[2].max_width = _BAND_WIDTH
+    table = grid(title, "quantity", "held", "band", "trial", "steady")
+    table.columns[0].no_wrap, table.columns[2].max_width = True, _BAND_WIDTH
     for name in answer if only is None else only:
         for row in rows_of(answer, [name]):
             released = (answer[column].get(name) for column in RELEASED_COLUMNS)
@@ -75,7 +75,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
                 "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
             ]
             band = f"{float(row.low):.3g} to {float(row.high):.3g}" if row.low and row.high else "-"
-            table.add_row(row.name, row.value, band, *cells, row.unit)
+            table.add_row(f"{row.name}, {row.unit}" if row.unit else row.name, row.value, band, *cells)
     return table
 
 
@@ -140,13 +140,13 @@ def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]
     """The pose that the model takes, unless nothing is around the robot; `head` begins the line."""
     if len(placement) == 1:
         return
-    said = [str(placement["kind"])]
+    details = [str(placement["kind"])]
     for name, item in placement.items():
         if isinstance(item, Mapping) and item.get("value") is not None:
-            said.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
+            details.append(f"{name.replace('_', ' ')} {in_words(item)}" + _band_words(item))
         elif name != "kind" and isinstance(item, str):
-            said.append(f"{name.replace('_', ' ')} {item}")
-    yield Detail(f"{head}: {', '.join(said)}")
+            details.append(f"{name.replace('_', ' ')} {item}")
+    yield Detail(f"{head}: {', '.join(details)}")
 
 
 RELEASED = "released at"
@@ -161,12 +161,12 @@ def unsteady(answer: Answer) -> Iterator[str]:
 
 def resting_pose(lying: Answer) -> Iterator[Detail]:
     """Final motion of a free robot; the line before it states its release."""
-    said = []
+    details = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
-            said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
+            details.append(f"{_WORDS.get(name, name.replace('_', ' '))} {in_words(item)}{_range_words(item)}".rstrip())
     words = _STATES[lying["state"]].format(time=in_words(lying["followed_time"]))
-    yield Detail(f"{words}: {', '.join(said)}")
+    yield Detail(f"{words}: {', '.join(details)}")
 
 
 _WORDS = {

@@ -31,8 +31,8 @@ def virtual_trial(answer: Answer) -> Blocks:
     """The video of `render`, and its true motion."""
     lost = f", {answer['dropped']} lost" if answer["dropped"] else ""
     size = f"{answer['width']}x{answer['height']} pixels, {answer['frames_per_second']:g} frames a second"
-    said = f"{answer['frames']} frames{lost}, {size}; setup and truth beside it"
-    yield f"{answer['video']}: synthetic, {said}"
+    details = f"{answer['frames']} frames{lost}, {size}; setup and truth beside it"
+    yield f"{answer['video']}: synthetic, {details}"
     names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate")
     true = {name: answer[name] for name in names}
     motion = f", {answer['motion']}" if answer["motion"] in ("held", "trial") else ""

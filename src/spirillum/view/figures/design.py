@@ -146,7 +146,7 @@ def _today(design: Design) -> list[float] | None:
 
 
 def _landscape(axes: Axes, design: Design) -> None:
-    assert design.landscape is not None  # noqa: S101 - the caller has asked
+    assert design.landscape is not None  # noqa: S101 - checked by the caller
     first, second, grid = design.landscape
     one, two = design.profiles
     x, x_unit = _field(first, one.unit)
@@ -168,7 +168,7 @@ def _landscape(axes: Axes, design: Design) -> None:
 
 
 def _front(axes: Axes, design: Design) -> None:
-    assert design.front is not None  # noqa: S101 - the caller has asked
+    assert design.front is not None  # noqa: S101 - checked by the caller
     first, second = design.objectives
     x, x_label = _objective(second, design.front[second.name])
     y, y_label = _objective(first, design.front[first.name])

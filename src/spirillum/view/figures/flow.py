@@ -310,7 +310,7 @@ def _place(flow: Flow, lengths: UnitPrefix) -> Iterator[str]:
         yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
     mean = UnitPrefix.of(np.array([motion.plug_velocity]), "m/s")
     through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
-    if motion.motion == "free":  # a moment of a run, which tells how its ends and an imposed flow drive the fluid
+    if motion.motion == "free":  # a moment of a run, which states how its ends and an imposed flow drive the fluid
         yield f"mean flow {through}"
     elif motion.batch.placement.flow is not None:
         yield f"imposed mean flow {through}"

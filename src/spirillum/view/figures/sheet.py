@@ -120,7 +120,7 @@ class Sheet:
     def finished(self, shape: float | None = None) -> Figure:
         """Fix the layout: as high as the panels need."""
         beside = self.panels[:, 1:].ravel()
-        for axes in beside if shape is None else ():  # one column tells the height, in a fraction of the time
+        for axes in beside if shape is None else ():  # one column determines the height, in a fraction of the time
             axes.set_in_layout(False)
         lay_out(self.figure)
         for axes in beside:

@@ -156,7 +156,7 @@ def film(
         speed: time of the run over time of the film: 0.5 is slow motion. None: 1, or as slow as it takes to see how
             the tail turns.
         camera: `fixed`, `follow`, or `auto`: it follows a robot that swims further than half of its length.
-        progress: told what is done, how many frames are done, and how many there are.
+        progress: called with stage, number done, and total.
 
     Returns:
         What was written, with a warning where the frames are too few to see the sense of the tail's rotation.
@@ -185,13 +185,13 @@ def film(
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
     shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset), inset=inset)
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
             for number, image in enumerate(images):
-                tell("film", number, times.size)
+                on_progress("film", number, times.size)
                 writer.add(image)
-        tell("film: writing", times.size, times.size)
+        on_progress("film: writing", times.size, times.size)
     return Film(target, robot, model, times.size, pixels, fps, speed, follows, turn, warnings)
 
 

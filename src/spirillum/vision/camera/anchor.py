@@ -1,6 +1,6 @@
 """A camera that is not still: each picture is registered to one of them, and moved to where that lies.
 
-A ruler's lines look alike at every multiple of their distance, so that two pictures far apart in time do not tell by
+A ruler's lines look alike at every multiple of their distance, so that two pictures far apart in time do not show by
 how many of them the camera has moved. From frame to frame they do: even the robot has hardly moved. The coarse shift
 between neighbouring frames is therefore added up, and robust Gauss-Newton image alignment with the anchor takes it from
 there, for shift and roll, to some hundredths of a pixel. What moves against the background is left out as outliers.
@@ -200,7 +200,7 @@ def _texture(flat: Samples) -> Samples:
     blurred = cv2.GaussianBlur(flat, (0, 0), flat.shape[1] / _COARSE)
     size = flat.shape[1] // factor, flat.shape[0] // factor
     small = cv2.resize(blurred[: size[1] * factor, : size[0] * factor], size, interpolation=cv2.INTER_AREA)
-    slope = cv2.Sobel(small, cv2.CV_32F, 1, 0, ksize=1)  # along the rows tube and paper tell nothing
+    slope = cv2.Sobel(small, cv2.CV_32F, 1, 0, ksize=1)  # along the rows tube and paper are uniform
     return np.stack([small, slope]).astype(np.float32)
 
 

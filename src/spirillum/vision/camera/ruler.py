@@ -31,10 +31,10 @@ _ROLLS = tuple(math.radians(sign * angle) for angle in (7.0, 14.0, 21.0, 28.0, 3
 _UPRIGHT = math.radians(6.0)
 """Roll up to which lines are taken as they were found, rad; beyond it they are taken along the channel."""
 _PROFILES, _NEAR, _HELD = 8, 0.06, 0.25
-"""Profiles along each strip that tell whether a reduced picture shows lines at their true distance; the relative range
+"""Profiles along each strip that show whether a reduced picture has lines at their true distance; the relative range
 of a spatial frequency in which its power is looked for; and the least power there over that of finer lines."""
 _MOST_ROWS = 500
-"""About as many rows tell the distance of the lines in large pictures."""
+"""About as many rows determine the distance of the lines in large pictures."""
 _BAND = 16
 """Rows sorted at once, so that they stay in the cache."""
 
@@ -133,7 +133,7 @@ def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
     """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones.
 
     Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
-    1 / factor. The full picture tells at which of these it holds the larger part of its power.
+    1 / factor. The full picture shows at which of these it holds the larger part of its power.
 
     Args:
         lines: in pixels of the full picture.

@@ -1,4 +1,4 @@
-"""Scale of lengths: a checkerboard tells the lens, a ruler the camera; their uncertainties are propagated."""
+"""Scale of lengths: a checkerboard calibrates the lens, a ruler the camera; their uncertainties are propagated."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class CalibratedCamera(NamedTuple):
 def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> CalibratedCamera:
     """The upright camera of a setup that gives a length per pixel."""
     wanted = setup.markers.length_per_pixel
-    assert wanted is not None  # noqa: S101 - the setup has seen to it
+    assert wanted is not None  # noqa: S101 - the setup ensures it
     optics = _with_lens(optics_of(setup, size, 1.0), lens)
     optics = optics.moved({"focal": optics.length_per_pixel / wanted})
     share = setup.markers.length_per_pixel_uncertainty / wanted
@@ -163,7 +163,7 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
     of the setup, by the implicit derivative of the fit.
     """
     spacing, height = setup.markers.spacing, setup.markers.height
-    assert spacing is not None  # noqa: S101 - the setup has seen to it
+    assert spacing is not None  # noqa: S101 - the setup ensures it
     assert height is not None  # noqa: S101
     start = _with_lens(optics_of(setup, size, float(size[0])), lens)
     start = start.moved({"focal": _first_focal(start, lines, spacing, height)})

@@ -63,7 +63,7 @@ SWAY = SwayConstants()
 
 
 @dataclass(frozen=True)
-class ElsewhereConstants:
+class FalseDetectionConstants:
     """Frames on which something else than the robot was followed."""
 
     fewest: int = 12
@@ -76,7 +76,7 @@ class ElsewhereConstants:
     """Jump of the place over the body's length."""
 
 
-ELSEWHERE = ElsewhereConstants()
+FALSE_DETECTION = FalseDetectionConstants()
 
 
 class Swayed(NamedTuple):
@@ -139,23 +139,25 @@ def something_else(time: Samples, place: Samples, marked: np.ndarray, length: fl
     found = np.zeros(time.size, dtype=bool)
     known = np.isfinite(place).all(axis=1)
     sure = np.flatnonzero(marked & known)
-    if sure.size < ELSEWHERE.fewest:
+    if sure.size < FALSE_DETECTION.fewest:
         return found
     speed = np.array([repeated_median_line(time[sure], place[sure, axis]).slope for axis in (0, 1)])
     along = place - speed * (time - time[0])[:, None]  # what does not move as the robot does jumps
     for stretch in stretches_of(~marked & known):
         beside = sure[(sure > stretch[-1]) | (sure < stretch[0])]
         after, before = beside[beside > stretch[-1]], beside[beside < stretch[0]]
-        few = ELSEWHERE.beside
+        few = FALSE_DETECTION.beside
         sides = [(stretch[-few:], after[:few]), (stretch[:few], before[-few:])]
         jumps = [np.median(along[own], axis=0) - np.median(along[other], axis=0) for own, other in sides if other.size]
-        if stretch.size >= ELSEWHERE.shortest and all(np.hypot(*jump) > ELSEWHERE.jump * length for jump in jumps):
+        if stretch.size >= FALSE_DETECTION.shortest and all(
+            np.hypot(*jump) > FALSE_DETECTION.jump * length for jump in jumps
+        ):
             found[stretch] = True
     return found
 
 
 def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
-    """What to say of such frames.
+    """Note on such frames.
 
     Args:
         found: a mask of them, (n,).
@@ -213,14 +215,14 @@ def track_of(
     optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
     seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
     cut = cut_off(record.placed)
-    told = seen & ~cut & (body.seal is None)  # a nose of glass shows what lies under it; against the seal, cues tell
+    told = seen & ~cut & (body.seal is None)  # a nose of glass shows what lies under it; against the seal, cues decide
     elongation = np.where(told, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     other = something_else(time, pose[:, :2], np.isfinite(roll[:, 0]) | np.isfinite(tail[:, 0]), body.robot.body.length)
     pose[other] = errors[other] = elongation[other] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = AlignedTrack(position, pose[:, 2], ())
-    if setup.markers.spacing is None:  # no ruler says how the camera is rolled
+    if setup.markers.spacing is None:  # no ruler shows how the camera is rolled
         along = align_with_path(time, *along[:2])
     position = along.position
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
@@ -297,7 +299,7 @@ def _agreement(time: Samples, record: Record, left_out: np.ndarray, pixel: float
 
 
 def _colour_lag(x: Samples, body: BodyFinder) -> float:
-    """Standard error of the way from the first frame to the last where colours tell the edges, m."""
+    """Standard error of the displacement from end to end where colours locate the edges, m."""
     seen = x[np.isfinite(x)]
     if body.seal is None or not seen.size:
         return 0.0
@@ -320,7 +322,7 @@ def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
 
 
 def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, placed_on: np.ndarray) -> float:
-    """Apparent size of the tail at the stated scale; NaN where the body's marks are often not where its outline says.
+    """Apparent size of the tail at the stated scale; NaN where the body's marks are often off its outline.
 
     Args:
         known: the robot.
@@ -339,7 +341,7 @@ def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, 
 def _readings(
     body: Samples, tail: Samples, x: Samples, known: Identified, optics: Optics
 ) -> tuple[FrameSeries, FrameSeries, FrameSeries]:
-    """The series whose steps tell lost frames, with the least standard errors of a step."""
+    """The series whose steps show lost frames, with the least standard errors of a step."""
     return (
         FrameSeries(tail, 2.0 * np.pi, LOST_FRAMES.tail_error),
         FrameSeries(body, known.stripes.period, LOST_FRAMES.body_error),

@@ -88,7 +88,7 @@ class BodyFinder:
             optics: the camera.
             bounds: part of the picture to look at: left, top, right, bottom.
             contour: the apparent contour of this body before this camera, where it is known already.
-            colours: of the seal's stripes, by which its edges are told; 0: edges are told by brightness alone.
+            colours: of the seal's stripes, by which its edges are found; 0: edges are found by brightness alone.
         """
         self.robot, self.optics, self.bounds, self.colours = robot, optics, bounds, colours
         self.contour = contour_of(robot, optics) if contour is None else contour
@@ -160,7 +160,7 @@ class BodyFinder:
 
     def _learn_seal(self, parts: list[_Part], poses: list[BodyPose]) -> list[PoseFit]:
         """Learn the seal's colours from frames with approximately known poses; the poses by its edges alone."""
-        assert self.seal is not None  # noqa: S101 - asked by those who know
+        assert self.seal is not None  # noqa: S101 - checked by the caller
         for turn in range(SEAL.learning_rounds):
             if turn < 2:
                 coloured = [part.colours for part in parts if part.colours is not None]
@@ -219,7 +219,7 @@ class BodyFinder:
 
     def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
         """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides."""
-        assert self.seal is not None  # noqa: S101 - asked by those who know
+        assert self.seal is not None  # noqa: S101 - checked by the caller
         found = []
         for image, pose in zip(images, poses, strict=True):
             part = self._part(image, pose)
@@ -302,7 +302,7 @@ class BodyFinder:
 
     def _learn_seal_biases(self, parts: list[_Part], found: list[PoseFit]) -> None:
         """Learn the bias of each colour of the seal, and the scatter of its edges."""
-        assert self.seal is not None  # noqa: S101 - asked by those who know
+        assert self.seal is not None  # noqa: S101 - checked by the caller
         seen = [
             self.seal.shifts(part.colours, *self._seal_places(one.pose))
             for part, one in zip(parts, found, strict=True)
@@ -416,7 +416,7 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray,
     normal = design.T @ (used[:, None] * design)
     try:
         return float(np.linalg.solve(normal, design.T @ (used * left))[3])
-    except np.linalg.LinAlgError:  # the edges of the nose lie along its way
+    except np.linalg.LinAlgError:  # the edges of the nose lie along its path
         return np.nan
 
 

@@ -45,7 +45,7 @@ class OutlineConstants:
     largest_error: float = 0.7
     """Largest standard error of a place that is kept, pixels."""
     fewest_at_end: int = 5
-    """Fewest edges at the nose, and at rear and seal, that tell how far apart both lie."""
+    """Fewest edges at the nose, and at rear and seal, for the distance of both."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,12 @@ class SealConstants:
     """Rounds in which the edges that move with the seal are learnt with it."""
     follows_seal: tuple[float, float] = (0.5, 0.9)
     """Scatter of an edge about the motion of the seal alone, along and across the body, beyond which it does not move
-    with the body, pixels: the seal tells the place across less well."""
+    with the body, pixels: the seal determines the lateral position less well."""
     follows: tuple[float, float] = (0.4, 0.4)
     """Scatter about the motion of all edges that move with the body, along and across, beyond which an edge does not,
     pixels."""
     fewest_of_side: int = 5
-    """Fewest edges at each of two sides whose distance tells the seal's size."""
+    """Fewest edges at each of two sides whose distance gives the seal's size."""
     proportions: float = 0.15
     """Relative difference of its length and its width from which on a block of colour is no whole seal."""
     size_tolerance: float = 0.02
@@ -101,13 +101,13 @@ class SealConstants:
     outline_share: float = 0.6
     """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""
     nose_share: float = 0.8
-    """Share of the edges of the nose, which tell the way of the robot, that have to move with the seal, too."""
+    """Share of the edges of the nose, which give the robot's displacement, that have to move with the seal, too."""
     apart: float = 0.3
     """Standard deviation between places by the outline alone and by the seal from which on they disagree, pixels."""
     moves: int = 1
     """Times that its edges are learnt again where the outline lies."""
     far_enough: float = 4.0
-    """Way of the robot from which on what moves is told from what stands still, pixels."""
+    """Displacement of the robot from which on what moves is distinguished from what stands still, pixels."""
     agreement: float = 0.015
     """Relative difference of the sizes by outline and by seal up to which they agree."""
     rough_steps: int = 3
@@ -130,7 +130,7 @@ class InitialDetectionConstants:
     faint: float = 0.4
     """Score over that on the best frames below which a frame is not learnt from: the robot is partly out of view."""
     doubtful: float = 0.6
-    """Score over that on the best frames below which a frame is looked at again where the others say."""
+    """Score over that on the best frames below which a frame is looked at again where the others suggest."""
     clearer: float = 1.2
     """Score there over the first one from which on it is taken."""
     whole_frames: int = 4
@@ -159,11 +159,11 @@ class SizeConstants:
     Assumed; on a hundred rendered and degraded videos (70 pixels from the middle to the nose) the apparent size was
     within 0.2 % in standard deviation."""
     doubt: float = 2.0
-    """Standard errors from which on size and scale are said to differ."""
+    """Standard errors from which on size and scale differ."""
     largest_difference: float = 0.1
     """Relative difference beyond which no length is given."""
     unconfirmed: float = 0.05
-    """Relative difference beyond which no length is given where the tail says nothing of the scale: another edge than
+    """Relative difference beyond which no length is given where the tail leaves the scale open: another edge than
     the body's may be followed."""
     tail_agrees: float = 0.35
     """Difference of the tail's apparent size from the ruler's or the body's up to which it agrees with it, over the
@@ -189,7 +189,7 @@ class IdentityConstants:
     """Relative difference from the stated size beyond which both have to be read: chance makes stripes of many
     things."""
     sure_share: float = 0.75
-    """Share on which the tail has to be read then, and on which it says where the nose is.
+    """Share on which the tail has to be read then, and on which it shows where the nose is.
 
     It was 0.83 and more on rendered videos of a hundred robots, 0.52 on one at half the size."""
 
@@ -323,7 +323,7 @@ class StripeConstants:
     halo: int = 8
     """Samples beside wide glare that it makes paler than a lamp does."""
     hidden: float = 0.25
-    """Share of what is seen of the seal that glare hides on half of the frames, from which on it is told."""
+    """Share of what is seen of the seal that glare hides on half of the frames, from which on it is flagged."""
     turned_under_glare: float = 2.0
     """Stripes by which the body has to turn then, so that its rate is given: of three degraded videos on which it
     turned by less than one and a half, two were off by 24 degrees; standing glare seemed to stop another body."""
@@ -373,13 +373,13 @@ class TailConstants:
     largest_rival: float = 0.85
     """Largest score of another phase over the best one."""
     seen_share: float = 0.5
-    """Share of the frames on which a tail of another shape has to be readable, so that it is said to be seen."""
+    """Share of the frames on which a tail of another shape has to be readable, so that it counts as detected."""
     halves_agree: float = 0.13
     """Largest difference of the wavelength of either half of a tail from that of the whole, over it."""
     stretch_frames: int = 4
     """Fewest frames from which the apparent wavelength is taken."""
     stretch_error: float = 0.006
-    """Largest standard error of the apparent wavelength over that of the file that tells of the scale.
+    """Largest standard error of the apparent wavelength over that of the file that constrains the scale.
 
     On path-traced videos of painted and glass covers it was 0.0005 to 0.003."""
     offset: float = 0.3
@@ -426,7 +426,7 @@ class UnwrappingConstants:
     On rendered videos with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and
     more."""
     leaps: int = 2
-    """Leaps that say that stripes are misread."""
+    """Leaps that show that stripes are misread."""
     stray_rest: float = radians(10.0)
     """Deviation of the step from the reading before to that behind a stray one up to which it is alone, rad."""
     leap_window: int = 9
@@ -444,7 +444,7 @@ class LostFramesConstants:
     """Frames lost while the times go on evenly (`lost_frames`)."""
 
     fewest: int = 20
-    """Fewest steps of a series that tell its usual step."""
+    """Fewest steps of a series for its usual step."""
     windows: tuple[int, ...] = (1, 3, 5, 9)
     """Frames before and after a step whose medians are compared, one after the other."""
     rounds: int = 30
@@ -480,7 +480,7 @@ class LostFramesConstants:
     place_error: float = 0.02
     """Least standard error of a step of the place, pixels."""
     half: float = 0.5
-    """Standard error of a loss that one series alone tells, over the loss."""
+    """Standard error of a loss that one series alone shows, over the loss."""
     repeats: float = 16.0
     """Chi-square by which a step of no motion has to fit better than any other for a repeated frame."""
     repeats_power: float = 25.0
@@ -500,7 +500,7 @@ class MultiplesConstants:
     """Steps that are multiples of one (`multiples`)."""
 
     fewest: int = 30
-    """Fewest steps that tell it."""
+    """Fewest steps for it."""
     most: float = 12.0
     """Largest of them over the smallest."""
     coherent: float = 0.4
@@ -526,21 +526,21 @@ class VisibilityConstants:
     second_clear: float = 1.3
     """Score of a second robot over that of the next best place."""
     maybe_turned: float = 0.85
-    """Score of a robot the other way round over that of the stated direction from which on more frames are asked."""
+    """Score of a robot the other way round over that of the stated direction from which on more frames are tested."""
     turned: float = 1.05
-    """Score of a robot the other way round over that of the stated direction from which on it is said."""
+    """Score of a robot the other way round over that of the stated direction from which on it is flagged."""
     often: float = 0.6
     """Share of the frames on which a second robot has to be seen."""
     asked: int = 3
     """Stride of the frames on which the body turned by 180 degrees is tried first."""
     lost: float = 0.03
-    """Share of frames without the robot that is said."""
+    """Share of frames without the robot that is flagged."""
     full_view: float = 0.97
     """Share of the edges in the picture below which the robot is partly out of view."""
     enough: float = 0.2
     """Share of frames in full view from which on the others are left out."""
     hidden: float = 0.55
-    """Share of the edges that fit below which glare, shadows or bubbles are said."""
+    """Share of the edges that fit below which glare, shadows or bubbles are flagged."""
 
 
 OUTLINE = OutlineConstants()

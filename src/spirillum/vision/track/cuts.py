@@ -32,7 +32,7 @@ class CutConstants:
     window: int = 8
     """Frames before and after a moment through which straight lines are fitted."""
     clear: float = 8.0
-    """Jump over the standard deviation of jumps elsewhere."""
+    """Jump over the standard deviation of the other jumps."""
     place: float = 1.0
     """Least jump of the place, pixels."""
     angle: float = 0.12
@@ -42,7 +42,7 @@ class CutConstants:
     gap: float = 3.0
     """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
     long_window: int = 30
-    """Readings before and after a gap through which the lines go that tell whether time has passed."""
+    """Readings before and after a gap through which lines are fitted that show whether time has passed."""
     clock_place: float = 0.3
     """Distance of these lines below which they meet, pixels."""
     clock_angle: float = 0.05
@@ -86,7 +86,7 @@ class Hops(NamedTuple):
     """Jumps of what was read on pictures that go on evenly."""
 
     distance: float
-    """Standard error of the displacement from the first frame to the last, m."""
+    """Standard error of the displacement from end to end, m."""
     angle: float
     """Standard error of the body's angle from end to end, rad."""
     phase: float
@@ -127,7 +127,7 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
 
 
 class Clock(NamedTuple):
-    """What the motion says of the largest gap between the times of the frames."""
+    """Evidence of the motion about the largest gap between the times of the frames."""
 
     relative_error: float
     """Relative standard uncertainty that it leaves in the length of the video."""
@@ -308,7 +308,7 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> _Jump |
 def _returns(jump: _Jump, time: Samples, values: Samples) -> bool:
     """Whether a series goes on after a jump as before: only frames beside it were misread, such as under a highlight.
 
-    By a line with a step through what lies farther away than the lines that tell the jump.
+    By a line with a step through what lies farther away than the lines that show the jump.
     """
     known = np.flatnonzero(np.isfinite(values))
     split = int(np.searchsorted(time[known], jump.moment))

@@ -45,7 +45,7 @@ class Identified(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether the tail is where it should be, and as the file says: at a wrong scale chance shows a body alone."""
+        """Whether the tail is where it should be, and as in the file: at a wrong scale chance shows a body alone."""
         wire = self.wire
         return wire.readable > IDENTITY.sure_share and not any(flag.spoils for flag in wire.flags)
 
@@ -180,7 +180,7 @@ def _standing(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], 
 
 
 def _nothing_moves(frames: list[Frame], still: Samples) -> bool:
-    """Whether noise alone tells the frames from their background."""
+    """Whether the frames differ from their background by noise alone."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     for frame in frames:
         image = frame.reduced(frame.image.shape[1] // still.shape[1])
@@ -212,7 +212,7 @@ def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
 
 
 def _surroundings(body: BodyFinder, pose: BodyPose) -> tuple[int, int, int, int]:
-    """Part of the picture about a robot, and about the way of one that hardly moves: left, top, right, bottom."""
+    """Part of the picture about a robot, and about the path of one that hardly moves: left, top, right, bottom."""
     robot = body.robot
     beside = STANDING.beside * robot.body.diameter
     ahead = (0.5 + STANDING.ahead) * robot.body.length
@@ -239,7 +239,7 @@ def _with_nose(
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
     """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
 
-    A body alone tells little of its ends where it is blurred, or looked for at a wrong scale.
+    A body alone constrains its ends little where it is blurred, or looked for at a wrong scale.
     """
     side = opposite(stated.optics.direction)
     turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})

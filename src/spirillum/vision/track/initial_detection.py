@@ -42,7 +42,7 @@ class SealSearch:
 
     def __init__(self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int]) -> None:
         """Lay out the grid in which the seal is looked for."""
-        assert robot.seal is not None  # noqa: S101 - asked by those who know
+        assert robot.seal is not None  # noqa: S101 - checked by the caller
         self._step = robot.body.diameter / SEAL.search_width
         nearer = 1.0 + 0.5 * robot.body.diameter / (optics.height - optics.axis_height)  # its top is what is seen
         self._long = max(3, round(nearer * robot.seal.length / self._step))
@@ -104,7 +104,7 @@ _ALLOWED = "allowed: one that is in view, with the right robot.file, heights and
 
 @dataclass(frozen=True)
 class Start:
-    """What the first look has told."""
+    """Result of the initial detection."""
 
     body: BodyFinder = field(repr=False)
     """The body, which has learnt, in front of a camera that shows it as large as it looks."""
@@ -122,7 +122,7 @@ class Start:
     clearness: float
     """How clearly it stands out: `spirillum.vision.track.size.clearness`."""
     rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
-    """Frames on which something else stands out as clearly, and where."""
+    """Frames with a false detection that is as clear, and where."""
     flags: tuple[Flag, ...]
     search: SealSearch | None = field(default=None, repr=False)
     """What looks for the seal in whole pictures, where the robot was found by it."""
@@ -281,7 +281,7 @@ def _rivals_of_seal(frames: Sequence[Frame], found: Sequence[list[PoseCandidate]
 
 
 def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _Learnt] | None:
-    """The body by its whole outline, which tells more; None unless it moves along with the seal, and has its size.
+    """The body by its whole outline, which is more accurate; None unless it moves with the seal, and has its size.
 
     What stands still seems to move along where the robot hardly moves.
     """
@@ -342,7 +342,7 @@ def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequ
 def _on_one_way(
     found: list[PoseCandidate], usual: float, body: BodyFinder, frames: Sequence[Frame], still: Samples
 ) -> list[PoseCandidate]:
-    """Look again, where the clear frames say, on those that are less clear: they may show clutter for the body."""
+    """Search again, at the poses of clear frames, on those that are less clear: they may show clutter for the body."""
     sure = {k: (frames[k].time, one.pose) for k, one in enumerate(found) if one.score > DETECTION.doubtful * usual}
     doubtful = [k for k in range(len(found)) if k not in sure]
     if len(sure) < DETECTION.whole_frames or not doubtful:

@@ -1,4 +1,4 @@
-"""What a first look at some frames of a video tells: the camera and its scale, and the robot's appearance."""
+"""Initial detection on some frames of a video: the camera and its scale, and the robot's appearance."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from spirillum.vision.video.pictures import reduction
 
 @dataclass(frozen=True)
 class GlareConstants:
-    """Glare that stands still on the robot's way."""
+    """Glare that stands still on the robot's path."""
 
     share: float = 0.9
     """Share of the frames on which a spot has to be white."""
     covered: float = 0.95
     """Share of the body's diameter that surely hides what is behind it."""
     least: float = 0.005
-    """Least size of its part on the way, over what body and coupling cover."""
+    """Least size of its part on the path, over what body and coupling cover."""
     most: float = 1.0
     """Largest size of it all, over that: what is larger is an overexposed background."""
     rim: float = 0.4
     """Width of its rim, over the radius of a disk as large as the spot."""
     across: float = 0.5
-    """Least sine of the angle between an edge and the way of the robot, of edges that tell how far it has moved."""
+    """Least sine of the angle between an edge and the path of the robot, of edges that show how far it has moved."""
     passes: float = 2.0
     """Least change of the distance of such an edge from a spot, within its rim, pixels."""
     fewest: int = 3
     """Fewest edge points of which this is true."""
     drift: float = 0.08
-    """Standard error of the way from the first frame to the last, pixels."""
+    """Standard error of the displacement from end to end, pixels."""
     beside: tuple[float, float] = (0.6, 0.85)
     """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
     lines: int = 5
-    """Lines along the way between these distances."""
+    """Lines along the path between these distances."""
     veil_width: float = 0.3
     """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
     veil_step: float = 30.0
@@ -60,11 +60,11 @@ class GlareConstants:
     sharp: float = 0.4
     """Least share of the step within four pixels on either side of it."""
     slant: int = 8
-    """Largest distance along the way of the step on one side of the body from that on the other, pixels."""
+    """Largest distance along the path of the step on one side of the body from that on the other, pixels."""
     in_view: float = 0.5
-    """Least share of the way that has to be in the picture."""
+    """Least share of the path that has to be in the picture."""
     veil_drift: float = 0.5
-    """Standard error of the way from the first frame to the last under a mirrored lamp, pixels. Assumed."""
+    """Standard error of the displacement from end to end under a mirrored lamp, pixels. Assumed."""
 
 
 GLARE = GlareConstants()
@@ -74,12 +74,12 @@ class Glare(NamedTuple):
     """What glare that stands still leaves in a track."""
 
     drift: float
-    """Standard error of the way from the first frame to the last, pixels."""
+    """Standard error of the displacement from end to end, pixels."""
     flags: tuple[Flag, ...]
 
 
 def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare:
-    """Look for glare that stands still where edges pass that tell how far the robot has moved.
+    """Look for glare that stands still where edges pass that show how far the robot has moved.
 
     Args:
         images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
@@ -114,7 +114,7 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
 
 
 def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare | None:
-    """Look beside the body for a lamp mirrored in the surface: a sharp step of the brightness across the robot's way.
+    """Look beside the body for a lamp mirrored in the surface: a sharp step of the brightness across the robot's path.
 
     It need not be white, and adds to the brightness of body and background alike. Lines of a ruler or a grid are
     narrower than the medians that are compared; walls run along the way.
@@ -147,7 +147,7 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
 def _brightness(
     images: Sequence[np.ndarray], pose: BodyPose, body: BodyFinder, along: Samples, across: Samples
 ) -> Samples | None:
-    """Median brightness at places along the way of a robot, of 255, (n,); None where much of it is out of view.
+    """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view.
 
     Args:
         images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
@@ -208,7 +208,7 @@ def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
 
 
 def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
-    """Spots that stay white where they are, on the way of the body, (h, w).
+    """Spots that stay white where they are, on the path of the body, (h, w).
 
     What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
     shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
@@ -242,7 +242,7 @@ def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
 
 
 def _pass(body: BodyFinder, poses: Sequence[BodyPose], spots: np.ndarray, low: np.ndarray) -> bool:
-    """Whether edges that tell how far the robot has moved come nearer to spots, or farther away, within their rims."""
+    """Whether edges that show how far the robot has moved come nearer to spots, or farther away, within their rims."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     reach = OUTLINE.half_profile + GLARE.rim * np.sqrt(np.count_nonzero(spots) / np.pi)
     far = np.pad(cv2.distanceTransform((~spots).astype(np.uint8), cv2.DIST_L2, 5), 1, constant_values=reach)

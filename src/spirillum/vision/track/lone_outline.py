@@ -1,4 +1,4 @@
-"""Whether an outline that alone tells where the body is can be trusted: its cover, what lies under it, what moves.
+"""Whether a pose from the outline alone can be trusted: its cover, what lies under it, what moves.
 
 Across the cover, an opaque one is of one brightness from rim to rim. Glass has a bright rim beside its contents, or
 contents whose brightness changes along the axis. Over a grid or through glass, an outline may follow what is not the
@@ -44,11 +44,11 @@ class AppearanceConstants:
     fewest: int = 3
     """Fewest pictures with all of the cover in view."""
     least: float = 20.0
-    """Least difference of brightness that tells anything, of 255."""
+    """Least significant difference of brightness, of 255."""
     white: float = 228.0
     """Brightness of glare, of 255."""
     glare: float = 0.005
-    """Share of the cover under glare from which on nothing is said."""
+    """Share of the cover under glare from which on nothing is concluded."""
     uneven: float = 0.5
     """Change of the brightness along the axis over that from the middle to the background from which on contents show.
 
@@ -116,7 +116,7 @@ def _brightness(image: np.ndarray, pose: BodyPose, optics: Optics, along: Sample
 
 @dataclass(frozen=True)
 class LoneOutlineConstants:
-    """An outline that alone tells where the body is."""
+    """A pose from the outline alone."""
 
     ahead: tuple[float, float] = (0.25, 2.0)
     """Stretch before the nose whose texture is that under the body, from the nose on, over the body's radius."""
@@ -133,15 +133,15 @@ class LoneOutlineConstants:
 
     On path-traced and drawn videos it was 0.5 on plain floors, and 8 to 16 on grid and millimetre paper."""
     apart: float = 3.0
-    """Least way between two frames that are compared, pixels."""
+    """Least displacement between two frames that are compared, pixels."""
     fewest: int = 3
-    """Fewest pairs of frames that tell whether the edges at an end of the body move."""
+    """Fewest pairs of frames for a test whether the edges at an end of the body move."""
     steep: float = 0.6
-    """Least sine of the angle between such an edge and the way of the robot."""
+    """Least sine of the angle between such an edge and the path of the robot."""
     stands: float = 0.5
     """Share of the contrast across the edges at an end that stays where it was from which on it stands still."""
     drift: float = 0.3
-    """Standard error of the way from the first frame to the last by an outline over a grid or of glass, pixels.
+    """Standard error of the displacement from end to end by an outline over a grid or of glass, pixels.
 
     On ten drawn and path-traced videos without a seal the way was off by up to 0.2 pixels."""
 
@@ -153,9 +153,9 @@ class OutlineCheck(NamedTuple):
     """What the cover of the body and the background leave open of its outline."""
 
     drift: float = 0.0
-    """Standard error of the way from the first frame to the last where the outline alone tells it, pixels."""
+    """Standard error of the displacement from end to end by the outline alone, pixels."""
     flags: tuple[Flag, ...] = ()
-    """A flag that names the cue and a frame, where the outline alone tells the pose."""
+    """A flag that names the cue and a frame, where the outline alone gives the pose."""
     suspect: str = ""
     """What the outline may follow in place of the body; empty for an opaque body over a plain background."""
 

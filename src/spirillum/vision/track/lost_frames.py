@@ -49,7 +49,7 @@ class Restored(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """A motion that does not go on one way throughout."""
+    """A motion that is not in one direction throughout."""
 
     name: str
     """Name of its flag."""
@@ -84,7 +84,7 @@ def restored_times(time: Samples, readings: tuple[FrameSeries, ...], picture: Pi
     Args:
         time: time of each frame as the video states it, s, (n,).
         readings: the series: tail, body and position.
-        picture: what the pictures say of each step; None: nothing.
+        picture: evidence of the pictures about each step; None: none.
     """
     none = Restored(time, 0.0, ())
     if time.size <= LOST_FRAMES.fewest or np.any(np.diff(time) <= 0):
@@ -150,7 +150,7 @@ def _put_back(
     ):
         return Restored(time, 0.0, (_uneven(int(np.count_nonzero(lost)) + stray),))
     corrected = _later(time, lost, frame)
-    # A loss that one series alone tells is half believed.
+    # A loss that one series alone shows counts half.
     alone = sum(_sees(one, lost) for one in after) < 2
     doubt = (LOST_FRAMES.half * float(np.sqrt(np.sum(lost**2))) if alone else 0.0) + stray
     length = float(corrected[-1] - corrected[0])
@@ -180,7 +180,7 @@ def _power(series: list[_Jumps]) -> float:
 
 
 def _change_of_motion(time: Samples, readings: tuple[FrameSeries, ...]) -> _Change | None:
-    """What changes in a video in which nothing moves for a while, or everything the other way; None of any other."""
+    """What changes in a video in which nothing moves for a while, or everything reversed; None of any other."""
     few = LOST_FRAMES.standing // 3
     means = []
     for reading in readings:
@@ -234,7 +234,7 @@ def _losses(series: list[_Jumps], wide: int, picture: PictureSteps | None) -> tu
 
 
 def _all_jumps(time: Samples, readings: tuple[FrameSeries, ...], frame: float, wide: int) -> list[_Jumps]:
-    """Jumps of the series that move enough to tell lost frames.
+    """Jumps of the series that move enough to show lost frames.
 
     Args:
         time: times, s, (n,).
@@ -304,13 +304,13 @@ def _local_slope(time: Samples, values: Samples) -> Samples:
 
 
 def _misfit(steps: _Jumps, counts: np.ndarray) -> Samples:
-    """Chi-square of each number of lost frames at each step, (m, counts); 0 where the series says nothing."""
+    """Chi-square of each number of lost frames at each step, (m, counts); 0 where the series has no information."""
     off = _wrapped(steps.jump[:, None] - counts[None, :] * steps.usual[:, None], steps.period)
     return np.nan_to_num((off / steps.error) ** 2, nan=0.0)
 
 
 def _sees(steps: _Jumps, lost: np.ndarray) -> bool:
-    """Whether the series can tell the losses from none, taken together."""
+    """Whether the series can distinguish the losses from none, taken together."""
     at = (lost > 0) & np.isfinite(steps.jump)
     return bool(np.sqrt(np.sum((lost[at] * steps.usual[at]) ** 2)) > LOST_FRAMES.told * steps.error)
 

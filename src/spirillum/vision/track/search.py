@@ -44,7 +44,7 @@ class SearchConstants:
     margin: int = 24
     """Width of the surroundings of a candidate that are looked at in refinement, pixels."""
     travel_penalty: float = 0.5
-    """Relative score that a way of one body length between two frames costs."""
+    """Relative score that a displacement of one body length between two frames costs."""
 
 
 SEARCH = SearchConstants()

@@ -51,7 +51,7 @@ class Walls(NamedTuple):
 
 
 class SetupFreeDetection(NamedTuple):
-    """What a video tells without a setup."""
+    """Setup-free detection in a video."""
 
     lines: Lines | None
     """Lines of the ruler; None where none was found."""
@@ -71,7 +71,7 @@ class SetupFreeDetection(NamedTuple):
     @property
     def optics(self) -> Optics:
         """The provisional camera, at the scale at which the robot was found."""
-        assert self.known is not None  # noqa: S101 - asked by those who know
+        assert self.known is not None  # noqa: S101 - checked by the caller
         return self.known.start.body.optics
 
     @property
@@ -96,21 +96,21 @@ def detect_without_setup(
     video: Video, robot: Robot, spacing: float | None = None, progress: Callable[[str, int, int], None] | None = None
 ) -> SetupFreeDetection:
     """Look at a video without a setup."""
-    tell = progress or (lambda _what, _done, _total: None)
+    on_progress = progress or (lambda _what, _done, _total: None)
     anywhere = _setup(robot, video.size, 1e-4, "right")
-    tell("reading frames", 0, 1)
+    on_progress("reading frames", 0, 1)
     frames = samples_of(video, anywhere.start, anywhere.end)
     stills = _Stills(frames)
     _check_no_noise(stills.at(1), video)
-    tell("looking for the ruler", 0, 1)
+    on_progress("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
     guesses = _guesses(robot, video.size, lines, spacing)[: None if stills.changes else 1]
     looks = (2 if stills.changes else 1) * len(guesses) * len(directions)
-    tell("looking for the robot", 0, looks)
+    on_progress("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
         found = _found_at(video, robot, (guess, lines, directions), stills)
         for done, (direction, known) in enumerate(found, 1 + 2 * len(directions) * place):
-            tell("looking for the robot", done, looks)
+            on_progress("looking for the robot", done, looks)
             if known is None:
                 continue
             stripes = _stripes_seen(robot, known)
@@ -165,7 +165,7 @@ def _ruler(
     still = stills.at(most)
     found = {side: ruler_of(still, bounds, -DIRECTIONS[side], most) for side in ("right", "down")}
     count = {side: 0 if lines is None else len(lines.number) for side, (lines, _) in found.items()}
-    # A full picture takes long at all rolls: first the way along which a reduced one shows more lines.
+    # A full picture takes long at all rolls: first the direction along which a reduced one shows more lines.
     for side in sorted(found, key=lambda one: -count[one]):
         lines, factor = found[side]
         if most > 1:
@@ -288,7 +288,7 @@ def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
 
 
 def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | None:
-    """The outermost clear pair of edges along the robot's way, inside the ruler; None without one.
+    """The outermost clear pair of edges along the robot's path, inside the ruler; None without one.
 
     Brightness is taken at lines along the way, as the median along each, so that robot, ruler and dust drop out.
     """

@@ -233,12 +233,12 @@ def _told(size: float) -> str:
 
 @dataclass(frozen=True)
 class DirectionConstants:
-    """Direction of the channel where no ruler tells it."""
+    """Direction of the channel without a ruler."""
 
     frames: int = 10
     """Fewest frames with a place."""
     way: float = 20.0
-    """Least way of a robot over the scatter of its places, to tell the direction."""
+    """Least displacement of a robot over the scatter of its positions for a direction."""
     least: float = 0.026
     """Least angle to the rows of the picture, rad: below it lengths are wrong by less than the lens's 0.03 %."""
 
@@ -257,9 +257,9 @@ class AlignedTrack(NamedTuple):
 
 
 def align_with_path(time: Samples, position: Samples, heading: Samples) -> AlignedTrack:
-    """Turn a track so that x runs along the robot's way.
+    """Turn a track so that x runs along the robot's path.
 
-    A ruler says how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
+    A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
     robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
 
     Args:
@@ -276,7 +276,7 @@ def align_with_path(time: Samples, position: Samples, heading: Samples) -> Align
     scatter = float(mad_scale(np.array([values - line.at(at) for line, values in zip(lines, places, strict=True)])))
     moves = float(np.hypot(*way)) > DIRECTION.way * scatter
     roll = float(np.arctan2(way[1], way[0])) if moves else float(np.nanmedian(heading))
-    roll -= np.pi * round(roll / np.pi)  # forwards and backwards are one way
+    roll -= np.pi * round(roll / np.pi)  # forwards and backwards are one direction
     if abs(roll) < DIRECTION.least:
         return AlignedTrack(position, heading, ())
     c, s = np.cos(roll), np.sin(roll)

@@ -85,7 +85,7 @@ def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> Still
 
 
 def shift_of(first: StillPicture, other: StillPicture) -> tuple[float, bool]:
-    """Shift of a view along the channel against another one, pixels, and whether it says that the camera moved."""
+    """Shift of a view along the channel against another one, pixels, and whether it shows that the camera moved."""
     rough = shift_between(first.flat, other.flat)
     if first.lines is None:
         return rough, abs(rough) > STEADINESS.moved_roughly
@@ -216,7 +216,7 @@ class PictureChangeConstants:
     blur: float = 1.0
     """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
     fewest: int = 20
-    """Fewest frames that tell the usual change."""
+    """Fewest frames for the usual change."""
     around: int = 15
     """Steps of the running median."""
     least: float = 1.1
@@ -256,7 +256,7 @@ class PictureChange:
 
 
 class PictureSteps(NamedTuple):
-    """What the pictures say of each step from a frame to the next."""
+    """Evidence of the pictures about each step from a frame to the next."""
 
     jumps: np.ndarray
     """Mask of the steps on which the picture changes as if a frame or more were missing, (n - 1,)."""
@@ -269,7 +269,7 @@ class PictureSteps(NamedTuple):
 
 
 def picture_steps(change: Samples) -> PictureSteps | None:
-    """What the changes of the picture say of missing and repeated frames.
+    """Evidence of the changes of the picture about missing and repeated frames.
 
     Args:
         change: of each picture against the last one and the one before, (n, 2).

@@ -1,4 +1,4 @@
-"""One frame after the other: where the body is, and what stripes and tail say; nothing looks ahead."""
+"""One frame after the other: pose of the body, angles of stripes and tail; causal."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class FollowingConstants:
     largest_jump: float = 4.0
     """Largest accepted distance from the predicted position, pixels."""
     gap: float = 3.0
-    """Time between two frames over the usual one from which on the robot may have left its predicted way."""
+    """Time between two frames over the usual one from which on the robot may have left its predicted path."""
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
     usual_edges: int = 200
     """Frames with the body in view whose median is the usual share of the edges that fit."""
     few_edges: float = 0.75
-    """Share of the edges that fit, over the usual one, below which the robot may be elsewhere: a shadow takes some."""
+    """Share of the edges that fit, over the usual one, below which the detection may be false: a shadow takes some."""
     more_edges: float = 1.2
     """Share of the edges that fit at another place, over that where it was followed, from which on it is there."""
 
@@ -93,7 +93,7 @@ class FrameTracker:
         Args:
             known: the robot, with readers that have learnt its appearance.
             still: static background of the pictures, (h, w, 3), or reduced by a whole factor.
-            ahead: whether the first look has seen the frames that come, so that its path says where the robot is.
+            ahead: whether the initial detection covers the frames that come, so that its path gives the robot's pose.
         """
         self.known, self.still, self.record = known, still, Record()
         self._ahead = ahead
@@ -159,7 +159,7 @@ class FrameTracker:
         return found._replace(error=BodyPose(np.nan, np.nan, np.nan))
 
     def _is_after_a_gap(self, time: float, guess: BodyPose) -> bool:
-        """Whether no frame was taken for so long that the robot may not have kept to its predicted way."""
+        """Whether no frame was taken for so long that the robot may have left its predicted path."""
         times, last = self.record.time[-FOLLOWING.memory :], self.record.placed[-1].pose
         far = FOLLOWING.sure_step * self.known.start.body.optics.length_per_pixel
         if hypot(guess.x - last.x, guess.y - last.y) <= far:

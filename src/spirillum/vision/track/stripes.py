@@ -184,7 +184,7 @@ class Stripes:
         return f"line of {360.0 * counts.min() / counts.sum():.0f} degrees, {line} on {seal}"
 
     def _as_wide(self, profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
-        """Whether stripes are seen as wide as stated; of patterns with several widths the fit alone says so."""
+        """Whether stripes are seen as wide as stated; of patterns with several widths the fit alone decides."""
         runs = {2.0 * np.pi / len(self.stripes) * run for run in runs_of(self.stripes)}
         if len(runs) != 1:
             return True
@@ -202,7 +202,7 @@ class Stripes:
         return float(np.median(told)) if told.size else 1.0
 
     def _told(self, fits: Samples) -> np.ndarray:
-        """Mask of the frames that tell the angle: where one colour alone is in view, many angles fit alike."""
+        """Mask of the frames that determine the angle: where one colour alone is in view, many angles fit alike."""
         if self.readable == 1.0:
             return np.ones(len(fits), dtype=bool)
         return np.asarray(fits[:, 3] >= STRIPES.ambiguous * fits[:, 2])

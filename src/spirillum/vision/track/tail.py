@@ -53,7 +53,7 @@ class _SeenShape(NamedTuple):
 
 
 def _other_than_a_helix() -> Flag:
-    """Say that the phase of such a tail is not read."""
+    """Note that the phase of such a tail is not read."""
     sentence = (
         "the rotation of a tail other than one helix of one size is not read from pictures, and not given; "
         "position and rotation of the body are"
@@ -225,7 +225,7 @@ class TailWave:
         return 1 if misfit > -1.0 else -1
 
     def unseen(self) -> Flag:
-        """Say that the tail is not seen well enough."""
+        """Note that the tail is not detected well enough."""
         sentence = (
             "the tail is not seen well enough, so that its rotation is not given: compress the film less, film the "
             "tail larger, or before a floor and in a light from which its wire stands out"
@@ -394,7 +394,7 @@ class TailWave:
 
         A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both halves.
         """
-        assert self.contrast is not None  # noqa: S101 - asked of a wave that was read
+        assert self.contrast is not None  # noqa: S101 - only of a wave that was read
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in strips]
         middle = self.xi.size // 2
         found = []

@@ -17,7 +17,7 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.contour import EDGE_CUES
 
 _ALONG = 0, 0, 1
-"""Coordinate of the pose that each cue of edges tells: x, or y for the coupling, of which the sides are seen."""
+"""Coordinate of the pose that each cue of edges determines: x, or y for the coupling, of which the sides are seen."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class CueConstants:
     fewest: int = 5
     """Fewest edges of a cue on a frame."""
     frames: int = 8
-    """Fewest frames with outline and seal from which is told whether they move alike."""
+    """Fewest frames with outline and seal for a comparison of their motions."""
     apart: float = 0.4
-    """Standard error of the way from the first frame to the last by cues that disagree that is flagged, pixels."""
+    """Standard error of the displacement from end to end by cues that disagree that is flagged, pixels."""
     colour_drift: float = 0.1
-    """Standard error of the way from the first frame to the last where colours tell the edges, pixels; at most a half
+    """Standard error of the displacement from end to end where colours locate the edges, pixels; at most a half
     of this way.
 
     Compression lets colours lag by this much: of nine path traced videos, at most 0.22 pixels were seen."""
@@ -55,7 +55,7 @@ class Agreement(NamedTuple):
     cues: dict[str, Cue]
     """Cues by name."""
     drift: float
-    """Standard error of the way from the first frame to the last by cues that disagree, m."""
+    """Standard error of the displacement from end to end by cues that disagree, m."""
     flags: tuple[Flag, ...]
     """A flag where outline and seal do not move alike, and both count."""
 
@@ -175,7 +175,7 @@ class Track:
     flags: tuple[Flag, ...] = ()
     """What to know about it."""
     words: str = ""
-    """What the video's file says of itself, such as that it is synthetic."""
+    """Metadata of the video's file, such as that it is synthetic."""
     drift: float = 0.0
     """Standard uncertainty of the velocity by a camera that drifted along the channel, and by glare, m/s."""
     body_angle_drift: float = 0.0
@@ -189,4 +189,4 @@ class Track:
     cues: Mapping[str, Cue] = field(repr=False, default_factory=dict)
     """Outline, seal, coupling and tail: how often each was used, and whether they agree; empty where unknown."""
     cue_drift: float = 0.0
-    """Standard error of the way from the first frame to the last by cues that disagree, and by colours that lag, m."""
+    """Standard error of the displacement from end to end by cues that disagree, and by colours that lag, m."""

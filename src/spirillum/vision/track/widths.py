@@ -43,7 +43,7 @@ class WidthConstants:
     seen: int = 10
     """Fewest frames of an edge."""
     linked: int = 4
-    """Fewest frames on which two edges are seen together from which on they say how these lie to each other."""
+    """Fewest frames on which two edges are seen together from which on they determine the distance of these."""
     uneven: float = radians(2.0)
     """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring-reference.md`."""
     clear: float = 10.0

@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 def ahead(items: Iterator[T], count: int) -> Iterator[T]:
-    """Items of an iterable, taken by a thread of its own before they are asked for."""
+    """Items of an iterable, taken by a thread of its own before they are requested."""
     queue: Queue[T | BaseException | None] = Queue(count)
     left = Event()
 
@@ -58,7 +58,7 @@ def ahead(items: Iterator[T], count: int) -> Iterator[T]:
                 if left.is_set():
                     return
             put(None)
-        except BaseException as error:  # handed over to the thread that asked
+        except BaseException as error:  # raised again in the thread that iterates
             put(error)
 
     thread = Thread(target=read, name="decoding", daemon=True)
@@ -133,7 +133,7 @@ class Video:
     stated: Stated = UNSTATED
     """How long the file states a video to be."""
     words: str = ""
-    """What the file says of itself: title and comment of a video, texts in a folder's first image and its README."""
+    """Metadata of the file: title and comment of a video, texts in a folder's first image and its README."""
     flags: list[Flag] = field(default_factory=list)
     """What was found while reading."""
 
@@ -191,7 +191,7 @@ class Video:
             raise InputError(f"{self.path} has no frame {_between(start, end)}; allowed: {VIDEO}")
 
     def _pictures(self, start: float) -> Iterator[tuple[int, float, Any]]:
-        assert self.images is not None  # noqa: S101 - asked where it is so
+        assert self.images is not None  # noqa: S101 - checked by the caller
         stamps = self._stamps()
         first = int(np.searchsorted(stamps, start - 1e-9))
         read = self.images.read_from(first, self.frames_within(_AHEAD_BYTES, 1, _BATCH))
@@ -199,7 +199,7 @@ class Video:
             yield index, float(stamps[index]), partial(self._noted, index, picture)
 
     def _stamps(self) -> np.ndarray:
-        assert self.images is not None and self.rate is not None  # noqa: S101, PT018 - open_video has seen to it
+        assert self.images is not None and self.rate is not None  # noqa: S101, PT018 - open_video ensures it
         return np.array(self.images.numbers, dtype=float) / self.rate
 
     def _noted(self, index: int, picture: np.ndarray | None) -> np.ndarray | None:

@@ -151,7 +151,7 @@ def _flags(*, grey: bool) -> int:
 
 
 def _stored(image: np.ndarray | None, header: Header) -> np.ndarray | None:
-    """A decoded image as it is stored: OpenCV turns those of TIFF files as they say, whatever its flags."""
+    """A decoded image as it is stored: OpenCV turns those of TIFF files by their tag, whatever its flags."""
     if image is None or image.dtype not in (np.uint8, np.uint16):
         return None
     return header.display.turned_back(image) if header.is_tiff else image
@@ -199,7 +199,7 @@ def _sizes(image: Any) -> Iterator[tuple[int, int]]:
         except EOFError:
             image.seek(0)
             return
-        yield image.tag_v2[256], image.tag_v2[257]  # Pillow's `size` is turned as the file says
+        yield image.tag_v2[256], image.tag_v2[257]  # Pillow's `size` is turned by the file's tag
 
 
 def _densities(image: Any) -> tuple[float, float, bool]:

@@ -35,9 +35,9 @@ _OPENING = {
 _FEW = 2
 """Frames of a stream that is a picture, not a video."""
 _NEAR = 0.02
-"""Least part of a video that is said to be missing."""
+"""Least part of a video that is flagged as missing."""
 _LOOSE = 0.5
-"""Least part of a video that is said to be missing where its length is that of the whole file, with sound, s."""
+"""Least part of a video that is flagged as missing where its length is that of the whole file, with sound, s."""
 
 
 class Stated(NamedTuple):
@@ -144,7 +144,7 @@ def _seconds(tag: str) -> float | None:
 
 
 def short_reason(error: BaseException) -> str:
-    """What a library says of an error, shortened."""
+    """A library's message of an error, shortened."""
     return str(getattr(error, "strerror", None) or error)[:120]
 
 
@@ -250,7 +250,7 @@ def image_folder(path: Path, aspect: float | None) -> ImageSequence:
     files.sort(key=lambda entry: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", entry.name)])
     first = [(name, picture) for name in files[:_SAMPLED_IMAGES] if (picture := _readable(name)) is not None]
     if not first:
-        read_image(files[0])  # says where it is no picture for its size, or of a kind that is not read
+        read_image(files[0])  # raises where it is no picture for its size, or of a kind that is not read
         raise InputError(f"{path}: {files[0].name} cannot be read as an image; allowed: {VIDEO}")
     stored = Counter(picture.shape[1::-1] for _, picture in first).most_common(1)[0][0]
     stated = ((name, stated_size(name)) for name in files)
