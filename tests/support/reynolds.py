@@ -43,7 +43,7 @@ class ShortCylinder:
     def __post_init__(self) -> None:
         nx, ny = self.cells
         x = 0.5 * self.length * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, nx + 1))
-        least = self.tube - self.radius - np.hypot(self.offset - np.abs(x * self.pitch), x * self.yaw).max()
+        least = self.tube - self.radius - np.hypot(self.offset - x * self.pitch, x * self.yaw).max()
         bend = self.radius * self.tube / (self.tube - self.radius)
         width = np.sqrt(2.0 * bend * max(least, 1e-8))
         if self.rounded > 0.0:
