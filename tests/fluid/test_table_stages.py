@@ -85,6 +85,7 @@ def test_straight_stage_is_near_the_finest_without_yaw(solved_by: TubeTable) -> 
     assert found["sideways_force"] < 0.03
     assert max(found.values()) < 0.06
     assert table.error == table.error_without_yaw
+    assert all(table.error[name] > 0.7 * found[name] for name in ("forward_velocity", "sideways_force"))
     assert f"largest error of {STRAIGHT.held_out} places" in table.error_against
 
 

@@ -133,10 +133,11 @@ class Prepared(DisplayMixin):
     @property
     def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each."""
+        stage = STAGES[self.table.stage]
         worse = [
-            _worse(name, self.table.error[name], allowed)
+            _worse(name, self.table.error[name], stage.accuracy * allowed, yawed=stage.yawed)
             for name, allowed in RESPONSES.items()
-            if self.table.error[name] > STAGES[self.table.stage].accuracy * allowed
+            if self.table.error[name] > stage.accuracy * allowed
         ]
         lost = () if self.kept else (_NOT_KEPT,)
         return (*self.robot.warnings, *worse, *lost)
@@ -169,10 +170,11 @@ class Prepared(DisplayMixin):
         }
 
 
-def _worse(name: str, error: float, allowed: float) -> Note:
+def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
     """That a table is further off than one should be; both errors are relative."""
     off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
-    what = f"{name.replace('_', ' ')} is off by up to {off} % at yawed poses between the nodes of the table"
+    where = "at yawed poses between" if yawed else "between"
+    what = f"{name.replace('_', ' ')} is off by up to {off} % {where} the nodes of the table"
     return Note("table-not-checked", f"{what}; at most {most} % is expected", (name,))
 
 

@@ -104,6 +104,8 @@ def _about_x(angle: float) -> Samples:
 _NEAR_GLASS = 0.9
 """Share of the largest pitch from which all harmonics of the tail's phase matter."""
 _SEED = 20121
+_CHECKED_PHASES = 3
+"""Phases of the tail at a check pose: its solids are solved for once."""
 _NO_YAW = kernel.yaw_limit_of(np.zeros(1), np.zeros(1), np.zeros(1), 0.0)
 """Limit of the yaw of a table without yawed nodes."""
 
@@ -173,10 +175,10 @@ def _wire(places: Places) -> float | None:
 
 
 @lru_cache(maxsize=4)
-def _tabulated_film(body: Outline, radius: float, yaws: int) -> Samples:
+def _tabulated_film(body: Outline, radius: float, yaws: int, intervals: int) -> Samples:
     """Packed film of a body in a tube, for all the places that tables have."""
     yaw, pitch = kernel.YAW_SLACK * LARGEST_YAW, 1.1 * max(kernel.STEEPEST)
-    return FilmTable.of(body, radius, yaw=yaw, pitch=pitch, yaws=yaws).packed
+    return FilmTable.of(body, radius, yaw=yaw, pitch=pitch, yaws=yaws, intervals=intervals).packed
 
 
 def _nodes(places: Places) -> list[NodeSolution]:
@@ -206,7 +208,8 @@ def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> Non
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the answers to `_nodes`."""
-    count, film = len(_level(places)), _tabulated_film(places.geometry.body, places.radius, places.stage.film_yaws)
+    count, stage = len(_level(places)), places.stage
+    film = _tabulated_film(places.geometry.body, places.radius, stage.film_yaws, stage.film_intervals)
     return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
 
 
@@ -317,29 +320,32 @@ def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
 
 
 def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
-    """Random check poses of a table between its nodes, each with a random phase of the tail."""
-    draw = np.random.default_rng(_SEED)
+    """Check poses of a table between its nodes, the hardest first, then random ones, each with some phases."""
+    draw, least = np.random.default_rng(_SEED), np.log(0.5 * places.gaps[0])
+    hardest = iter(() if yawed else places.stage.hardest)
     chosen: list[NodeSolution] = []
     while len(chosen) < places.stage.held_out:
-        t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
-        f, share = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0))
+        rise, f = next(hardest, None) or (float(draw.uniform(0.0, 1.0)), float(draw.uniform(-0.8, 1.0)))
+        t, share = float(np.exp((1.0 - rise) * least)), float(draw.uniform(-1.0, 1.0))
         yaw = share * float(places.most_yaw.max()) if yawed else 0.0
-        seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
+        seat, first = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
+        phases = tuple(first + phase for phase in even_phases(_CHECKED_PHASES))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(NodeSolution(((places.geometry, (phase,)),), seat, places.resolution(np.inf, seat, FINE)))
+            chosen.append(NodeSolution(((places.geometry, phases),), seat, places.checks))
     return chosen
 
 
 def _largest_errors(
-    table: Samples, poses: Sequence[NodeSolution], true: Iterator[Sequence[Samples]]
+    table: Samples, poses: Sequence[NodeSolution], solved: Iterator[Sequence[Samples]]
 ) -> dict[str, float]:
-    """Largest error of `RESPONSES` at poses, over their sizes in a turn of the tail; `true` gives their solutions."""
+    """Largest error of `RESPONSES` at poses, over their sizes in a turn of the tail; `solved` gives their solutions."""
     errors = []
     for pose in poses:
-        (_, phases), seat, answers = pose.tails[0], pose.seat, next(true)
-        own, *turn = np.empty((1 + PHASES, kernel.MOTIONS, kernel.MOTIONS))
-        for phase, out in zip((phases[0], *even_phases()), (own, *turn), strict=True):
+        (_, phases), seat, answers = pose.tails[0], pose.seat, next(solved)
+        found = np.empty((len(phases) + PHASES, kernel.MOTIONS, kernel.MOTIONS))
+        for phase, out in zip((*phases, *even_phases()), found, strict=True):
             kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phase, out)
-        errors.append(response_errors(own, answers[0][0], np.stack(turn)))
+        turn = found[len(phases) :]
+        errors += [response_errors(own, true, turn) for own, true in zip(found, answers[0], strict=False)]
     return dict(zip(RESPONSES, np.max(errors, axis=0).tolist(), strict=True))

@@ -148,7 +148,9 @@ class _Link:
         seat, forces = solids.seat, 3 * len(points)
         placed = seat.placed(points)
         distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
-        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.wire_damping)
+        own = waves_between(
+            seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.wire_damping, solids.fineness.slack
+        )
         # from forces in robot axes to those in the tube's
         along = np.asarray(np.kron(np.eye(len(points)), seat.rotation), dtype=np.float64)
         mobility = system.mobility.copy()

@@ -33,10 +33,8 @@ _SWEPT = 121
 """Points along the tail at which its clearance from the wall is computed."""
 _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
-_GROWTH = 2.0
-"""Ratio of one node t to the one before, near the floor."""
-_SPACED = 1.3
-"""Least ratio of the first of these to the last of those."""
+_SPACED = 0.38
+"""Least logarithm of the ratio of the first of these to the last of those, over that of `Stage.growth`."""
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most nodes the wall limits the tail to a smaller one."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
@@ -110,9 +108,9 @@ class Places:
                 "single poses without a table"
             )
         found = []
-        while thin * _SPACED < self.stage.upper[0]:
+        while thin * self.stage.growth**_SPACED < self.stage.upper[0]:
             found.append(thin)
-            thin *= _GROWTH
+            thin *= self.stage.growth
         return np.array([*found, *self.stage.upper])
 
     @property
@@ -146,12 +144,13 @@ class Places:
     def fineness(self, t: float, seat: Seat) -> Fineness:
         """Resolution of the flow at a place."""
         gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
-        return self.resolution(float(gap), seat)
-
-    def resolution(self, gap: float, seat: Seat, stage: Stage | None = None) -> Fineness:
-        """Resolution of a stage, or of this one, with the finest wire; the gap is over the body's radius."""
-        found = (stage or self.stage).fineness(gap, level=bool(seat.pitch == 0 and seat.yaw == 0))
+        found = self.stage.fineness(float(gap), level=bool(seat.pitch == 0 and seat.yaw == 0))
         return replace(found, wire=finest_wire(self.geometry))
+
+    @property
+    def checks(self) -> Fineness:
+        """Resolution of the flow at check poses."""
+        return replace(self.stage.checks, wire=finest_wire(self.geometry))
 
     @cached_property
     def most_yaw(self) -> Samples:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.wall import SLACK, WallWaves, each, extensions, point_waves, times_layers, weighted_layers
+from spirillum.fluid.tube.wall import WallWaves, each, extensions, point_waves, times_layers, weighted_layers
 from spirillum.fluid.wire.sources import Panels
 
 
@@ -158,7 +158,7 @@ class LevelRings(Rings):
         edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
         for low, high in pairwise([0, *edges.tolist(), waves.k.size]):
             if high > low:
-                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + SLACK
+                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + waves.slack
 
     def sent(
         self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float

@@ -20,7 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import check_memory
 from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
-from spirillum.fluid.tube.wall import WallWaves, each, waves_between
+from spirillum.fluid.tube.wall import SLACK, WallWaves, each, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
@@ -43,6 +43,10 @@ class Fineness:
     """Gauss nodes of a panel."""
     panel: float = 2.5
     """Longest panels over the length on which the film's traction varies."""
+    wires: float = 1e-3
+    """Coarsest tolerance of waves to and from wires."""
+    slack: float = SLACK
+    """See `WallWaves.slack`."""
 
     @property
     def damping(self) -> float:
@@ -52,7 +56,7 @@ class Fineness:
     @property
     def wire_damping(self) -> float:
         """At which waves to and from wires are cut off: what pushes the robot needs more of them than what holds it."""
-        return _damping(min(self.tolerance, _WIRES))
+        return _damping(min(self.tolerance, self.wires))
 
     @property
     def precision(self) -> type[np.floating]:
@@ -66,8 +70,6 @@ def _damping(tolerance: float) -> float:
 
 _SINGLE = 5e-3
 """Finest tolerance at which single precision will do."""
-_WIRES = 1e-3
-"""Coarsest tolerance of waves to and from wires."""
 
 
 class Solids:
@@ -162,7 +164,7 @@ class Solids:
         x, damping = self.panels.x.ravel(), self.fineness.damping
         if wires is not None:
             x, damping = np.concatenate([x, wires]), self.fineness.wire_damping
-        return waves_between(self.seat.radius, float(np.ptp(x)), distance, damping)
+        return waves_between(self.seat.radius, float(np.ptp(x)), distance, damping, self.fineness.slack)
 
     @cached_property
     def motion(self) -> tuple[Samples, Samples]:

@@ -31,8 +31,7 @@ _BANDS = (0.35, 0.65)
 _FURTHER = 3.0
 """Damping, as an exponent over that at which waves are cut, from which things are out of reach while others are not."""
 SLACK = 3.0
-"""Exponent over that at which waves are cut, up to which they are kept between things further from the wall than the
-nearest: there are many of them, and what each lacks adds up to half a percent of what holds and pushes the robot."""
+"""Default of `WallWaves.slack`: what waves beyond it miss is below the error of fine solutions."""
 _AT_WALL = 1e-9
 """Distance over the radius below which things are at the wall, where every wave reaches them."""
 _THREADS = 2
@@ -56,10 +55,13 @@ class WallWaves:
     """Orders p = 0 to orders - 1."""
     cut: float
     """Waves are kept until they are damped by exp(-cut), there and back."""
+    slack: float = SLACK
+    """Exponent over `cut`, up to which waves are kept between things further from the wall than the nearest: there are
+    many of them, and what each lacks adds up to half a percent of what holds and pushes the robot without any."""
 
     def orders_between(self, number: int, distance: float) -> int:
         """Orders that matter at one k between things at this mean distance from the wall, m; 0 for none."""
-        steepest, k = (self.cut + SLACK) / (2.0 * distance), float(self.k[number])
+        steepest, k = (self.cut + self.slack) / (2.0 * distance), float(self.k[number])
         if k > steepest:
             return 0
         return min(int(np.ceil(self.radius * np.sqrt(steepest**2 - k**2)) + 3.0), self.orders[number])
@@ -87,7 +89,7 @@ class WaveBand(NamedTuple):
     """Indices of what they reach before they are damped."""
 
 
-def waves_between(radius: float, reach: float, distance: float, tolerance: float) -> WallWaves:
+def waves_between(radius: float, reach: float, distance: float, tolerance: float, slack: float = SLACK) -> WallWaves:
     """The waves that matter between things in a tube.
 
     Args:
@@ -95,6 +97,7 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
         reach: largest axial distance between them, m.
         distance: mean of their smallest distances from the wall, m.
         tolerance: waves are kept until they are damped by this much, there and back.
+        slack: see `WallWaves.slack`.
     """
     steepest = -np.log(tolerance) / (2.0 * distance)
     step = 2.0 * np.pi / (reach - np.log(tolerance) / _DECAY * radius)
@@ -110,7 +113,7 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
     weight[1] -= slope
     around = radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))
     orders = tuple(int(p) for p in np.ceil(around) + 3.0)
-    return WallWaves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance))
+    return WallWaves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance), slack)
 
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
