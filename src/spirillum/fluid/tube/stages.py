@@ -64,11 +64,11 @@ class Stage:
         return self.resolutions[gap < _NEAR, level]
 
 
-_LOOSE = Fineness("standard", 0.01, 4, wires=4e-3, slack=1.0)
+_LOOSE = Fineness("standard", 0.03, 4, wires=4e-3, slack=1.0)
 _COARSE = {
-    (True, True): _LOOSE,
-    (True, False): replace(_LOOSE, tolerance=0.03),
-    (False, True): replace(_LOOSE, tolerance=0.03),
+    (True, True): Fineness("standard", 0.01, 4),
+    (True, False): _LOOSE,
+    (False, True): Fineness("standard", 0.03, 4),
     (False, False): replace(_LOOSE, tolerance=0.1),
 }
 """Against the finest resolution: at most 0.4 % of the forward velocity, 1 % of the normal resistance and torques."""
@@ -85,11 +85,11 @@ YAW = Stage(
     seconds=(6.0, 14.0),
     held_out=3,
     checks=Fineness("standard", 0.01, 6, slack=1.0),
-    hardest=((0.0, -0.8), (0.4, 0.96), (0.96, -0.8)),
+    hardest=((0.0, -0.8), (0.89, 0.3), (0.4, 0.96), (0.96, -0.8)),
     growth=2.5,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
 FINE = Stage(
     "fine",
     up=(0.0, 0.28, 0.55, 0.78, 0.92, 1.0),
