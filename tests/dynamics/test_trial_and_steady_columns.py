@@ -65,7 +65,7 @@ def test_the_held_answer_stays_the_headline(driven: sp.Robot, answer: Any) -> No
 def test_columns_stand_side_by_side(answer: Any) -> None:
     table, *lines = (block for block in blocks_of(answer.to_dict()) if not isinstance(block, str) or "t" in block)
     assert [str(column.header) for column in table.columns] == [
-        "quantity", "held", "band", "trial", "steady", "unit",
+        "quantity", "held", "band", "trial", "steady",
     ]  # fmt: skip
     assert "trial: released, motor on after 60 s, mean over 20 s; contact assumed, not validated" in lines
 

@@ -293,7 +293,7 @@ def test_two_robots_start_together(tab: Any) -> None:
     tab.page.keyboard.press("Control+z")
     tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'tail.wavelength' && knob.value == 25)")
     tab.until("spirillum.frame.lanes.every(lane => lane.ready)")
-    tab.command(do="duty", swimmer=1, value=0.5)
+    tab.command(do="duty", lane=1, value=0.5)
     tab.command(do="step")
     tab.until("spirillum.scene.lanes[1].duty == 0.5")
     tab.until("spirillum.frame.lanes[1].time > 0 && spirillum.frame.lanes[0].time == spirillum.frame.lanes[1].time")

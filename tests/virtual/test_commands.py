@@ -73,10 +73,10 @@ def test_a_film_is_of_a_robot_that_is_named_or_of_a_run(run: Run, tmp_path: Path
         (("-o", "a.mp4", "--distortion", "inf"), "distortion = inf"),
         (("-o", "a.mp4", "--distortion=-100"), "distortion = -100"),
         (("-o", "a.mp4", "--heading", "90deg"), "heading = 90 deg; allowed: -45 to 45 deg"),
-        (("-o", "a.mp4", "--depth-error", "1m"), "depth_error = 1000 mm"),
-        (("-o", "a.mp4", "--depth-error=-20mm"), "depth_error = -20 mm"),
+        (("-o", "a.mp4", "--depth-error", "1m"), "--depth-error = 1000 mm"),
+        (("-o", "a.mp4", "--depth-error=-20mm"), "--depth-error = -20 mm"),
         (("-o", "a.mp4", "--run", "no.nc"), "no.nc does not exist"),
-        (("-o", "a.mp4", "--glare-fixed"), "glare_moves = False (--glare-fixed) without glare; allowed: "),
+        (("-o", "a.mp4", "--glare-fixed"), "--glare-fixed without glare; allowed: "),
         (
             (
                 "-o",

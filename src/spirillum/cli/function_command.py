@@ -282,7 +282,8 @@ def _with_options(error: InputError, items: Iterable[Declaration]) -> InputError
     sentence = str(error)
     for item in items:
         last = item.path.rpartition(".")[2]
-        found = rf"{re.escape(item.path)}\b" if item.table in _IN_PYTHON else rf"{last} = True\b"
+        on = not item.default if item.is_switch else True
+        found = rf"{re.escape(item.path)}\b" if item.table in _IN_PYTHON else rf"{last} = {on}\b"
         found += rf"|{last}(?= = )" if "_" in last else ""
         sentence = re.sub(rf"(?<![\w.-])(?:{found})", _name_of(item), sentence)
     return error if sentence == str(error) else InputError(sentence)

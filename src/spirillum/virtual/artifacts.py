@@ -166,7 +166,7 @@ def with_troubles(
     fields = given if isinstance(given, Mapping) else {}
     found = stated.model_copy(update={name: size for name, size in disturbed.items() if fields.get(name) is None})
     if not (found.glare_moves or found.glare):
-        raise InputError("glare_moves = False (--glare-fixed) without glare; allowed: with a glare above 0")
+        raise InputError("glare_moves = False without glare; allowed: with a glare above 0")
     return Troubles.of(chosen if isinstance(value, str) else value), found
 
 
