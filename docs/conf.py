@@ -10,6 +10,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+import jaxtyping  # noqa: F401 - shapes of arrays are then read as such
+
 from spirillum import __version__, arrays
 from spirillum.robot import fields as robot_fields
 
