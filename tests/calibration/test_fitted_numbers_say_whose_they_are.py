@@ -91,7 +91,7 @@ def test_a_calibration_file_is_not_left_out_again(
     monkeypatch.chdir(calibration.parent)
     outcome = run(*command, "--calibration", "calibration.toml", "--no-calibration")
     assert (outcome.code, outcome.out) == (2, "")
-    assert "calibration together with no-calibration (calibrated = False); allowed: one of them" in outcome.err
+    assert "calibration together with no-calibration (--no-calibration); allowed: one of them" in outcome.err
 
 
 def test_a_field_that_a_study_varies_is_not_replaced_by_a_file(calibration: Path) -> None:
