@@ -101,8 +101,6 @@ def _about_x(angle: float) -> Samples:
     return found
 
 
-_NEAR_GLASS = 0.9
-"""Share of the largest pitch from which all harmonics of the tail's phase matter."""
 _SEED = 20121
 _CHECKED_PHASES = 3
 """Phases of the tail at a check pose: its solids are solved for once."""
@@ -220,20 +218,21 @@ class _Place(NamedTuple):
     f: float
     seat: Seat
     phases: int
-    """Of the tail, evenly spread: a tail near the glass has more harmonics over a turn."""
+    """Of the tail, evenly spread."""
 
 
-def _phases_of(places: Places, f: float) -> int:
-    """Number of phases of the tail at a node without yaw."""
-    return places.stage.phases if abs(f) > _NEAR_GLASS else places.stage.few_phases
+def _phases_at(places: Places, seat: Seat) -> int:
+    """Number of phases of the tail at a node."""
+    return places.stage.phases_at(places.tail_clearance(seat) / float(np.max(places.swept[:, 1])))
 
 
 def _level(places: Places) -> list[_Place]:
     """Nodes without yaw that are solved for: for each t those nose up, then, off the axis, those nose down."""
     return [
-        _Place(float(t), float(f), places.seat(float(t), float(f)), _phases_of(places, f))
+        _Place(float(t), float(f), seat, _phases_at(places, seat))
         for t in places.gaps
         for f in (*places.up, *(-places.down[1:] if t < 1.0 else ()))
+        for seat in [places.seat(float(t), float(f))]
     ]
 
 
@@ -242,16 +241,12 @@ def _yawed(places: Places) -> list[_Place]:
     if not places.stage.yawed:
         return []
     return [
-        _Place(
-            float(t),
-            float(f),
-            places.seat(float(t), float(f), share * float(most)),
-            places.stage.phases if share > kernel.YAW_SHARES[0] else places.stage.little_yawed,
-        )
+        _Place(float(t), float(f), seat, _phases_at(places, seat))
         for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
         for f, most in zip(places.yaw_pitches, row, strict=True)
         for share in kernel.YAW_SHARES
+        for seat in [places.seat(float(t), float(f), share * float(most))]
     ]
 
 

@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.tube.reduced import Answers, Reduced
 from spirillum.fluid.tube.solids import MOTIONS, Solids
-from spirillum.fluid.tube.wall import point_reflection, waves_between
+from spirillum.fluid.tube.wall import point_reflection
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
@@ -148,9 +148,7 @@ class _Link:
         seat, forces = solids.seat, 3 * len(points)
         placed = seat.placed(points)
         distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
-        own = waves_between(
-            seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.wire_damping, solids.fineness.slack
-        )
+        own = solids.fineness.waves(seat.radius, placed[:, 0], distance, solids.fineness.wire_damping)
         # from forces in robot axes to those in the tube's
         along = np.asarray(np.kron(np.eye(len(points)), seat.rotation), dtype=np.float64)
         mobility = system.mobility.copy()

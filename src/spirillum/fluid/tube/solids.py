@@ -20,7 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import check_memory
 from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
-from spirillum.fluid.tube.wall import SLACK, WallWaves, each, waves_between
+from spirillum.fluid.tube.wall import CROWD, SLACK, WallWaves, each, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
@@ -47,6 +47,8 @@ class Fineness:
     """Coarsest tolerance of waves to and from wires."""
     slack: float = SLACK
     """See `WallWaves.slack`."""
+    crowd: float = CROWD
+    """See `wall.CROWD`."""
 
     @property
     def damping(self) -> float:
@@ -57,6 +59,10 @@ class Fineness:
     def wire_damping(self) -> float:
         """At which waves to and from wires are cut off: what pushes the robot needs more of them than what holds it."""
         return _damping(min(self.tolerance, self.wires))
+
+    def waves(self, radius: float, x: Samples, distance: float, damping: float) -> WallWaves:
+        """The waves that matter between things that are at x, m; see `waves_between`."""
+        return waves_between(radius, float(np.ptp(x)), distance, damping, self.slack, self.crowd)
 
     @property
     def precision(self) -> type[np.floating]:
@@ -161,10 +167,10 @@ class Solids:
             distance: mean of the smallest distances of both from the wall, m.
             wires: where along the tube they are, m.
         """
-        x, damping = self.panels.x.ravel(), self.fineness.damping
-        if wires is not None:
-            x, damping = np.concatenate([x, wires]), self.fineness.wire_damping
-        return waves_between(self.seat.radius, float(np.ptp(x)), distance, damping, self.fineness.slack)
+        x, fineness = self.panels.x.ravel(), self.fineness
+        if wires is None:
+            return fineness.waves(self.seat.radius, x, distance, fineness.damping)
+        return fineness.waves(self.seat.radius, np.concatenate([x, wires]), distance, fineness.wire_damping)
 
     @cached_property
     def motion(self) -> tuple[Samples, Samples]:

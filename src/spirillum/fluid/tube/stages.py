@@ -32,12 +32,9 @@ class Stage:
     """Nodes f nose down."""
     upper: tuple[float, ...]
     """Nodes t far from the floor."""
-    phases: int
-    """Phases of the tail at nodes near the largest pitch or yaw, where all harmonics matter."""
-    few_phases: int
-    """Phases of the tail at the other nodes without yaw."""
-    little_yawed: int
-    """Phases of the tail at the least yaw."""
+    phases: tuple[tuple[float, int], ...]
+    """Phases of the tail from which clearance on, over the radius that it sweeps; near the glass it has more harmonics
+    over a turn."""
     resolutions: dict[tuple[bool, bool], Fineness]
     """Resolution of the flow for (near the glass, level) nodes."""
     seconds: tuple[float, float]
@@ -63,41 +60,41 @@ class Stage:
         """Return the resolution of a node."""
         return self.resolutions[gap < _NEAR, level]
 
+    def phases_at(self, clearance: float) -> int:
+        """Number of phases of a tail with that clearance over the radius that it sweeps."""
+        return [count for least, count in self.phases if clearance >= least][-1]
 
-_LOOSE = Fineness("standard", 0.03, 4, wires=4e-3, slack=1.0)
+
+_LOOSE = Fineness("standard", 0.03, 4, wires=4e-3, slack=1.0, crowd=1.25)
 _COARSE = {
-    (True, True): Fineness("standard", 0.01, 4),
+    (True, True): Fineness("standard", 0.01, 4, crowd=1.25),
     (True, False): _LOOSE,
-    (False, True): Fineness("standard", 0.03, 4),
+    (False, True): Fineness("standard", 0.03, 4, crowd=1.25),
     (False, False): replace(_LOOSE, tolerance=0.1),
 }
 """Against the finest resolution: at most 0.4 % of the forward velocity, 1 % of the normal resistance and torques."""
 
 YAW = Stage(
     "yaw",
-    up=(0.0, 0.55, 0.92, 1.0),
+    up=(0.0, 0.4, 0.8, 1.0),
     down=(0.0, 0.55, 1.0),
     upper=(0.55, 1.0),
-    phases=7,
-    few_phases=5,
-    little_yawed=5,
+    phases=((0.0, 7), (0.7, 5), (3.0, 3)),
     resolutions=_COARSE,
     seconds=(6.0, 14.0),
     held_out=3,
-    checks=Fineness("standard", 0.01, 6, slack=1.0),
-    hardest=((0.0, -0.8), (0.89, 0.3), (0.4, 0.96), (0.96, -0.8)),
-    growth=2.5,
+    checks=Fineness("standard", 0.01, 4, slack=1.0, crowd=1.25),
+    hardest=((0.0, -0.8), (0.25, -0.25), (0.91, -0.85)),
+    growth=3.0,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), yawed=False, film_yaws=1)
 FINE = Stage(
     "fine",
     up=(0.0, 0.28, 0.55, 0.78, 0.92, 1.0),
     down=(0.0, 0.28, 0.55, 0.8, 1.0),
     upper=(0.55, 0.78, 1.0),
-    phases=9,
-    few_phases=5,
-    little_yawed=7,
+    phases=((0.0, 9), (1.0, 5)),
     resolutions={
         (near, level): Fineness("standard", 0.002 if level else 0.01)
         for near in (True, False)

@@ -3,7 +3,7 @@
 A force at y moves the fluid at x, besides by the Stokeslet, by -2/pi int dk sum_p eps_p U_p(x) S_p U_p(y)', over
 k > 0 and the even and odd waves of order p, with eps_0 = 1, else 2, and without the factor 1/(8 pi mu); see
 `kernels.stokes_flow`. No net flux passes along the tube. Near k = 0 the integrand goes as A + B log k: the nodes in k
-crowd there, and what lies below the first is summed.
+crowd there, and below the first of them it is extrapolated in log k.
 
 Axes here: x along the tube, y up, z to the right; angles count from y.
 """
@@ -22,9 +22,9 @@ from spirillum.arrays import Samples
 
 _DECAY = 2.5
 """Decay rate of a force's flow along the tube, times the radius: images in the sum over k are beyond it."""
-_LOWEST = 1e-5
-"""First node in k, over the step."""
-_CROWD = 1.5
+_LOWEST, _NEGLIGIBLE = 1e-3, 1e-12
+"""First node in k over the step, and the least k to which the integral below it is extrapolated."""
+CROWD = 1.5
 """Where nodes in k begin to crowd towards 0, over the step."""
 _BANDS = (0.35, 0.65)
 """Orders over all of them at which a new band begins."""
@@ -89,7 +89,9 @@ class WaveBand(NamedTuple):
     """Indices of what they reach before they are damped."""
 
 
-def waves_between(radius: float, reach: float, distance: float, tolerance: float, slack: float = SLACK) -> WallWaves:
+def waves_between(
+    radius: float, reach: float, distance: float, tolerance: float, slack: float = SLACK, crowd: float = CROWD
+) -> WallWaves:
     """The waves that matter between things in a tube.
 
     Args:
@@ -98,22 +100,32 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
         distance: mean of their smallest distances from the wall, m.
         tolerance: waves are kept until they are damped by this much, there and back.
         slack: see `WallWaves.slack`.
+        crowd: see `CROWD`.
     """
     steepest = -np.log(tolerance) / (2.0 * distance)
     step = 2.0 * np.pi / (reach - np.log(tolerance) / _DECAY * radius)
-    # k = c log(1 + exp(t/c)), even steps in t: exponentially close to k = 0, even where k > c
-    crowd = _CROWD * step
-    t = step * np.arange(-np.ceil(-_CROWD * np.log(_LOWEST)), np.ceil(steepest / step) + 1.0)
-    k = crowd * np.logaddexp(0.0, t / crowd)
-    weight = step / (1.0 + np.exp(-t / crowd))
-    # below the first node the integrand is linear in t, and weights fall off as a geometric series
-    ratio = np.exp(-1.0 / _CROWD)
-    slope = weight[0] * ratio / (1.0 - ratio) ** 2
-    weight[0] += weight[0] * ratio / (1.0 - ratio) + slope
-    weight[1] -= slope
+    k, weight = _nodes(step, crowd * step, steepest)
     around = radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))
     orders = tuple(int(p) for p in np.ceil(around) + 3.0)
     return WallWaves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance), slack)
+
+
+def _nodes(step: float, crowd: float, steepest: float) -> tuple[Samples, Samples]:
+    """Nodes in k and weights, 1/m, of the trapezoidal rule in t, k = c log(1 + exp(t/c)), and of what is below it.
+
+    Even steps in t come exponentially close to k = 0, even where k > c. Below the first node the integrand is
+    extrapolated linearly in log k from the first two.
+    """
+    first, least = (int(np.ceil(crowd / step * np.log(share))) for share in (_LOWEST, _NEGLIGIBLE))
+    t = step * np.arange(least, np.ceil(steepest / step) + 1.0)
+    k = crowd * np.logaddexp(0.0, t / crowd)
+    weight = step / (1.0 + np.exp(-t / crowd))
+    below, k = np.split(k, [first - least])
+    lost, weight = np.split(weight, [first - least])
+    share = np.log(below / k[0]) / np.log(k[1] / k[0])
+    weight[0] += np.sum(lost * (1.0 - share))
+    weight[1] += np.sum(lost * share)
+    return k, weight
 
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
