@@ -10,14 +10,17 @@ axis, and by one about the robot's own that brings the tail's phase along.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from threading import Thread
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.errors import InputError
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.nodes import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.outer_resistance import (
@@ -39,6 +42,7 @@ from spirillum.fluid.tube.progress_messages import kept_after, progress_message
 from spirillum.fluid.tube.stages import FINE, RESPONSES, Stage, response_errors
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import check_solvable, finest_wire
+from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.tube_table import MOTIONS, film_at
@@ -122,18 +126,46 @@ def built_tables(
             fit into memory.
         KeyboardInterrupt: if it was interrupted; says how many places are kept.
     """
-    every = [Places(geometry, radius, stage) for geometry, radius in robots]
-    nodes = [_nodes(places) for places in every]
-    wanted = [place for some in nodes for place in some]
-    for places, some in zip(every, nodes, strict=True):
-        _check_memory(places.geometry, some)
+    requests = [_Request.of(Places(geometry, radius, stage)) for geometry, radius in robots]
+    wanted = [pose for request in requests for pose in request.poses]
+    for request in requests:
+        _check_memory(request.places.geometry, request.nodes)
     if progress is not None:
         count, kept = _solved_before(wanted)
         progress(progress_message(count, workers, kept, stage.seconds), 0, count)
+    start = time.perf_counter()
+    films = _start_films(requests, workers)
     try:
-        return _solved_tables(every, nodes, workers, progress)
+        found = iter(solutions(wanted, "table of the tube", progress, workers))
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
+    films.join()
+    tables = [_table(request, [next(found) for _ in request.poses]) for request in requests]
+    seconds = (time.perf_counter() - start) / len(tables)
+    return [replace(table, seconds=seconds) for table in tables]
+
+
+@dataclass(frozen=True)
+class _Request:
+    """All poses that are solved for to make one table; the dearest ones first."""
+
+    places: Places
+    straight: list[NodeSolution]
+    """Check poses without yaw."""
+    yawed: list[NodeSolution]
+    """Check poses with yaw."""
+    nodes: list[NodeSolution]
+
+    @classmethod
+    def of(cls, places: Places) -> _Request:
+        """All poses of a robot."""
+        yawed = _held_out(places) if places.stage.yawed else []
+        return cls(places, _held_out(places, yawed=False), yawed, _nodes(places))
+
+    @property
+    def poses(self) -> list[NodeSolution]:
+        """Check poses and nodes."""
+        return [*self.straight, *self.yawed, *self.nodes]
 
 
 def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
@@ -142,29 +174,27 @@ def _solved_before(places: Sequence[NodeSolution]) -> tuple[int, int]:
     return len(shared), sum(all_kept([places[number] for number in numbers]) for numbers in shared)
 
 
-def _solved_tables(
-    every: Sequence[Places], nodes: Sequence[list[NodeSolution]], workers: int, progress: Progress | None
-) -> list[TubeTable]:
-    """The tables of robots whose nodes are given."""
-    start = time.perf_counter()
-    wanted = [place for some in nodes for place in some]
-    found = iter(solutions(wanted, "table of the tube", progress, workers))
-    packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
-    straight = [_held_out(places, yawed=False) for places in every]
-    yawed = [_held_out(places) if places.stage.yawed else [] for places in every]
-    checked = [pose for some in (*straight, *yawed) for pose in some]
-    true = iter(solutions(checked, "checking the table", progress, workers))
-    without = [_largest_errors(table, some, true) for table, some in zip(packed, straight, strict=True)]
-    with_yaw = [
-        _largest_errors(table, some, true) if some else known
-        for table, some, known in zip(packed, yawed, without, strict=True)
-    ]
-    seconds = (time.perf_counter() - start) / len(every)
-    return [
-        TubeTable(places.geometry, places.radius, table, error, level, len(some), seconds, _wire(places), stage.name)
-        for places, some, table, error, level in zip(every, nodes, packed, with_yaw, without, strict=True)
-        for stage in [places.stage]
-    ]
+def _start_films(requests: Sequence[_Request], workers: int) -> Thread:
+    """Tabulate the films beside the solutions where those leave this process idle; a refusal comes with the table."""
+
+    def tabulate() -> None:
+        with suppress(InputError), one_thread():
+            for request in requests if workers > 1 else ():
+                _film_of_table(request.places)
+
+    thread = Thread(target=tabulate, daemon=True)  # an interrupt does not wait for it
+    thread.start()
+    return thread
+
+
+def _table(request: _Request, found: Sequence[Sequence[Samples]]) -> TubeTable:
+    """The table of a robot from the solutions at all poses of its request."""
+    places, level, count = request.places, len(request.straight), len(request.poses) - len(request.nodes)
+    packed = _packed(places, found[count:])
+    without = _largest_errors(packed, request.straight, found[:level])
+    error = _largest_errors(packed, request.yawed, found[level:count]) if request.yawed else without
+    nodes, stage = len(request.nodes), places.stage.name
+    return TubeTable(places.geometry, places.radius, packed, error, without, nodes, 0.0, _wire(places), stage)
 
 
 def _wire(places: Places) -> float | None:
@@ -172,7 +202,13 @@ def _wire(places: Places) -> float | None:
     return 0.0 if finest_wire(places.geometry) == "high" else None
 
 
-@lru_cache(maxsize=4)
+def _film_of_table(places: Places) -> Samples:
+    """Packed film of a robot's body in its tube."""
+    stage = places.stage
+    return _tabulated_film(places.geometry.body, places.radius, stage.film_yaws, stage.film_intervals)
+
+
+@lru_cache(maxsize=16)
 def _tabulated_film(body: Outline, radius: float, yaws: int, intervals: int) -> Samples:
     """Packed film of a body in a tube, for all the places that tables have."""
     yaw, pitch = kernel.YAW_SLACK * LARGEST_YAW, 1.1 * max(kernel.STEEPEST)
@@ -206,8 +242,8 @@ def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> Non
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the answers to `_nodes`."""
-    count, stage = len(_level(places)), places.stage
-    film = _tabulated_film(places.geometry.body, places.radius, stage.film_yaws, stage.film_intervals)
+    count = len(_level(places))
+    film = _film_of_table(places)
     return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
 
 
@@ -332,12 +368,12 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
 
 
 def _largest_errors(
-    table: Samples, poses: Sequence[NodeSolution], solved: Iterator[Sequence[Samples]]
+    table: Samples, poses: Sequence[NodeSolution], solved: Sequence[Sequence[Samples]]
 ) -> dict[str, float]:
-    """Largest error of `RESPONSES` at poses, over their sizes in a turn of the tail; `solved` gives their solutions."""
+    """Largest error of `RESPONSES` at poses with their solutions, over their sizes in a turn of the tail."""
     errors = []
-    for pose in poses:
-        (_, phases), seat, answers = pose.tails[0], pose.seat, next(solved)
+    for pose, answers in zip(poses, solved, strict=True):
+        (_, phases), seat = pose.tails[0], pose.seat
         found = np.empty((len(phases) + PHASES, kernel.MOTIONS, kernel.MOTIONS))
         for phase, out in zip((*phases, *even_phases()), found, strict=True):
             kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phase, out)
