@@ -353,12 +353,13 @@ def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
 def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
     """Check poses of a table between its nodes, the hardest first, then random ones, each with some phases."""
     draw, least = np.random.default_rng(_SEED), np.log(0.5 * places.gaps[0])
-    hardest = iter(() if yawed else places.stage.hardest)
+    hardest = iter(places.stage.hardest_yawed if yawed else [(*pose, 0.0) for pose in places.stage.hardest])
     chosen: list[NodeSolution] = []
     while len(chosen) < places.stage.held_out:
-        rise, f = next(hardest, None) or (float(draw.uniform(0.0, 1.0)), float(draw.uniform(-0.8, 1.0)))
-        t, share = float(np.exp((1.0 - rise) * least)), float(draw.uniform(-1.0, 1.0))
-        yaw = share * float(places.most_yaw.max()) if yawed else 0.0
+        rise, f, share = (float(draw.uniform(low, high)) for low, high in ((0.0, 1.0), (-0.8, 1.0), (-1.0, 1.0)))
+        rise, f, share = next(hardest, (rise, f, share if yawed else 0.0))
+        t = float(np.exp((1.0 - rise) * least))
+        yaw = share * places.largest_yaw(t, f) if yawed else 0.0
         seat, first = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         phases = tuple(first + phase for phase in even_phases(_CHECKED_PHASES))
         clear = places.tail_clearance(seat) > places.least_clearance

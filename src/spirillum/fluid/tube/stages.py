@@ -44,7 +44,10 @@ class Stage:
     checks: Fineness
     """Resolution of the flow at these poses."""
     hardest: tuple[tuple[float, float], ...] = ()
-    """The first of these poses without yaw: log t from half the first node (0) to the axis (1), and f."""
+    """The first of these poses without yaw, where interpolation errs most: log t from half the first node (0) to the
+    axis (1), and f."""
+    hardest_yawed: tuple[tuple[float, float, float], ...] = ()
+    """The first of those with yaw: as `hardest`, and the yaw over the largest one there."""
     growth: float = 2.0
     """Ratio of one node t to the one before, near the floor."""
     accuracy: float = 2.0
@@ -77,18 +80,19 @@ _COARSE = {
 YAW = Stage(
     "yaw",
     up=(0.0, 0.4, 0.8, 1.0),
-    down=(0.0, 0.55, 1.0),
+    down=(0.0, 0.3, 0.7, 1.0),
     upper=(0.55, 1.0),
     phases=((0.0, 7), (0.7, 5), (3.0, 3)),
     resolutions=_COARSE,
     seconds=(6.0, 14.0),
     held_out=3,
     checks=Fineness("standard", 0.01, 4, slack=1.0, crowd=1.25),
-    hardest=((0.0, -0.8), (0.25, -0.25), (0.91, -0.85)),
+    hardest=((0.25, -0.85), (0.96, 0.0), (0.24, 0.97), (0.0, 0.0)),
+    hardest_yawed=((0.6, -0.05, -0.88), (0.99, -0.95, 0.83), (0.99, 0.56, 0.86)),
     growth=3.0,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
 FINE = Stage(
     "fine",
     up=(0.0, 0.28, 0.55, 0.78, 0.92, 1.0),
