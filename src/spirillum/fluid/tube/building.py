@@ -364,7 +364,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
         phases = tuple(first + phase for phase in even_phases(_CHECKED_PHASES))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(NodeSolution(((places.geometry, phases),), seat, places.checks))
+            chosen.append(NodeSolution(((places.geometry, phases),), seat, places.fineness_of_check(seat)))
     return chosen
 
 

@@ -144,13 +144,11 @@ class Places:
     def fineness(self, t: float, seat: Seat) -> Fineness:
         """Resolution of the flow at a place."""
         gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
-        found = self.stage.fineness(float(gap), level=bool(seat.pitch == 0 and seat.yaw == 0))
-        return replace(found, wire=finest_wire(self.geometry))
+        return replace(self.stage.fineness(float(gap), seat), wire=finest_wire(self.geometry))
 
-    @property
-    def checks(self) -> Fineness:
-        """Resolution of the flow at check poses."""
-        return replace(self.stage.checks, wire=finest_wire(self.geometry))
+    def fineness_of_check(self, seat: Seat) -> Fineness:
+        """Resolution of the flow at a check pose."""
+        return replace(self.stage.fineness_of_check(seat), wire=finest_wire(self.geometry))
 
     @cached_property
     def most_yaw(self) -> Samples:

@@ -14,8 +14,11 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.wall import SLACK
+from spirillum.robot.tube_pose import Seat
 
 StageName = Literal["straight", "yaw", "fine"]
+Tilt = Literal["level", "pitched", "yawed"]
 
 _NEAR = 0.12
 """Gap over the body's radius below which a node is near the glass."""
@@ -35,13 +38,13 @@ class Stage:
     phases: tuple[tuple[float, int], ...]
     """Phases of the tail from which clearance on, over the radius that it sweeps; near the glass it has more harmonics
     over a turn."""
-    resolutions: dict[tuple[bool, bool], Fineness]
-    """Resolution of the flow for (near the glass, level) nodes."""
+    resolutions: dict[tuple[bool, Tilt], Fineness]
+    """Resolution of the flow for nodes (near the glass, tilt)."""
     seconds: tuple[float, float]
     """Time that a node takes one process of a fast and of a slow machine, s."""
     held_out: int
     """Poses without yaw, and with it, from which the table's errors are stated."""
-    checks: Fineness
+    checks: dict[Tilt, Fineness]
     """Resolution of the flow at these poses."""
     hardest: tuple[tuple[float, float], ...] = ()
     """The first of these poses without yaw, where interpolation errs most: log t from half the first node (0) to the
@@ -59,23 +62,31 @@ class Stage:
     film_intervals: int = 15
     """Intervals of its splines: with 11 it is within 0.4 %."""
 
-    def fineness(self, gap: float, *, level: bool) -> Fineness:
-        """Return the resolution of a node."""
-        return self.resolutions[gap < _NEAR, level]
+    def fineness(self, gap: float, seat: Seat) -> Fineness:
+        """Return the resolution of a node whose level gap over the body's radius is given."""
+        return self.resolutions[gap < _NEAR, _tilt_of(seat)]
+
+    def fineness_of_check(self, seat: Seat) -> Fineness:
+        """Return the resolution of a check pose."""
+        return self.checks[_tilt_of(seat)]
 
     def phases_at(self, clearance: float) -> int:
         """Number of phases of a tail with that clearance over the radius that it sweeps."""
         return [count for least, count in self.phases if clearance >= least][-1]
 
 
-_LOOSE = Fineness("standard", 0.03, 4, wires=4e-3, slack=1.0, crowd=1.25)
-_COARSE = {
-    (True, True): Fineness("standard", 0.01, 4, crowd=1.25),
-    (True, False): _LOOSE,
-    (False, True): Fineness("standard", 0.03, 4, crowd=1.25),
-    (False, False): replace(_LOOSE, tolerance=0.1),
+_LOOSE = Fineness("standard", 0.1, 4, wires=4e-3, slack=1.0, crowd=1.25)
+_FINER = replace(_LOOSE, tolerance=0.01, order=6, panel=3.5)
+_COARSE: dict[tuple[bool, Tilt], Fineness] = {
+    (True, "level"): replace(_LOOSE, tolerance=0.005, wires=1e-3, slack=SLACK),
+    (True, "pitched"): _FINER,
+    (True, "yawed"): replace(_LOOSE, tolerance=0.03, slack=2.0),
+    (False, "level"): replace(_LOOSE, tolerance=0.03, wires=1e-3, slack=SLACK),
+    (False, "pitched"): _LOOSE,
+    (False, "yawed"): _LOOSE,
 }
-"""Against the finest resolution: at most 0.4 % of the forward velocity, 1 % of the normal resistance and torques."""
+"""Near the glass within 0.3 % of the forward velocity, 1 % of forces, torques and the normal resistance."""
+_CHECKS: dict[Tilt, Fineness] = {"level": _COARSE[True, "level"], "pitched": _FINER, "yawed": _FINER}
 
 YAW = Stage(
     "yaw",
@@ -86,27 +97,28 @@ YAW = Stage(
     resolutions=_COARSE,
     seconds=(6.0, 14.0),
     held_out=3,
-    checks=Fineness("standard", 0.01, 4, slack=1.0, crowd=1.25),
+    checks=_CHECKS,
     hardest=((0.25, -0.85), (0.96, 0.0), (0.24, 0.97), (0.0, 0.0)),
     hardest_yawed=((0.6, -0.05, -0.88), (0.99, -0.95, 0.83), (0.99, 0.56, 0.86)),
     growth=3.0,
     film_intervals=11,
 )
 STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
+_FINEST: dict[Tilt, Fineness] = {
+    "level": Fineness("standard", 0.002),
+    "pitched": Fineness("standard", 0.01),
+    "yawed": Fineness("standard", 0.01),
+}
 FINE = Stage(
     "fine",
     up=(0.0, 0.28, 0.55, 0.78, 0.92, 1.0),
     down=(0.0, 0.28, 0.55, 0.8, 1.0),
     upper=(0.55, 0.78, 1.0),
     phases=((0.0, 9), (1.0, 5)),
-    resolutions={
-        (near, level): Fineness("standard", 0.002 if level else 0.01)
-        for near in (True, False)
-        for level in (True, False)
-    },
+    resolutions={(near, tilt): fineness for near in (True, False) for tilt, fineness in _FINEST.items()},
     seconds=(10.0, 17.0),
     held_out=6,
-    checks=Fineness("standard", 0.01),
+    checks=dict.fromkeys(_FINEST, _FINEST["yawed"]),
     accuracy=1.0,
 )
 STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW, FINE)}
@@ -119,6 +131,10 @@ def stage_of(name: str) -> StageName:
         if name == known:
             return known
     raise InputError(f"stage = {name[:40]!r}{did_you_mean(name[:40], STAGES)}; allowed: {', '.join(STAGES)}")
+
+
+def _tilt_of(seat: Seat) -> Tilt:
+    return "level" if seat.level else "yawed" if seat.yaw else "pitched"
 
 
 RESPONSES = {

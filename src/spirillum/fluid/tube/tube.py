@@ -47,6 +47,8 @@ _COARSER = 10.0
 """Tolerance of the resolution that gives the error estimate, over that of the result."""
 _COARSEST = 0.05
 """Coarsest tolerance of Fourier modes."""
+_ORDERS = ((5e-3, 4), (5e-4, 6), (0.0, 8))
+"""Gauss nodes of a panel from which tolerance on: they change the speed by less than the tolerance does."""
 _MOST_FINE_STATIONS = 300
 """Along a tail with `high` wires, whose equations then cost as much as the solids'."""
 _MOST_WAVES = 1_000_000
@@ -230,7 +232,8 @@ class Tube(SwimmerModel):
     def fineness(self, batch: RobotBatch, index: int = 0) -> Fineness:
         """Resolution of the flow around robot number `index`."""
         tolerance = min(_CUT * self._coarser * batch.options.tube.tolerance, _COARSEST)
-        return Fineness(self._wire_of(batch, index), tolerance)
+        order = next(order for coarsest, order in _ORDERS if tolerance >= coarsest)
+        return Fineness(self._wire_of(batch, index), tolerance, order)
 
     def _wire_of(self, batch: RobotBatch, index: int) -> Accuracy:
         stated = batch.options.slender.accuracy

@@ -22,8 +22,9 @@ from spirillum.arrays import Samples
 
 _DECAY = 2.5
 """Decay rate of a force's flow along the tube, times the radius: images in the sum over k are beyond it."""
-_LOWEST, _NEGLIGIBLE = 1e-3, 1e-12
-"""First node in k over the step, and the least k to which the integral below it is extrapolated."""
+_LOWEST, _MOST_LOWEST, _NEGLIGIBLE = 1e-5, 1e-3, 1e-12
+"""First node in k over the step, a tenth of the tolerance between these, and the least k to which the integral below it
+is extrapolated."""
 CROWD = 1.5
 """Where nodes in k begin to crowd towards 0, over the step."""
 _BANDS = (0.35, 0.65)
@@ -104,19 +105,20 @@ def waves_between(
     """
     steepest = -np.log(tolerance) / (2.0 * distance)
     step = 2.0 * np.pi / (reach - np.log(tolerance) / _DECAY * radius)
-    k, weight = _nodes(step, crowd * step, steepest)
+    lowest = float(np.clip(0.1 * tolerance, _LOWEST, _MOST_LOWEST))
+    k, weight = _nodes(step, crowd * step, lowest, steepest)
     around = radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))
     orders = tuple(int(p) for p in np.ceil(around) + 3.0)
     return WallWaves(radius, k, 2.0 / np.pi * weight, orders, -np.log(tolerance), slack)
 
 
-def _nodes(step: float, crowd: float, steepest: float) -> tuple[Samples, Samples]:
+def _nodes(step: float, crowd: float, lowest: float, steepest: float) -> tuple[Samples, Samples]:
     """Nodes in k and weights, 1/m, of the trapezoidal rule in t, k = c log(1 + exp(t/c)), and of what is below it.
 
     Even steps in t come exponentially close to k = 0, even where k > c. Below the first node the integrand is
     extrapolated linearly in log k from the first two.
     """
-    first, least = (int(np.ceil(crowd / step * np.log(share))) for share in (_LOWEST, _NEGLIGIBLE))
+    first, least = (int(np.ceil(crowd / step * np.log(share))) for share in (lowest, _NEGLIGIBLE))
     t = step * np.arange(least, np.ceil(steepest / step) + 1.0)
     k = crowd * np.logaddexp(0.0, t / crowd)
     weight = step / (1.0 + np.exp(-t / crowd))
