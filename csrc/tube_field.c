@@ -8,27 +8,6 @@
 
 static const double TAPER = 0.4; /* part of the waves over which they are faded out */
 
-/* exp(-z) I_0(z), by its power series, and for large z by the asymptotic one (DLMF 10.25.2, 10.40.1). */
-static void scaled_i0(const double z[LANES], double value[LANES]) {
-    double total[LANES], term[LANES], open = 1.0;
-    EACH_LANE total[l] = term[l] = 1.0;
-    for (int n = 1; n < 60 && open > 0.0; n++) {
-        const double odd = (2.0 * n - 1.0) * (2.0 * n - 1.0);
-        open = 0.0;
-        EACH_LANE {
-            const bool is_small = z[l] < 15.0;
-            const double half = 0.5 * z[l] / n, factor = is_small ? half * half : odd / (8.0 * n * z[l]);
-            term[l] *= factor;
-            total[l] += term[l];
-            term[l] = term[l] < 1e-17 * total[l] || (!is_small && factor > 1.0) ? 0.0 : term[l];
-        }
-        for (int l = 0; l < LANES; l++) open += term[l];
-    }
-    for (int l = 0; l < LANES; l++) {
-        value[l] = z[l] < 15.0 ? total[l] * exp(-z[l]) : total[l] / sqrt(2.0 * PI * z[l]);
-    }
-}
-
 /* Number of orders up to which waves are no steeper than `steepest`; none if k is. */
 static int64_t count_orders(double k, double radius, double steepest, int64_t orders) {
     if (k > steepest) return 0;
@@ -49,17 +28,20 @@ typedef struct {
     double cos[LANES], sin[LANES]; /* of p theta */
 } Waves;
 
-/* Order 0; `top` is exp(-k R) I_0(k R). */
-static Waves waves_at(const Places *at, double k, double radius, double top) {
+static Waves waves_at(const Places *at, double k, double radius) {
     Waves w = {.k = k, .wall = k * radius};
     EACH_LANE {
         w.z[l] = larger(k * at->rho[l], 1e-12 * w.wall);
         w.cos[l] = 1.0;
         w.sin[l] = 0.0;
     }
-    scaled_i0(w.z, w.scale);
-    for (int l = 0; l < LANES; l++) w.scale[l] *= exp(w.z[l] - w.wall) / top;
     return w;
+}
+
+/* Begin with order 0, and fill the ratios I_{p+1}/I_p; `top` is exp(-k R) I_0(k R). */
+static void start_orders(Waves *w, double top, int64_t orders, double (*r)[LANES]) {
+    fill_bessel_ratios(w->z, orders + 2, r, w->scale);
+    EACH_LANE w->scale[l] *= exp(w->z[l] - w->wall) / top;
 }
 
 /* From order p to the next, with I_{p+1}/I_p there and at the wall. */
@@ -115,7 +97,7 @@ static void add_columns(const Places *at, const Sums *sums, Waves w, const WallF
                         double *amplitudes) {
     const int64_t orders = largest_count(at);
     double r[orders + 2][LANES], v[9][LANES], real[LANES], imaginary[LANES];
-    fill_bessel_ratios(w.z, orders + 2, r);
+    start_orders(&w, flows[0].scaled, orders, r);
     for (int64_t p = 0; p < orders; p++) {
         fill_flows(p, w.z, w.wall, r, v);
         for (int odd = 0; odd < 2; odd++) {
@@ -181,10 +163,8 @@ EXPORT void wave_amplitudes(const double *wave_k, const double *weights, const i
     for (int64_t i = 0; i < waves; i++, amplitudes += 12 * most, steps += most) {
         const double k = wave_k[i], wall = k * radius;
         WallFlows flows[counts[i]];
-        double layers[9 * counts[i]], walls[LANES], top[LANES];
+        double layers[9 * counts[i]];
         fill_wall_flows(wall, counts[i], flows);
-        EACH_LANE walls[l] = wall;
-        scaled_i0(walls, top);
         for (int64_t c = 0; c < columns;) {
             Places at = {.counts = {0}};
             Sums sums = {{{0.0}}, {{0.0}}};
@@ -197,7 +177,7 @@ EXPORT void wave_amplitudes(const double *wave_k, const double *weights, const i
                 at.sin[lane] = sin(angle[c]);
                 at.counts[lane++] = count_orders(k, radius, steepest[c], counts[i]);
             }
-            add_columns(&at, &sums, waves_at(&at, k, radius, top[0]), flows, most, amplitudes);
+            add_columns(&at, &sums, waves_at(&at, k, radius), flows, most, amplitudes);
         }
         for (int64_t p = 0; p < counts[i]; p++) steps[p] = flows[p].ratio;
         wall_layers(wall, bessel[i], layers, counts[i]);
@@ -219,11 +199,11 @@ typedef struct {
 } FieldPoints;
 
 /* Add cylindrical velocity and pressure of the waves of one k; see `add_waves`. */
-static void add_orders(const FieldPoints *f, Waves w, double radius, const double *steps, int64_t most,
+static void add_orders(const FieldPoints *f, Waves w, double top, double radius, const double *steps, int64_t most,
                        const double *amplitudes, double total[4][LANES]) {
     const int64_t orders = largest_count(&f->at);
     double r[orders + 2][LANES], v[9][LANES], here[LANES];
-    fill_bessel_ratios(w.z, orders + 2, r);
+    start_orders(&w, top, orders, r);
     for (int64_t p = 0; p < orders; p++) {
         /* the flows u = rho d(grad phi)/d rho + e_x d phi/dx carry a pressure, 2 mu k^2 phi */
         const double push[3] = {0.0, p ? -2.0 * w.k / w.wall : 0.0, p ? 2.0 * w.k : 2.0 * w.k / (w.wall * w.wall)};
@@ -258,10 +238,9 @@ EXPORT void add_waves(const double *points, const double *steepest, const double
                       int64_t waves, int64_t most) {
     double tops[waves];
     for (int64_t i = 0; i < waves; i++) {
-        double wall[LANES], top[LANES];
-        EACH_LANE wall[l] = wave_k[i] * radius;
-        scaled_i0(wall, top);
-        tops[i] = top[0];
+        WallFlows flows[1];
+        fill_wall_flows(wave_k[i] * radius, 1, flows);
+        tops[i] = flows[0].scaled;
     }
     for (int64_t first = 0; first < n; first += LANES) {
         const int some = (int)(n - first < LANES ? n - first : LANES);
@@ -284,7 +263,7 @@ EXPORT void add_waves(const double *points, const double *steepest, const double
                 f.imaginary[l] = sin(k * f.x[l]);
             }
             if (largest_count(&f.at) == 0) continue;
-            add_orders(&f, waves_at(&f.at, k, radius, tops[i]), radius, steps + i * most, most,
+            add_orders(&f, waves_at(&f.at, k, radius), tops[i], radius, steps + i * most, most,
                        amplitudes + i * 12 * most, total);
         }
         for (int l = 0; l < some; l++) {

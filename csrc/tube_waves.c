@@ -13,18 +13,23 @@
 
 #include <string.h>
 
-/* By backward recurrence (DLMF 10.29, 10.74(v)), which forgets where it starts in orders above z only. */
-void fill_bessel_ratios(const double z[LANES], int64_t count, double (*r)[LANES]) {
-    double ratio[LANES], largest = 0.0;
+/* By backward recurrence (DLMF 10.29, 10.74(v)), which forgets where it starts in orders above z only; the sum of all
+ * I_n is exp(z) (DLMF 10.35.5). */
+void fill_bessel_ratios(const double z[LANES], int64_t count, double (*r)[LANES], double scaled[LANES]) {
+    double ratio[LANES], sum[LANES] = {0.0}, largest = 0.0;
     for (int l = 0; l < LANES; l++) largest = larger(largest, z[l]);
-    const int64_t steep = (int64_t)largest, last = (count > steep ? count : steep) + 40;
+    const int64_t steep = (int64_t)largest, last = (count > steep ? count : steep) + 20;
     const double from = (double)last + 1.0;
     EACH_LANE ratio[l] = z[l] / (from + sqrt(from * from + z[l] * z[l]));
     for (int64_t n = last - 1; n >= 0; n--) {
         const double twice = 2.0 * ((double)n + 1.0);
-        EACH_LANE ratio[l] = z[l] / (twice + z[l] * ratio[l]);
+        EACH_LANE {
+            ratio[l] = z[l] / (twice + z[l] * ratio[l]);
+            sum[l] = ratio[l] * (1.0 + sum[l]);
+        }
         if (n < count) EACH_LANE r[n][l] = ratio[l];
     }
+    EACH_LANE scaled[l] = 1.0 / (1.0 + 2.0 * sum[l]);
 }
 
 void fill_flows(int64_t p, const double z[LANES], double wall, double (*r)[LANES], double v[9][LANES]) {
@@ -67,51 +72,64 @@ static void invert(const double a[9], double inverse[9]) {
 }
 
 void fill_wall_flows(double wall, int64_t orders, WallFlows *flows) {
-    double z[LANES], r[orders + 2][LANES], v[9][LANES], matrix[9];
+    double z[LANES], scaled[LANES], r[orders + 2][LANES], v[9][LANES], matrix[9];
     EACH_LANE z[l] = wall;
-    fill_bessel_ratios(z, orders + 2, r);
+    fill_bessel_ratios(z, orders + 2, r, scaled);
     for (int64_t p = 0; p < orders; p++) {
         fill_flows(p, z, wall, r, v);
         for (int e = 0; e < 9; e++) matrix[e] = v[e][0];
         invert(matrix, flows[p].inverse);
         flows[p].ratio = r[p][0];
+        flows[p].scaled = scaled[0];
+    }
+}
+
+/* Waves of one k in a tube: k R, and the flows of orders first <= p < end on the wall. */
+typedef struct {
+    double k, wall;
+    int64_t first, end;
+    const WallFlows *flows;
+} Waves;
+
+/* Fill the velocities (X, u_rho, v) at points for unit velocities on the wall, (orders, 3, 3) each. */
+static void fill_extensions(Waves waves, const double rho[LANES], double (*out)[9 * (waves.end - waves.first)]) {
+    const double wall = waves.wall;
+    double z[LANES], size[LANES], r[waves.end + 2][LANES], v[9][LANES], u[9][LANES];
+    EACH_LANE z[l] = larger(waves.k * rho[l], 1e-12 * wall);
+    fill_bessel_ratios(z, waves.end + 2, r, size);
+    EACH_LANE size[l] *= exp(z[l] - wall) / waves.flows[0].scaled; /* I_p(z)/I_p(k R), first of p = 0 */
+    for (int64_t p = 0; p < waves.end; p++) {
+        if (p >= waves.first) {
+            const double *w = waves.flows[p].inverse;
+            fill_flows(p, z, wall, r, v);
+            for (int i = 0; i < 9; i += 3) {
+                for (int j = 0; j < 3; j++) {
+                    EACH_LANE u[i + j][l]
+                        = size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
+                }
+            }
+            for (int l = 0; l < LANES; l++) {
+                for (int e = 0; e < 9; e++) out[l][(p - waves.first) * 9 + e] = u[e][l];
+            }
+        }
+        EACH_LANE size[l] *= r[p][l] / waves.flows[p].ratio;
     }
 }
 
 /* Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3).
  *
- * scale: I_0(k rho)/I_0(k radius); first: the first order p. */
-EXPORT void wave_extensions(double k, double radius, const double *rho, const double *scale, int64_t first, double *out,
-                            int64_t n, int64_t orders) {
-    const int64_t end = first + orders;
-    const double wall = k * radius;
-    WallFlows flows[end];
-    double z[LANES], size[LANES], r[end + 2][LANES], v[9][LANES], u[9][LANES];
-    fill_wall_flows(wall, end, flows);
+ * first: the first order p. */
+EXPORT void wave_extensions(double k, double radius, const double *rho, int64_t first, double *out, int64_t n,
+                            int64_t orders) {
+    WallFlows flows[first + orders];
+    const Waves waves = {k, k * radius, first, first + orders, flows};
+    double lanes[LANES], found[LANES][9 * orders];
+    fill_wall_flows(waves.wall, waves.end, flows);
     for (int64_t at = 0; at < n; at += LANES) {
         const int some = (int)(n - at < LANES ? n - at : LANES);
-        EACH_LANE {
-            const int64_t i = at + (l < some ? l : some - 1);
-            z[l] = larger(k * rho[i], 1e-12 * wall);
-            size[l] = scale[i];
-        }
-        fill_bessel_ratios(z, end + 2, r);
-        for (int64_t p = 0; p < end; p++) {
-            if (p >= first) {
-                const double *w = flows[p].inverse;
-                fill_flows(p, z, wall, r, v);
-                for (int i = 0; i < 9; i += 3) {
-                    for (int j = 0; j < 3; j++) {
-                        EACH_LANE u[i + j][l]
-                            = size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
-                    }
-                }
-                for (int l = 0; l < some; l++) {
-                    for (int e = 0; e < 9; e++) out[((at + l) * orders + p - first) * 9 + e] = u[e][l];
-                }
-            }
-            EACH_LANE size[l] *= r[p][l] / flows[p].ratio;
-        }
+        EACH_LANE lanes[l] = rho[at + (l < some ? l : some - 1)];
+        fill_extensions(waves, lanes, found);
+        memcpy(out + at * 9 * orders, found, (size_t)some * sizeof found[0]);
     }
 }
 
@@ -126,9 +144,9 @@ static double product(int64_t i, int64_t j, const double *w, double (*r)[LANES],
  *
  * In units of 4 pi R/(8 pi mu), symmetric, (orders, 3, 3); first: K_1(z)/K_0(z). */
 EXPORT void wall_layers(double z, double first, double *layers, int64_t orders) {
-    double r[orders + 3][LANES], q[orders + 3], w[orders + 3], lanes[LANES];
+    double r[orders + 3][LANES], q[orders + 3], w[orders + 3], lanes[LANES], scaled[LANES];
     EACH_LANE lanes[l] = z;
-    fill_bessel_ratios(lanes, orders + 3, r);
+    fill_bessel_ratios(lanes, orders + 3, r, scaled);
     q[0] = first;
     for (int64_t n = 1; n < orders + 3; n++) q[n] = 2.0 * (double)n / z + 1.0 / q[n - 1];
     for (int64_t n = 0; n < orders + 3; n++) w[n] = 1.0 / (z * (r[n][0] + q[n]));
@@ -157,17 +175,39 @@ typedef struct {
 
 static Angle angle_of(double radians) { return (Angle){cos(radians), sin(radians)}; }
 
-/* Fill the extensions X, u_rho, v and cos, sin of p theta, for orders from that one on of which p theta is `turned`. */
-static void fill_point(const double *restrict extensions, Angle theta, Angle turned, int64_t orders,
-                       double rows[restrict POINT_ROWS][3 * orders]) {
-    for (int64_t p = 0; p < orders; p++) {
+static Angle sum_of(Angle a, Angle b) { return (Angle){a.cos * b.cos - a.sin * b.sin, a.sin * b.cos + a.cos * b.sin}; }
+
+/* A few points (x, y, z), of which the last one stands in all lanes that are free. */
+typedef struct {
+    int some;
+    double x[LANES], rho[LANES];
+    Angle theta[LANES];
+} Points;
+
+static Points points_at(const double *points, int64_t at, int64_t n) {
+    Points found = {.some = (int)(n - at < LANES ? n - at : LANES)};
+    for (int l = 0; l < LANES; l++) {
+        const double *point = points + 3 * (at + (l < found.some ? l : found.some - 1));
+        const double rho = hypot(point[1], point[2]);
+        found.x[l] = point[0];
+        found.rho[l] = rho;
+        found.theta[l] = rho > 0.0 ? (Angle){point[1] / rho, point[2] / rho} : (Angle){1.0, 0.0};
+    }
+    return found;
+}
+
+/* Fill the extensions X, u_rho, v and cos, sin of p theta. */
+static void fill_point(Waves waves, const double *restrict extensions, Angle theta,
+                       double rows[restrict POINT_ROWS][3 * (waves.end - waves.first)]) {
+    Angle turned = {1.0, 0.0};
+    if (waves.first) turned = angle_of((double)waves.first * atan2(theta.sin, theta.cos));
+    for (int64_t p = 0; p < waves.end - waves.first; p++) {
         for (int64_t w = 0; w < 3; w++) {
             for (int e = X; e <= V; e++) rows[e][3 * p + w] = extensions[9 * p + 3 * e + w];
             rows[COS][3 * p + w] = turned.cos;
             rows[SIN][3 * p + w] = turned.sin;
         }
-        const double next = turned.cos * theta.cos - turned.sin * theta.sin;
-        turned = (Angle){next, turned.sin * theta.cos + turned.cos * theta.sin};
+        turned = sum_of(turned, theta);
     }
 }
 
@@ -185,42 +225,112 @@ static void fill_wave(int64_t size, double rows[POINT_ROWS][size], bool is_odd, 
     }
 }
 
-/* Velocities (x, rho, theta) of waves in cylindrical components about a second, parallel axis.
+/* Velocities (x, rho, theta) of waves around a cylinder, in cylindrical components about its own, parallel axis.
  *
- * angle: polar angles of the points about the tube's axis; turn: those less the angles about the second axis;
+ * reference: its radius; offset: of its axis below the tube's; theta: angles about it.
  * out: even, odd; component; point; order; wall component. */
-EXPORT void circle_waves(const double *extensions, const double *angle, const double *turn, double *out, int64_t n,
-                         int64_t orders) {
+EXPORT void circle_waves(double k, double radius, double reference, double offset, const double *theta, double *out,
+                         int64_t n, int64_t orders) {
     const int64_t size = 3 * orders;
-    double rows[POINT_ROWS][size], wave[3][size];
+    WallFlows flows[orders];
+    const Waves waves = {k, k * radius, 0, orders, flows};
+    double places[n][3], extensions[LANES][9 * orders], rows[POINT_ROWS][size], wave[3][size];
+    fill_wall_flows(waves.wall, orders, flows);
     for (int64_t i = 0; i < n; i++) {
-        const Angle theta = angle_of(angle[i]), about = angle_of(turn[i]);
-        fill_point(extensions + 9 * orders * i, theta, (Angle){1.0, 0.0}, orders, rows);
-        for (int odd = 0; odd < 2; odd++) {
-            fill_wave(size, rows, odd, about, wave);
-            for (int c = 0; c < 3; c++) memcpy(out + ((3 * odd + c) * n + i) * size, wave[c], sizeof wave[c]);
+        places[i][0] = 0.0;
+        places[i][1] = reference * cos(theta[i]) - offset;
+        places[i][2] = reference * sin(theta[i]);
+    }
+    for (int64_t at = 0; at < n; at += LANES) {
+        const Points points = points_at(&places[0][0], at, n);
+        fill_extensions(waves, points.rho, extensions);
+        for (int l = 0; l < points.some; l++) {
+            const Angle turn = sum_of(points.theta[l], angle_of(-theta[at + l]));
+            fill_point(waves, extensions[l], points.theta[l], rows);
+            for (int odd = 0; odd < 2; odd++) {
+                fill_wave(size, rows, odd, turn, wave);
+                for (int c = 0; c < 3; c++) {
+                    memcpy(out + ((3 * odd + c) * n + at + l) * size, wave[c], sizeof wave[c]);
+                }
+            }
         }
     }
 }
 
-/* Velocities (x, y, z) of waves at points; phase: k x there.
+enum { PARTS = 12 }; /* component; even, odd; real, imaginary part */
+
+/* Fill the velocities of waves along three axes at each of a few points, (lanes, PARTS, orders, wall component).
+ *
+ * axes: at each point, by rows (x, y, z). */
+static void fill_velocities(Waves waves, const Points *points, double axes[3][3][LANES],
+                            double (*out)[PARTS][3 * (waves.end - waves.first)]) {
+    const int64_t size = 3 * (waves.end - waves.first);
+    double cos_p[LANES], sin_p[LANES], real[LANES], imaginary[LANES], radial[3][LANES], around[3][LANES];
+    double values[PARTS][LANES];
+    double extensions[LANES][3 * size];
+    fill_extensions(waves, points->rho, extensions);
+    for (int l = 0; l < LANES; l++) {
+        const Angle theta = points->theta[l], along = angle_of(waves.k * points->x[l]);
+        Angle turned = {1.0, 0.0};
+        if (waves.first) turned = angle_of((double)waves.first * atan2(theta.sin, theta.cos));
+        cos_p[l] = turned.cos, sin_p[l] = turned.sin;
+        real[l] = along.cos, imaginary[l] = along.sin;
+        for (int c = 0; c < 3; c++) {
+            radial[c][l] = axes[c][1][l] * theta.cos + axes[c][2][l] * theta.sin;
+            around[c][l] = axes[c][2][l] * theta.cos - axes[c][1][l] * theta.sin;
+        }
+    }
+    for (int64_t e = 0; e < size; e++) {
+        const int64_t at = 9 * (e / 3) + e % 3;
+        double x[LANES], rho[LANES], v[LANES];
+        for (int l = 0; l < LANES; l++) {
+            x[l] = extensions[l][at];
+            rho[l] = extensions[l][at + 3];
+            v[l] = extensions[l][at + 6];
+        }
+        for (int odd = 0; odd < 2; odd++) { /* X and u_rho go as cos(p theta) or -sin(p theta), u_x comes times i */
+            const double *like = odd ? sin_p : cos_p, *other = odd ? cos_p : sin_p, sign = odd ? -1.0 : 1.0;
+            for (int c = 0; c < 3; c++) {
+                double *re = values[4 * c + 2 * odd], *im = values[4 * c + 2 * odd + 1];
+                EACH_LANE {
+                    const double along = axes[c][0][l] * x[l] * (sign * like[l]);
+                    const double across = radial[c][l] * rho[l] * (sign * like[l]) - around[c][l] * v[l] * other[l];
+                    re[l] = across * real[l] - along * imaginary[l];
+                    im[l] = across * imaginary[l] + along * real[l];
+                }
+            }
+        }
+        for (int l = 0; l < LANES; l++) {
+            for (int i = 0; i < PARTS; i++) out[l][i][e] = values[i][l];
+        }
+        if (e % 3 == 2) {
+            EACH_LANE {
+                const double next = cos_p[l] * points->theta[l].cos - sin_p[l] * points->theta[l].sin;
+                sin_p[l] = sin_p[l] * points->theta[l].cos + cos_p[l] * points->theta[l].sin;
+                cos_p[l] = next;
+            }
+        }
+    }
+}
+
+/* Velocities (x, y, z) of waves at points.
  *
  * out: point; component; real, imaginary part; even, odd; order from the first one; wall component. */
-EXPORT void station_waves(const double *extensions, const double *angle, const double *phase, int64_t first,
-                          double *out, int64_t n, int64_t orders) {
+EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
+                        int64_t orders) {
     const int64_t size = 3 * orders;
-    double rows[POINT_ROWS][size], wave[3][size];
-    for (int64_t i = 0; i < n; i++) {
-        const Angle theta = angle_of(angle[i]), along = angle_of(phase[i]);
-        fill_point(extensions + 9 * orders * i, theta, angle_of((double)first * angle[i]), orders, rows);
-        for (int odd = 0; odd < 2; odd++) {
-            fill_wave(size, rows, odd, theta, wave);
+    WallFlows flows[first + orders];
+    const Waves waves = {k, k * radius, first, first + orders, flows};
+    double found[LANES][PARTS][size], axes[3][3][LANES] = {{{0.0}}};
+    for (int c = 0; c < 3; c++) EACH_LANE axes[c][c][l] = 1.0;
+    fill_wall_flows(waves.wall, waves.end, flows);
+    for (int64_t at = 0; at < n; at += LANES) {
+        const Points points = points_at(places, at, n);
+        fill_velocities(waves, &points, axes, found);
+        for (int l = 0; l < points.some; l++) {
             for (int c = 0; c < 3; c++) {
-                double *restrict parts = out + ((3 * i + c) * 4 + odd) * size;
-                const double a = c ? along.cos : -along.sin, b = c ? along.sin : along.cos;
-                for (int64_t e = 0; e < size; e++) {
-                    parts[e] = wave[c][e] * a;
-                    parts[2 * size + e] = wave[c][e] * b;
+                for (int part = 0; part < 4; part++, out += size) {
+                    memcpy(out, found[l][4 * c + 2 * (part % 2) + part / 2], (size_t)size * sizeof *out);
                 }
             }
         }
@@ -228,42 +338,34 @@ EXPORT void station_waves(const double *extensions, const double *angle, const d
 }
 
 /* Unit vectors along x, rho and theta of a tilted axis, in the tube's; by rows. */
-static void fill_axes(const double *rotation, Angle theta, double axes[3][3]) {
+static void fill_axes(const double *rotation, Angle theta, int lane, double axes[3][3][LANES]) {
     for (int i = 0; i < 3; i++) {
         const double x = rotation[3 * i], y = rotation[3 * i + 1], z = rotation[3 * i + 2];
-        axes[0][i] = x;
-        axes[1][i] = y * theta.cos + z * theta.sin;
-        axes[2][i] = z * theta.cos - y * theta.sin;
-    }
-}
-
-/* One component of a wave, times its real and imaginary phase: (2, size). */
-static void fill_parts(int64_t size, double wave[3][size], const double axis[3], Angle phase,
-                       double parts[restrict 2][size]) {
-    for (int64_t e = 0; e < size; e++) {
-        const double along = axis[0] * wave[0][e], across = axis[1] * wave[1][e] + axis[2] * wave[2][e];
-        parts[0][e] = across * phase.cos - along * phase.sin;
-        parts[1][e] = across * phase.sin + along * phase.cos;
+        axes[0][i][lane] = x;
+        axes[1][i][lane] = y * theta.cos + z * theta.sin;
+        axes[2][i][lane] = z * theta.cos - y * theta.sin;
     }
 }
 
 /* To one of both arrays, the other one is NULL. */
-static void fill_tilted(const double *extensions, const double *angle, const double *phase, const double *around,
-                        const double *rotation, int64_t first, double *out, float *single, int64_t angles, int64_t n,
-                        int64_t orders) {
+static void fill_rings(double k, double radius, const double *places, const double *around, const double *rotation,
+                       int64_t first, double *out, float *single, int64_t angles, int64_t n, int64_t orders) {
     const int64_t size = 3 * orders;
-    double rows[POINT_ROWS][size], wave[3][size], parts[2][size], axes[3][3];
-    const double *values = &parts[0][0];
-    for (int64_t i = 0; i < angles * n; i++) {
-        const Angle theta = angle_of(angle[i]), along = angle_of(phase[i]);
-        if (i % n == 0) fill_axes(rotation, angle_of(around[i / n]), axes);
-        fill_point(extensions + 9 * orders * i, theta, angle_of((double)first * angle[i]), orders, rows);
-        for (int odd = 0; odd < 2; odd++) {
-            fill_wave(size, rows, odd, theta, wave);
-            for (int c = 0; c < 3; c++) {
-                const int64_t place = ((2 * c + odd) * angles * n + i) * 2 * size;
-                fill_parts(size, wave, axes[c], along, parts);
-                if (out) memcpy(out + place, parts, sizeof parts);
+    WallFlows flows[first + orders];
+    const Waves waves = {k, k * radius, first, first + orders, flows};
+    double found[LANES][PARTS][size], axes[3][3][LANES];
+    fill_wall_flows(waves.wall, waves.end, flows);
+    for (int64_t at = 0; at < angles * n; at += LANES) {
+        const Points points = points_at(places, at, angles * n);
+        for (int l = 0; l < LANES; l++) {
+            fill_axes(rotation, angle_of(around[(at + (l < points.some ? l : 0)) / n]), l, axes);
+        }
+        fill_velocities(waves, &points, axes, found);
+        for (int l = 0; l < points.some; l++) {
+            for (int block = 0; block < 6; block++) {
+                const int64_t place = (block * angles * n + at + l) * 2 * size;
+                const double *values = found[l][2 * block];
+                if (out) memcpy(out + place, values, (size_t)(2 * size) * sizeof *values);
                 for (int64_t e = 0; single && e < 2 * size; e++) single[place + e] = (float)values[e];
             }
         }
@@ -272,18 +374,28 @@ static void fill_tilted(const double *extensions, const double *angle, const dou
 
 /* Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
  *
- * extensions: (angles, n, orders, 3, 3); angle, phase: polar angles about the tube's axis and k x, (angles, n);
- * theta: angles about the rings' axis; rotation: from the rings' axes to the tube's.
+ * places: on the rings, about the tube's axis, (angles, n, 3); theta: angles about the rings' axis; rotation: from the
+ * rings' axes to the tube's.
  * out: component; even, odd; angle; ring; real, imaginary part; order from the first one; wall component. */
-EXPORT void tilted_waves(const double *extensions, const double *angle, const double *phase, const double *theta,
-                         const double *rotation, int64_t first, double *out, int64_t angles, int64_t n,
-                         int64_t orders) {
-    fill_tilted(extensions, angle, phase, theta, rotation, first, out, NULL, angles, n, orders);
+EXPORT void ring_waves(double k, double radius, const double *places, const double *theta, const double *rotation,
+                       int64_t first, double *out, int64_t angles, int64_t n, int64_t orders) {
+    fill_rings(k, radius, places, theta, rotation, first, out, NULL, angles, n, orders);
 }
 
 /* The same in single precision. */
-EXPORT void single_tilted_waves(const double *extensions, const double *angle, const double *phase, const double *theta,
-                                const double *rotation, int64_t first, float *out, int64_t angles, int64_t n,
-                                int64_t orders) {
-    fill_tilted(extensions, angle, phase, theta, rotation, first, NULL, out, angles, n, orders);
+EXPORT void single_ring_waves(double k, double radius, const double *places, const double *theta,
+                              const double *rotation, int64_t first, float *out, int64_t angles, int64_t n,
+                              int64_t orders) {
+    fill_rings(k, radius, places, theta, rotation, first, NULL, out, angles, n, orders);
+}
+
+/* Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix.
+ *
+ * Both are in column-major order: columns (m, n) and (size, size). */
+EXPORT void subtract_block(const double *block, const int64_t *columns, const int64_t *rows, const double *scale,
+                           double *matrix, int64_t m, int64_t n, int64_t size) {
+    for (int64_t j = 0; j < m; j++, block += n) {
+        double *restrict column = matrix + columns[j] * size;
+        for (int64_t i = 0; i < n; i++) column[rows[i]] -= scale[columns[j]] * block[i];
+    }
 }

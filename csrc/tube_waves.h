@@ -5,13 +5,13 @@
 #include "core.h"
 #include "lanes.h"
 
-/* The flows of one order p at the wall: inverse of their velocities (3 x 3), and I_{p+1}/I_p. */
+/* The flows of one order p at the wall: inverse of their velocities (3 x 3), I_{p+1}/I_p, and exp(-k R) I_0. */
 typedef struct {
-    double inverse[9], ratio;
+    double inverse[9], ratio, scaled;
 } WallFlows;
 
-/* r[n] = I_{n+1}(z)/I_n(z) for n < count. */
-void fill_bessel_ratios(const double z[LANES], int64_t count, double (*r)[LANES]);
+/* r[n] = I_{n+1}(z)/I_n(z) for n < count, and exp(-z) I_0(z). */
+void fill_bessel_ratios(const double z[LANES], int64_t count, double (*r)[LANES], double scaled[LANES]);
 
 /* Velocities (X, rho, v), rows, of three flows, columns, of order p >= 0 at k rho = z, in units of I_p(z).
  * The columns are scaled by `wall` = k R; r are ratios of Bessel functions at z. */

@@ -11,10 +11,11 @@ from scipy.special import ive, k0e, k1e
 
 from spirillum.kernels.stokes_flow import (
     circle_waves,
+    point_waves,
     ring_blocks,
-    single_tilted_waves,
-    station_waves,
-    tilted_waves,
+    ring_waves,
+    single_ring_waves,
+    subtract_block,
     wall_layers,
     wave_extensions,
 )
@@ -25,9 +26,8 @@ WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
 
 def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0, first: int = 0) -> np.ndarray:
     rho = np.asarray(rho, dtype=float)
-    scale = ive(0, k * rho) / ive(0, k * radius) * np.exp(k * (rho - radius))
     out = np.empty((rho.size, orders - first, 3, 3))
-    wave_extensions(k, radius, rho, scale, first, out)
+    wave_extensions(k, radius, rho, first, out)
     return out
 
 
@@ -173,16 +173,16 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     k, orders, rng = 1.3, 4, np.random.default_rng(2)
     theta, rho, x = rng.uniform(-np.pi, np.pi, 6), rng.uniform(0.05, 0.5, 6), rng.uniform(-2, 2, 6)
     y, z = rho * np.cos(theta) - 0.4, rho * np.sin(theta)
-    distance, angle = np.hypot(y, z), np.arctan2(z, y)
-    values = extensions(k, distance, orders)
-    found = np.empty((6, 3, 2, 2, orders, 3))
-    station_waves(values, angle, k * x, 0, found)
-    some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
-    station_waves(extensions(k, distance, orders, first=2), angle, k * x, 2, some)
-    np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
-    circle = np.empty((2, 3, 6, orders, 3))
-    circle_waves(values, angle, angle - theta, circle)
     points = np.stack([x, y, z], axis=1)
+    found = np.empty((6, 3, 2, 2, orders, 3))
+    point_waves(k, 1.0, points, 0, found)
+    some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
+    point_waves(k, 1.0, points, 2, some)
+    np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
+    circle = np.empty((6, 2, 3, orders, 3))  # each point lies on a cylinder of its own
+    for own, radius, angle in zip(circle, rho, theta, strict=True):
+        circle_waves(k, 1.0, radius, 0.4, np.array([angle]), own[:, :, None])
+    circle = np.moveaxis(circle, 0, 2)
     for p in range(orders):
         there, back = wave(k, p, points), wave(k, p, points, turn=-1.0)
         for parity, both in enumerate((0.5 * (there + back), 0.5j * (there - back))):  # cos(p theta), -sin(p theta)
@@ -201,17 +201,37 @@ def test_waves_on_rings_about_a_tilted_axis() -> None:
     theta, rings = rng.uniform(-np.pi, np.pi, 4), 3
     rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     points = rng.uniform(-0.5, 0.5, (4, rings, 3))
-    x, y, z = np.moveaxis(points, -1, 0)
-    values, angle = extensions(k, np.hypot(y, z).ravel(), orders, first=first), np.arctan2(z, y)
     at_points = np.empty((4 * rings, 3, 2, 2, orders - first, 3))
-    station_waves(values, angle.ravel(), k * x.ravel(), first, at_points)
+    point_waves(k, 1.0, points.reshape(-1, 3), first, at_points)
     out = np.array([np.zeros(4), np.cos(theta), np.sin(theta)]), np.array([np.zeros(4), -np.sin(theta), np.cos(theta)])
     axes = rotation @ np.stack([np.tile([[1.0], [0.0], [0.0]], 4), *out])  # (component, xyz, angle)
     wanted = np.einsum("cxt,tnxrpow->cptnrow", axes, at_points.reshape(4, rings, 3, 2, 2, orders - first, 3))
     found = np.empty(wanted.shape)
-    arguments = values.reshape(4, rings, orders - first, 3, 3), angle, k * x, theta, rotation, first
-    tilted_waves(*arguments, found)
+    ring_waves(k, 1.0, points, theta, rotation, first, found)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-14 * np.abs(wanted).max())
     single = np.empty(wanted.shape, np.float32)
-    single_tilted_waves(*arguments, single)
+    single_ring_waves(k, 1.0, points, theta, rotation, first, single)
     np.testing.assert_array_equal(single, found.astype(np.float32))
+
+
+@pytest.mark.parametrize("z", [0.1, 0.7, 15.0, 300.0, 4000.0])
+def test_extensions_reach_from_the_axis_to_the_wall(z: float) -> None:
+    """u_x of the wave of order 0 that is 1 in x on the wall, from SciPy's scaled Bessel functions."""
+    rho = np.array([0.0, 0.3, 0.9, 1.0])
+    ends = extensions(z, rho, 1)[:, 0, 0, 0]
+    x, s = rho * z, ive(0, rho * z) * np.exp(z * (rho - 1.0))
+    a = np.array([[ive(0, z), z * ive(1, z) + 2.0 * ive(0, z)], [ive(1, z), z * ive(0, z)]])
+    first, second = np.linalg.solve(a, [1.0, 0.0])
+    wanted = first * s + second * (x * ive(1, x) * np.exp(z * (rho - 1.0)) + 2.0 * s)
+    np.testing.assert_allclose(ends, wanted, rtol=1e-9, atol=1e-300)
+
+
+def test_blocks_are_subtracted_from_their_rows_and_columns() -> None:
+    rng = np.random.default_rng(4)
+    matrix, block, scale = rng.normal(size=(7, 7)), rng.normal(size=(3, 2)), rng.normal(size=7)
+    rows, columns = np.array([0, 2, 5]), np.array([6, 1])
+    wanted = matrix.copy()
+    wanted[np.ix_(rows, columns)] -= block * scale[columns]
+    found = np.asfortranarray(matrix)
+    subtract_block(block.T, columns, rows, scale, found.T)
+    np.testing.assert_allclose(found, wanted, rtol=1e-15)

@@ -119,12 +119,7 @@ def layer_blocks(
 
 @native("out")
 def wave_extensions(
-    k: float,
-    radius: float,
-    rho: Float64[Array, " n"],
-    scale: Float64[Array, " n"],
-    first: int,
-    out: Float64[Array, "n orders 3 3"],
+    k: float, radius: float, rho: Float64[Array, " n"], first: int, out: Float64[Array, "n orders 3 3"]
 ) -> None:
     """Fill in the velocities (X, u_rho, v) at rho for unit velocities at the radius.
 
@@ -132,7 +127,6 @@ def wave_extensions(
         k: wave number, above 0.
         radius: of the cylinder on which the waves are one.
         rho: where.
-        scale: I_0(k rho)/I_0(k radius).
         first: the first order p.
         out: to be filled.
     """
@@ -151,45 +145,45 @@ def wall_layers(z: float, first: float, layers: Float64[Array, "orders 3 3"]) ->
 
 @native("out")
 def circle_waves(
-    extensions: Float64[Array, "n orders 3 3"],
-    angle: Float64[Array, " n"],
-    turn: Float64[Array, " n"],
+    k: float,
+    radius: float,
+    reference: float,
+    offset: float,
+    theta: Float64[Array, " n"],
     out: Float64[Array, "2 3 n orders 3"],
 ) -> None:
     """Velocities (x, rho, theta) of even and odd waves in cylindrical components about a second, parallel axis.
 
     Args:
-        extensions: at points.
-        angle: polar angles of the points about the tube's axis.
-        turn: those less the angles about the second axis.
+        k: wave number, above 0.
+        radius: of the tube.
+        reference: radius of the cylinder about the second axis.
+        offset: of the second axis below the tube's.
+        theta: angles about the second axis.
         out: to be filled: even, odd; component; point; order; wall component. u_x comes times i.
     """
 
 
 @native("out")
-def station_waves(
-    extensions: Float64[Array, "n orders 3 3"],
-    angle: Float64[Array, " n"],
-    phase: Float64[Array, " n"],
-    first: int,
-    out: Float64[Array, "n 3 2 2 orders 3"],
+def point_waves(
+    k: float, radius: float, places: Float64[Array, "n 3"], first: int, out: Float64[Array, "n 3 2 2 orders 3"]
 ) -> None:
     """Velocities (x, y, z) of waves at points.
 
     Args:
-        extensions: at points.
-        angle: polar angles of the points about the tube's axis.
-        phase: k x.
+        k: wave number, above 0.
+        radius: of the tube.
+        places: points about the tube's axis.
         first: the first order p.
         out: to be filled: point; component; real, imaginary part; even, odd; order; wall component.
     """
 
 
 @native("out")
-def tilted_waves(
-    extensions: Float64[Array, "angles n orders 3 3"],
-    angle: Float64[Array, "angles n"],
-    phase: Float64[Array, "angles n"],
+def ring_waves(
+    k: float,
+    radius: float,
+    places: Float64[Array, "angles n 3"],
     theta: Float64[Array, " angles"],
     rotation: Float64[Array, "3 3"],
     first: int,
@@ -198,9 +192,9 @@ def tilted_waves(
     """Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
 
     Args:
-        extensions: at the rings' points.
-        angle: polar angles of the points about the tube's axis.
-        phase: k x there.
+        k: wave number, above 0.
+        radius: of the tube.
+        places: points on the rings, about the tube's axis.
         theta: angles about the rings' axis.
         rotation: from the rings' axes to the tube's.
         first: the first order p.
@@ -209,16 +203,35 @@ def tilted_waves(
 
 
 @native("out")
-def single_tilted_waves(
-    extensions: Float64[Array, "angles n orders 3 3"],
-    angle: Float64[Array, "angles n"],
-    phase: Float64[Array, "angles n"],
+def single_ring_waves(
+    k: float,
+    radius: float,
+    places: Float64[Array, "angles n 3"],
     theta: Float64[Array, " angles"],
     rotation: Float64[Array, "3 3"],
     first: int,
     out: Float32[Array, "3 2 angles n 2 orders 3"],
 ) -> None:
-    """See `tilted_waves`; in single precision."""
+    """See `ring_waves`; in single precision."""
+
+
+@native("matrix")
+def subtract_block(
+    block: Float64[Array, "m n"],
+    columns: Int64[Array, " m"],
+    rows: Int64[Array, " n"],
+    scale: Float64[Array, " size"],
+    matrix: Float64[Array, "size size"],
+) -> None:
+    """Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix.
+
+    Args:
+        block: its columns, one after the other.
+        columns: of the matrix.
+        rows: of the matrix.
+        scale: number of each column of the matrix.
+        matrix: its columns, one after the other.
+    """
 
 
 @native("field", rows="n")

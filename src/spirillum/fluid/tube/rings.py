@@ -207,11 +207,8 @@ class LevelRings(Rings):
 
         orders = waves.orders[number]
         theta = midpoints(max(waves.orders), self.modes)
-        y, z = self.reference * np.cos(theta) - self.offset, self.reference * np.sin(theta)
-        angle = np.arctan2(z, y)
-        values = extensions(float(waves.k[number]), waves.radius, np.hypot(y, z), orders)
         waved = np.empty((2, 3, theta.size, orders, 3))
-        circle_waves(values, angle, angle - theta, waved)
+        circle_waves(float(waves.k[number]), waves.radius, self.reference, self.offset, theta, waved)
         found = []
         for parity, field in enumerate(waved):
             flat = field.reshape(3, theta.size, -1)

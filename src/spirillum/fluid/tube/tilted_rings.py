@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, System, finer, midpoints, projectors, sent_to_wall
-from spirillum.fluid.tube.wall import WallWaves, distances_of, each, extensions, times_layers
+from spirillum.fluid.tube.wall import WallWaves, distances_of, each, times_layers
 from spirillum.fluid.wire.sources import Panels
 from spirillum.robot.tube_pose import Seat
 
@@ -105,6 +105,8 @@ class TiltedRings(Rings):
 
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
+        from spirillum.kernels.stokes_flow import subtract_block
+
         tiers = self._tiers(systems)
         # What plain tiers and others do to each other is symmetric; the waves of averaged ones are averaged both ways.
         alike = [tier.averaged is tier.sample for tier in tiers]
@@ -145,9 +147,9 @@ class TiltedRings(Rings):
         duals = [np.concatenate([family.dual for family in system]) for system in systems]
         for (a, b, s), block in blocks.items():
             rows, columns = tiers[a].unknowns[s], tiers[b].unknowns[s]
-            matrices[s][np.ix_(rows, columns)] -= block * duals[s][columns]
+            subtract_block(block.T, columns, rows, duals[s], matrices[s].T)
             if a != b and (b, a, s) not in blocks:
-                matrices[s][np.ix_(columns, rows)] -= block.T * duals[s][rows]
+                subtract_block(block, rows, columns, duals[s], matrices[s].T)
 
     def sent(
         self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
@@ -269,12 +271,9 @@ class TiltedRings(Rings):
         Returns:
             component; even, odd; angle; ring; real, imaginary; order; wall component.
         """
-        from spirillum.kernels.stokes_flow import single_tilted_waves, tilted_waves
+        from spirillum.kernels.stokes_flow import ring_waves, single_ring_waves
 
-        shape, k = placed.shape[:2], float(waves.k[number])
-        x, y, z = np.moveaxis(placed, -1, 0)
-        values = extensions(k, waves.radius, np.hypot(y, z).ravel(), high, low)
-        out = np.empty((3, 2, *shape, 2, high - low, 3), precision)
-        fill = tilted_waves if precision is np.float64 else single_tilted_waves
-        fill(values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, low, out)
+        out = np.empty((3, 2, *placed.shape[:2], 2, high - low, 3), precision)
+        fill = ring_waves if precision is np.float64 else single_ring_waves
+        fill(float(waves.k[number]), waves.radius, placed, theta, self.seat.rotation, low, out)
         return out

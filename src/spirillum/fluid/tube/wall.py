@@ -155,13 +155,10 @@ def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 
         orders: the order after the last.
         first: the first order.
     """
-    from scipy.special import i0e
-
     from spirillum.kernels.stokes_flow import wave_extensions
 
-    scale = i0e(k * rho) / i0e(k * radius) * np.exp(k * (rho - radius))
     found = np.empty((rho.size, orders - first, 3, 3))
-    wave_extensions(k, radius, rho, scale, first, found)
+    wave_extensions(k, radius, rho, first, found)
     return found
 
 
@@ -199,12 +196,11 @@ def point_waves(points: Samples, waves: WallWaves, number: int, first: int = 0, 
         first: the first order.
         last: the order after the last; None: of all that are kept.
     """
-    from spirillum.kernels.stokes_flow import station_waves
+    from spirillum.kernels import stokes_flow
 
-    k, last = float(waves.k[number]), waves.orders[number] if last is None else last
-    values = extensions(k, waves.radius, np.hypot(points[:, 1], points[:, 2]), last, first)
+    last = waves.orders[number] if last is None else last
     out = np.empty((len(points), 3, 2, 2, last - first, 3))
-    station_waves(values, np.arctan2(points[:, 2], points[:, 1]), k * points[:, 0], first, out)
+    stokes_flow.point_waves(float(waves.k[number]), waves.radius, points, first, out)
     return out.reshape(3 * len(points), 2, 2, last - first, 3)
 
 
