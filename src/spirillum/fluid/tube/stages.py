@@ -103,7 +103,7 @@ YAW = Stage(
     growth=3.0,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", upper=(0.65, 1.0), seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
 _FINEST: dict[Tilt, Fineness] = {
     "level": Fineness("standard", 0.002),
     "pitched": Fineness("standard", 0.01),
