@@ -68,6 +68,11 @@ def percent(share: float) -> str:
     return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
 
 
+def times(ratio: float) -> str:
+    """A ratio as a multiple, with two significant digits and no exponent up to 1e5."""
+    return f"{ratio:.0f}x" if 10 <= abs(ratio) < 1e5 else f"{ratio:.2g}x"
+
+
 class DisplayMixin(ABC):
     """What every answer gives to `print` and to notebooks: its quantities with units, and its notes."""
 

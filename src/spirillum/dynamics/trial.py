@@ -56,6 +56,9 @@ ASSUMPTION = "contact assumed, not validated"
 """What a released motion rests on."""
 _POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth": "azimuth"}
 """The pose of an answer, and where a run has it."""
+_OF_ONE_POSE = ("hydrodynamic_efficiency", "propulsive_power", "overall_efficiency")
+"""Quantities that a trial does not have."""
+_MANY_POSES = "they follow from the body's drag at one pose, and a trial passes through many"
 _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
@@ -107,6 +110,7 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     values |= {name: float(run[of]) for name, of in exact.items() if of in run}
     notes = notes_in(run.attrs)
     basis = {
+        **{name: quantity(None, QUANTITIES[name].unit, reason=_MANY_POSES) for name in _OF_ONE_POSE},
         "assumption": ASSUMPTION,
         "state": "standing" if is_held(notes) else "swimming",
         "wait": quantity(float(run.attrs["wait"]), QUANTITIES["wait"].unit),
