@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from spirillum.notes import Note, notes_in_answer, notes_of, shown_cautions
 from spirillum.quantities import QUANTITIES
-from spirillum.units import among, in_unit
+from spirillum.units import among, in_unit, speed_unit
 
 
 class QuantityRow(NamedTuple):
@@ -46,6 +46,8 @@ def _is_quantity(item: Any) -> bool:
 def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]]) -> QuantityRow:
     unit = item["unit"]
     shown = among(item["value"], unit, [other["value"] for other in known.values() if other["unit"] == unit])
+    if unit == "m/s" and item["value"]:
+        shown = speed_unit(item["value"], known.get("tail_rotation_rate", {}).get("value"))
     value, low, high = ("" if item.get(key) is None else in_unit(item[key], unit, shown) for key in _ENDS)
     plain = "" if shown == "1" else shown
     si = "" if plain in ("", unit) else f"{item['value']:.6g} {unit}"

@@ -44,7 +44,7 @@ from spirillum.swimming.preparation import preparation_minutes, table_for, why_n
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
-from spirillum.units import KINDS, display_unit, parse_option, show
+from spirillum.units import KINDS, parse_option, show, speed_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -413,6 +413,9 @@ def quick_run(
     )
 
 
+_ANNOUNCED = ("forward_velocity", "tail_rotation_rate")
+
+
 @dataclass(frozen=True)
 class TrialRequest:
     """Arguments of `spirillum.predict` that decide the released motions of a robot."""
@@ -443,13 +446,13 @@ class TrialRequest:
             return held
         if reason:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
-        self._announce("held", held.forward_velocity)
+        self._announce("held", held.forward_velocity, held.tail_rotation_rate)
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
         nominal = self._run(held)
-        self._announce("trial", nominal.values.get("forward_velocity"))
+        self._announce("trial", *map(nominal.values.get, _ANNOUNCED))
         return self._with_interval(held, nominal) if self.interval else nominal
 
     def steady(self) -> ReleasedMotion:
@@ -459,7 +462,7 @@ class TrialRequest:
         still = self.in_tube.model_copy(update={"wait": None})
         shared = {**self._shared(), "progress": None}
         found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=self.fit, **shared).prediction)
-        self._announce("steady", found.values.get("forward_velocity"))
+        self._announce("steady", *map(found.values.get, _ANNOUNCED))
         return found
 
     def _run(self, held: Prediction) -> ReleasedMotion:
@@ -532,10 +535,10 @@ class TrialRequest:
         rng = np.random.default_rng(1)
         return discrepancy_factors(kept, self.fit.central(self.robot), predicted, rng, whose=self.posterior_for)
 
-    def _announce(self, column: str, speed: float | None) -> None:
+    def _announce(self, column: str, speed: float | None, rate: float | None) -> None:
         """Tell of a column as soon as it is there."""
         if self.progress is not None and speed is not None:
-            self.progress(f"{SPEED_OF}{column}: {show(speed, display_unit(speed, 'm/s'))}", 1, 1)
+            self.progress(f"{SPEED_OF}{column}: {show(speed, speed_unit(speed, rate))}", 1, 1)
 
     def _check_unused(self, reason: str) -> None:
         """Refuse settings of a released motion for an answer without one, with the reason."""

@@ -315,17 +315,16 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
     near = np.abs(values[among] - values[winner]) <= _EQUAL * abs(values[winner])
     ties = tuple(ranked[int(place)].name for place in among[near] if place != winner)
-    lead = _lead(sign * finite)
     error = _speed_error(chosen, name, winner)
-    decided = {"ties": ties, **({"lead": lead, "error": error} if np.isfinite(lead + error) else {})}
+    lead = _lead(sign * finite) if np.isfinite(error) else np.nan
     places = chosen.get(f"{name}_at_place")
     if places is None:
-        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, **decided)
+        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties, lead, error)
     others = places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = sign * np.column_stack([values, others])[among]
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(among[np.argmax(there, axis=0)] == winner)) if there.shape[1] else 0
-    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, **decided)
+    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties, lead, error)
 
 
 def _lead(values: Values) -> float:

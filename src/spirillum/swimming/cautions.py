@@ -101,7 +101,7 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     if not has_table(batch) and not why_no_table(batch):
         whole, band = (preparation_minutes(batch, stage) for stage in ("yaw", "straight"))
         more = (
-            f"`spirillum prepare ROBOT` adds band, trial and steady motion in {whole[0]} to {whole[1]} min "
+            f"`spirillum prepare ROBOT` adds band, trial, steady in {whole[0]} to {whole[1]} min "
             f"(--stage straight: band, {band[0]} to {band[1]})"
         )
     return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]

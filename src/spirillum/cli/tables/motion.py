@@ -33,7 +33,7 @@ from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.released_motion import END_STATES
 from spirillum.swimming.steady import headline
-from spirillum.units import display_unit, in_unit
+from spirillum.units import display_unit, in_unit, speed_unit
 
 
 def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
@@ -253,6 +253,8 @@ def _averages(title: str, answer: Answer) -> Table:
         items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
         most = max((abs(item["value"]) for item in items if item["value"] is not None), default=None)
         unit = display_unit(most, items[1]["unit"])
+        if items[1]["unit"] == "m/s":
+            unit = speed_unit(most, answer.get("mean_tail_rotation_rate_on", _NONE)["value"])
         values = [in_unit(_rounded(item["value"], most), items[1]["unit"], unit) for item in items]
         table.add_row(name.removeprefix("mean_").replace("_", " "), *values, unit)
     return table

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.display import percent, rows_of
-from spirillum.units import display_unit, in_unit
+from spirillum.units import display_unit, in_unit, speed_unit
 
 Answer = Mapping[str, Any]
 
@@ -115,7 +115,7 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
             standing, lost = trial["standing"], trial["without_answer"]
             yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
         return
-    unit = display_unit(speed["high"], speed["unit"])
+    unit = speed_unit(speed["high"], trial["tail_rotation_rate"]["value"])
     low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
     parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
     words = [

@@ -19,6 +19,7 @@ def robot(answer: Answer) -> Blocks:
     fields = answer["fields"]
     yield f"{fields['name']}  {fields['description']}"
     rows = grid("fields", "field", "value", "unit")
+    rows.columns[0].no_wrap, rows.columns[1].no_wrap = True, False  # values may be words
     for name, item in fields.items():
         word = "none" if name in ("tail.taper", "channel", "seal") and item is None else _word(item)
         value, unit = _quantity(item) if isinstance(item, Mapping) else (word, "")
