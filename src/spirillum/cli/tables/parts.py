@@ -115,7 +115,7 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
             standing, lost = trial["standing"], trial["without_answer"]
             yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
         return
-    unit = speed_unit(speed["high"], trial["tail_rotation_rate"]["value"])
+    unit = speed_unit(speed["high"], trial.get("tail_rotation_rate", speed)["value"])
     low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
     parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
     words = [
