@@ -65,17 +65,17 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
-    table = grid(title, "quantity", "held", "low", "high", "trial", "steady")
-    table.padding = (0, 1, 0, 0)  # six columns at 80 characters
-    for name in answer if only is None else only:
-        for row in rows_of(answer, [name]):
-            released = (answer[column].get(name) for column in RELEASED_COLUMNS)
-            cells = [
-                "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
-            ]
-            words = "efficiency" if name == "hydrodynamic_efficiency" else row.name
-            label = f"{words}, {row.unit}" if row.unit else words
-            table.add_row(label, row.value, row.low or "-", row.high or "-", *cells)
+    rows = {name: row for name in (answer if only is None else only) for row in rows_of(answer, [name])}
+    ends = ("low", "high") if any(row.low for row in rows.values()) else ()
+    table = grid(title, "quantity", "held", *ends, *RELEASED_COLUMNS)
+    if ends:
+        table.padding = (0, 1, 0, 0)  # six columns at 80 characters
+    for name, row in rows.items():
+        released = (answer[column].get(name) for column in RELEASED_COLUMNS)
+        cells = ["-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released]
+        words = "efficiency" if name == "hydrodynamic_efficiency" else row.name
+        label = f"{words}, {row.unit}" if row.unit else words
+        table.add_row(label, row.value, *(getattr(row, end) or "-" for end in ends), *cells)
     return table
 
 
