@@ -298,7 +298,7 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         return sheet.finished()
 
 
-_TRIAL = f"From the film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
+_TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
 
 
 def _effect_label(place: int, name: str) -> str:
