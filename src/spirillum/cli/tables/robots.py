@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid
+from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid, reason_of
 from spirillum.results.installation import report_lines
 from spirillum.units import for_people, in_unit, shown_in
 
@@ -86,6 +86,7 @@ def export(answer: Answer) -> Blocks:
         for name, item in answer["parameters"].items():
             rows.add_row(name, f"{item['value']:.6g}", item["unit"])
         yield rows
+        yield from reason_of(answer)
     else:
         links = answer["links"].items()
         masses = {f"{name} {key}": link[key] for name, link in links for key in ("mass", "displaced_volume")}
