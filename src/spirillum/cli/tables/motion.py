@@ -78,7 +78,7 @@ def _beside_published(item: Answer) -> str:
     paper = item["published"]
     unit = display_unit(paper["value"], paper["unit"])
     ours = ", ".join(
-        f"{name} {in_unit(own['value'], own['unit'], unit)} {unit} ({times(own['value'] / paper['value'])} that)"
+        f"{name} {in_unit(own['value'], own['unit'], unit)} {unit} ({times(own['value'] / paper['value'])})"
         for name, own in item["ours"].items()
         if own["value"] is not None
     )

@@ -125,7 +125,8 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
     over = "draws of the fit and what it leaves open" if "interval_of" in trial else "what is not stated"
     level = f"{100 * speed['level']:g} % interval of the speed over {over}"
     yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
-    yield "the column trial is the run at nominal values of these unknowns, not their median"
+    at = "the posterior median and nominal unknowns" if "interval_of" in trial else "nominal unknowns"
+    yield f"the column trial is one run, at {at}; the median is that of {trial['runs']} runs"
     if words:
         yield f"of its variance: {', '.join(words)}; state the first of them first"
 
