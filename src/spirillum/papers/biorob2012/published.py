@@ -28,8 +28,8 @@ VELOCITY_DROPS = {"lowest": VelocityDrop(0.0653, 10.0, 3.5), "largest": Velocity
 _WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
 _SOURCE = "BioRob 2012, text on Figs 5 and 6"
 _REMARK = (
-    "the paper does not report how its robots were placed; in a trial the robot lies on the glass, where the film slows "
-    "it (contact assumed, not validated)"
+    "the paper does not report how its robots were placed; in a trial the robot lies on the glass, where the film "
+    "slows it (contact assumed, not validated)"
 )
 
 
