@@ -150,9 +150,13 @@ def _print_json(answer: Answer) -> None:
 
 
 def _print(console: Console, block: Block, style: str = "") -> None:
-    text = isinstance(block, str)
-    content = wrapped(block) if isinstance(block, str) else block
-    console.print(content, highlight=False, soft_wrap=text, markup=False, style=style or None)
+    if isinstance(block, str):
+        console.print(wrapped(block), highlight=False, soft_wrap=True, markup=False, style=style or None)
+        return
+    title, block.title = block.title, None  # else it is wrapped at the width of the table
+    if title:
+        _print(console, Text.from_markup(str(title)).plain, "bold")
+    console.print(block, highlight=False)
 
 
 def _print_title(console: Console, block: Block, cautions: Sequence[Note]) -> None:
