@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent
-WIDTH = "100"
+WIDTH = "80"
 _FENCE = re.compile(r"^(<!-- (?:slow|run) -->\n)?```(console|pycon|python|toml|text)\n(.*?)^```$", re.M | re.S)
 _FILE = re.compile(r"# ([\w-]+\.(?:toml|csv))\b")
 _PROGRESS = re.compile(r".*: \d+(?: of \d+)?, .* elapsed(?:, about .* left)?")

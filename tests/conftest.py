@@ -102,6 +102,14 @@ def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def wide_terminal() -> Iterator[None]:
+    """Each sentence is printed as one line; tests of layouts set the width that they look at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "1000")
+        yield
+
+
 @pytest.fixture(scope="session")
 def flat_pictures() -> ModuleType:
     """The module `flat_pictures`: `flat_pictures.flat(velocity=1e-3, ...)` is a film."""

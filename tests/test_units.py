@@ -386,3 +386,11 @@ def test_fields_of_a_file_take_no_float() -> None:
     """Where a number without unit is refused, nothing is said of what it would mean."""
     with pytest.raises(InputError, match=r'has no unit; allowed: a number with its unit, for example "18 mm"$'):
         sp.load("biorob2012-wide", **{"tail.wavelength": 0.02})
+
+
+def test_slow_and_fast_runs_of_a_robot_have_one_unit() -> None:
+    from spirillum.units import Hz, speed_unit
+
+    assert {speed_unit(speed, 1.4 * Hz) for speed in (1e-5, 4e-5, -5e-4)} == {"mm/s"}
+    assert speed_unit(2e-5, 110 * Hz) == "um/s"  # a bacterium
+    assert speed_unit(2e-5, None) == speed_unit(2e-5, 0.0) == "um/s"

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from spirillum.notes import Note, notes_in_answer, notes_of, shown_cautions
 from spirillum.quantities import QUANTITIES
-from spirillum.units import among, in_unit
+from spirillum.units import among, in_unit, speed_unit
 
 
 class QuantityRow(NamedTuple):
@@ -46,6 +46,8 @@ def _is_quantity(item: Any) -> bool:
 def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]]) -> QuantityRow:
     unit = item["unit"]
     shown = among(item["value"], unit, [other["value"] for other in known.values() if other["unit"] == unit])
+    if unit == "m/s" and item["value"]:
+        shown = speed_unit(item["value"], known.get("tail_rotation_rate", {}).get("value"))
     value, low, high = ("" if item.get(key) is None else in_unit(item[key], unit, shown) for key in _ENDS)
     plain = "" if shown == "1" else shown
     si = "" if plain in ("", unit) else f"{item['value']:.6g} {unit}"
@@ -66,6 +68,11 @@ def percent(share: float) -> str:
     """A share in per cent, with two significant digits and no exponent up to 1e5."""
     value = 100.0 * share
     return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
+
+
+def times(ratio: float) -> str:
+    """A ratio as a multiple, with two significant digits and no exponent up to 1e5."""
+    return f"{ratio:.0f}x" if 10 <= abs(ratio) < 1e5 else f"{ratio:.2g}x"
 
 
 class DisplayMixin(ABC):

@@ -405,6 +405,22 @@ def display_unit(value: float | None, unit: str) -> str:
     return for_people(unit)
 
 
+def speed_unit(speed: float | None, rate: float | None) -> str:
+    """The unit in which people read a speed beside the tail's rate: one for the slow and the fast runs of a robot.
+
+    Args:
+        speed: m/s.
+        rate: of the tail, rad/s.
+    """
+    if speed and rate and abs(speed) * Hz >= _ROBOTS_ADVANCE * abs(rate):
+        return "mm/s"
+    return display_unit(speed, "m/s")
+
+
+_ROBOTS_ADVANCE = 5e-6
+"""Advance in a turn of the tail from which a robot is one of millimetres and more, m."""
+
+
 def among(value: float | None, unit: str, others: Iterable[float | None]) -> str:
     """The unit in which people read an SI `value` beside `others` of the same unit: a zero takes that of the least."""
     if value != 0:

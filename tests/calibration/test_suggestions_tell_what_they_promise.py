@@ -225,6 +225,7 @@ def test_a_set_field_of_robots_that_nobody_named_says_whose_they_are(fitted: Pat
     found = run("suggest", str(fitted / "posterior.nc"), *few, "--set", "motor.resistance=5 ohm", "--json")
     assert found.code == 0
     assert "biorob2012-wide and biorob2012-narrow, are used" in json.loads(found.out)["warnings"][0]
+    assert json.loads(found.out)["model_reason"].endswith(" was fitted with it")
 
 
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:

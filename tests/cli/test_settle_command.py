@@ -37,6 +37,7 @@ def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -
     answer = json.loads(outcome.out)
     assert answer["schema"] == "spirillum.settling/1"
     assert answer["file"] is None
+    assert f"model tube: {answer['model_reason']}" in tables.out
     assert answer["lying"]["state"] == "steady"
     gap = answer["lying"]["gap"]
     assert gap["low"] <= gap["value"] <= gap["high"]

@@ -29,7 +29,7 @@ LONG = {
 
 def _ended(command: list[str], folder: Path, number: int, *, group: bool) -> tuple[int, str]:
     """Exit code and standard error of a command that gets a signal while it is at work."""
-    environment = os.environ | {"SPIRILLUM_CACHE": str(folder / "cache")}
+    environment = os.environ | {"SPIRILLUM_CACHE": str(folder / "cache"), "COLUMNS": "400"}
     script = (
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # background jobs ignore it
         "from spirillum.cli import main\nmain()"

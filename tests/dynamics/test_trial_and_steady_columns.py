@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -65,9 +66,24 @@ def test_the_held_answer_stays_the_headline(driven: sp.Robot, answer: Any) -> No
 def test_columns_stand_side_by_side(answer: Any) -> None:
     table, *lines = (block for block in blocks_of(answer.to_dict()) if not isinstance(block, str) or "t" in block)
     assert [str(column.header) for column in table.columns] == [
-        "quantity", "held", "band", "trial", "steady",
+        "quantity", "held", "low", "high", "trial", "steady",
     ]  # fmt: skip
     assert "trial: released, motor on after 60 s, mean over 20 s; contact assumed, not validated" in lines
+
+
+def test_what_a_trial_does_not_have_has_its_reason(answer: Any) -> None:
+    missing = answer.to_dict()["trial"]["hydrodynamic_efficiency"]
+    assert missing["value"] is None
+    assert any(missing["reason"] in str(block) for block in blocks_of(answer.to_dict()))
+
+
+def test_lines_end_between_words_at_80_columns(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    for arguments in (("predict", WIDE, "--all", "--notes"), ("predict", WIDE, "--model", "cfd")):
+        outcome = run(*arguments)
+        lines = (outcome.out + outcome.err).splitlines()
+        assert max(map(len, lines)) <= 80
+        assert "  validated" in lines or outcome.code == 2
 
 
 @pytest.mark.parametrize(

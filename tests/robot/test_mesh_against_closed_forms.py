@@ -260,3 +260,12 @@ def test_fineness_out_of_range_is_refused(fineness: Any) -> None:
 def test_short_and_very_long_tails(turns: int) -> None:
     found = pieces(0.2, **{"tail.length": f"{turns * 25} mm", "channel": "none"})["tail"]
     assert found.volume > 0
+
+
+@pytest.mark.parametrize(("density", "grey"), [("8960 kg/m^3", False), ("8500 kg/m^3", False), ("7900 kg/m^3", True)])
+def test_a_wire_as_dense_as_steel_is_grey_and_others_are_copper(density: str, grey: bool) -> None:
+    (tail,) = (
+        piece for piece in robot_mesh(load("biorob2012-wide", **{"tail.density": density})) if piece.name == "tail"
+    )
+    red, _, blue = tail.colours[0]
+    assert bool(abs(red - blue) < 0.1) == grey

@@ -26,6 +26,7 @@ def test_all_files_are_there_and_a_rerun_keeps_them(tmp_path: Path) -> None:
     first = virtual_experiment(None, folder, **SMALL, jobs=2, progress=lambda *words: told.append(words))
     assert first.robots == ("biorob2012-wide", "biorob2012-narrow")
     assert told[-1][1:] == (4, 4)
+    assert all("model" in robot for robot in first.to_dict()["robots"])
     names = {path.name for path in (folder / "biorob2012-wide").iterdir()}
     ends = ("mp4", "truth.json", "truth.nc")
     assert names == {"setup.toml", *(f"trial-{number}.{end}" for number in (1, 2) for end in ends)}

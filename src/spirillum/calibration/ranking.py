@@ -45,6 +45,7 @@ _MANY_ROBOTS = 10
 """Below that number the standard error itself is hardly known."""
 _WORST = 3
 _MODELS = ("sbt", "rft")
+_PAPERS_MODELS = "none is named, and the paper compares these two"
 _FREE = "body_drag,body_rotation"
 _FREE_IN_TUBE = "gap,pitch"
 _FREE_IN_TRIAL = "friction_coefficient,roughness"
@@ -87,6 +88,8 @@ class Ranking(DisplayMixin):
 
     ranked: tuple[ModelRank, ...]
     warnings: tuple[Note, ...]
+    model_reason: str = ""
+    """Why these models were ranked; empty where they were named."""
 
     @property
     def best(self) -> ModelRank:
@@ -175,6 +178,7 @@ class Ranking(DisplayMixin):
             "synthetic": experiment.synthetic,
             "robots": experiment.size,
             "models": models,
+            **({"model_reason": self.model_reason} if self.model_reason else {}),
             "verdict": self.verdict(),
             "clear": self.clear,
         }
@@ -240,7 +244,8 @@ def rank_models(
     if not fits:
         raise failed[0]
     found = ranked_fits(fits)
-    return replace(found, warnings=(*said, *found.warnings))
+    reason = "" if models else _PAPERS_MODELS
+    return replace(found, warnings=(*said, *found.warnings), model_reason=reason)
 
 
 def free_by_model(

@@ -44,7 +44,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
-from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.model_choice import fitted_with, has_table
 from spirillum.swimming.released_motion import HELD, RELEASED
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
@@ -114,6 +114,7 @@ class Suggestion(DisplayMixin):
             "posterior": self.posterior.source,
             "synthetic": self.posterior.synthetic,
             "model": self.posterior.model,
+            "model_reason": fitted_with(self.posterior.source),
             "trials": self.trials,
             **({} if self.answer == HELD else {"answer": self.answer}),
             "candidates": rows,

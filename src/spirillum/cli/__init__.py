@@ -225,8 +225,10 @@ def _of_place(error: OSError) -> str:
 
 def _fail(sentence: str, code: int) -> int:
     if sentence and sys.stderr is not None:
+        from spirillum.cli.wrapping import wrapped
+
         with suppress(OSError, ValueError):  # nobody listens; the exit code still says it
-            sys.stderr.write(f"spirillum: {sentence}\n")
+            sys.stderr.write(wrapped(f"spirillum: {sentence}") + "\n")
         _flushed(sys.stderr)
     return code
 

@@ -19,6 +19,7 @@ from spirillum.cli.shared_options import (
     optional_robot,
     starting,
 )
+from spirillum.cli.wrapping import wrapped
 
 if TYPE_CHECKING:
     from spirillum.live.observation import Observation, Tracked
@@ -265,7 +266,7 @@ def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to 
     Example: `spirillum setup new setup.toml`
     """
     request(file)
-    typer.echo(f"{file}: fill in heights, their uncertainties and the robot; comments explain them")
+    typer.echo(wrapped(f"{file}: fill in heights, their uncertainties and the robot; comments explain them"))
 
 
 @setup_app.command("propose", cls=FunctionCommand)
@@ -324,7 +325,7 @@ def new_observations(
     from spirillum.measurement.observations import new_observations_file
 
     new_observations_file(file, overwrite=force)
-    typer.echo(f"{file}: columns and their units are explained in its comments")
+    typer.echo(wrapped(f"{file}: columns and their units are explained in its comments"))
 
 
 @observations_app.command("check", cls=NotedCommand)
@@ -353,4 +354,4 @@ def join_observations(
     from spirillum.measurement.observations import join_observations
 
     rows = join_observations(files, output)
-    typer.echo(f"{output}: {rows} rows of {len(files)} files")
+    typer.echo(wrapped(f"{output}: {rows} rows of {len(files)} files"))

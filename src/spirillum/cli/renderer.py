@@ -15,10 +15,12 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from spirillum.cli.shared_options import every_note
 from spirillum.cli.tables import blocks_of
 from spirillum.cli.tables.parts import Answer, Block, Detail
+from spirillum.cli.wrapping import NARROWEST, wrapped
 from spirillum.display import counted
 from spirillum.envelope import as_json, with_notes_last
 from spirillum.notes import Note, notes_in_answer, shown_cautions
@@ -101,9 +103,6 @@ def _duration(seconds: float) -> str:
     return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
 
 
-_NARROWEST = 80
-
-
 _PACE = 900.0
 """Time over which the pace of work is averaged, s: a pose of a table takes half a minute."""
 
@@ -125,8 +124,8 @@ def show(answer: Answer, *, json: bool, **options: Any) -> None:
         _print_json(answer)
         return
     console = _PipedConsole(emoji=False)
-    if console.width < _NARROWEST:
-        console = _PipedConsole(width=_NARROWEST, emoji=False)  # a narrow terminal wraps; it must not lose numbers
+    if console.width < NARROWEST:
+        console = _PipedConsole(width=NARROWEST, emoji=False)  # a narrow terminal wraps; it must not lose numbers
     notes, every = notes_in_answer(answer), every_note.get()
     cautions = [] if every else shown_cautions(notes)
     title, *blocks = blocks_of(answer, **options)
@@ -151,14 +150,20 @@ def _print_json(answer: Answer) -> None:
 
 
 def _print(console: Console, block: Block, style: str = "") -> None:
-    console.print(block, highlight=False, soft_wrap=isinstance(block, str), markup=False, style=style or None)
+    if isinstance(block, str):
+        console.print(wrapped(block), highlight=False, soft_wrap=True, markup=False, style=style or None)
+        return
+    title, block.title = block.title, None  # else it is wrapped at the width of the table
+    if title:
+        _print(console, Text.from_markup(str(title)).plain, "bold")
+    console.print(block, highlight=False)
 
 
 def _print_title(console: Console, block: Block, cautions: Sequence[Note]) -> None:
     """The title, which may be that of a table, with the weightiest cautions below it."""
     if isinstance(block, Table):
-        title, block.title = block.title, None
-        console.print(title, highlight=False, soft_wrap=True, style="bold")
+        title, block.title = Text.from_markup(str(block.title)).plain, None
+        _print(console, title, "bold")
     else:
         _print(console, block, "bold")
     for note in cautions:
@@ -169,7 +174,8 @@ def _print_title(console: Console, block: Block, cautions: Sequence[Note]) -> No
 
 def _print_note(console: Console, note: Note, code: str = "") -> None:
     colour = "yellow" if note.severity == "caution" else "blue"
-    line = f"[{colour}]{note.severity}:[/{colour}] {escape(note + code)}"
+    line = Text(wrapped(f"{note.severity}: {note}{code}"))
+    line.stylize(colour, 0, len(note.severity) + 1)
     console.print(line, highlight=False, soft_wrap=True)
 
 
@@ -211,7 +217,7 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
     from spirillum.fluid.tube.progress_messages import TILTED
 
     if tilted and model in MODELS and MODELS[model].placed:
-        Console(stderr=True, soft_wrap=True).print(TILTED, highlight=False)
+        _print_line(TILTED)
     quick = model not in MODELS or MODELS[model].closed_form
     return at_work("solving for the flow", quiet=quiet or quick)
 
@@ -226,7 +232,7 @@ def _print_line(line: str) -> None:
     """Print a line on standard error; one that is closed or full changes nothing else."""
     if sys.stderr is not None:
         with suppress(OSError, ValueError):
-            sys.stderr.write(f"{line}\n")
+            sys.stderr.write(f"{wrapped(line)}\n")
             sys.stderr.flush()
 
 
@@ -278,7 +284,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
 
     def tell(what: str, done: int, total: int | None) -> None:
         if what.startswith((*lines, SPEED_OF)):
-            bar.console.print(what, highlight=False)
+            bar.console.print(wrapped(what), highlight=False)
             what, done, total = "at work", 0, None  # without an end, but with the time that goes by
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen
         if total != before[1] or done < (before[0] or 0):  # other work has another pace

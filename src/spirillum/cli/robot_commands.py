@@ -18,6 +18,7 @@ from spirillum.cli.shared_options import (
     complete_robots,
     starting,
 )
+from spirillum.cli.wrapping import wrapped
 
 robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 
@@ -37,7 +38,7 @@ def robot_new(
     from spirillum.robot.load import new_robot_file
 
     new_robot_file(path, preset, overwrite=force)
-    typer.echo(f"{path} written; see what follows from it with: spirillum robot show {path}")
+    typer.echo(wrapped(f"{path} written; see what follows from it with: spirillum robot show {path}"))
 
 
 @robot_app.command("show", cls=NotedCommand)

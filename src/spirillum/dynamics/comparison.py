@@ -103,6 +103,10 @@ def _steps(robot: Robot, answers: Mapping[str, Prediction], friction: str) -> It
     yield from _released(held, trial.values, friction)
 
 
+RELEASED_EFFECT = "contact and motion in time"
+"""The last effect, where there is a trial."""
+
+
 def _released(held: Prediction, trial: Mapping[str, float], friction: str) -> Iterator[Effect]:
     """From the held answer to the trial: held at the trial's mean pose, level and then yawed, and the trial."""
     pose = {name: trial[name] for name in ("gap", "pitch", "yaw")}
@@ -115,7 +119,7 @@ def _released(held: Prediction, trial: Mapping[str, float], friction: str) -> It
         except InputError:  # nearer to the wall than the table answers for: part of the next step
             continue
         yield Effect(name, there.forward_velocity)
-    yield Effect("contact and motion in time", trial["forward_velocity"])
+    yield Effect(RELEASED_EFFECT, trial["forward_velocity"])
 
 
 _UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}

@@ -32,7 +32,7 @@ from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import AUTO, UNBOUNDED
+from spirillum.swimming.model_choice import AUTO, NO_CHANNEL, UNBOUNDED, ModelChoice
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import (
@@ -208,11 +208,11 @@ def magnetic_sweep(
             f"{loaded.name} has a channel, whose walls a sweep does not know; allowed: model 'slender' or 'rft', which "
             "leave them out, or `simulate` at each rate"
         )
-    model = UNBOUNDED if model == AUTO else model
-    check_full(find_swimmer_model(model))
-    own = with_resolution(loaded, resolution, model)
+    choice = ModelChoice(UNBOUNDED, NO_CHANNEL) if model == AUTO else ModelChoice(model)
+    check_full(find_swimmer_model(choice.model))
+    own = with_resolution(loaded, resolution, choice.model)
     # The rates of the sweep decide whether there is an answer, not the robot's own.
-    held = replace(predict(without_reynolds_bound(own), model=model, calibrated=False), robot=own)
+    held = replace(predict(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
     check_range("turns", turns, 4, 10_000)
@@ -401,6 +401,7 @@ def _dataset(
         values = np.broadcast_to(getattr(closed, name), rates.shape)
         meaning = f"{name.replace('_', ' ')} of the held robot, closed form"
         data[f"held_{name}"] = ("field_rate", values, attributes(name, meaning=meaning, source="m B sin(lag)"))
+    reason = held.answered_by.get("model_reason", "")
     data["step_out_rate"] = ((), held.step_out_rate, attributes("step_out_rate"))
     return xr.Dataset(
         data,
@@ -409,6 +410,7 @@ def _dataset(
             "title": f"{held.robot.name} in a rotating field",
             "robot": held.robot.name,
             "model": held.model.name,
+            **({"model_reason": reason} if reason else {}),
             "turns": float(turns),
             "settings": json.dumps(held.robot.model_dump(), sort_keys=True),
             "known_error": held.known_error,

@@ -93,6 +93,7 @@ def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
     content: dict[str, Any] = {
         "robot": dataset.attrs["robot"],
         "model": dataset.attrs["model"],
+        **({"model_reason": dataset.attrs["model_reason"]} if "model_reason" in dataset.attrs else {}),
         "step_out_rate": quantity(float(dataset["step_out_rate"]), "rad/s"),
         "field_rate": quantity(dataset["field_rate"].values, "rad/s"),
     }

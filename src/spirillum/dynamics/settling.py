@@ -35,6 +35,7 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import IN_CHANNEL
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.released_motion import SteadyState
 from spirillum.units import KINDS, parse_option
@@ -194,6 +195,7 @@ class Settling(DisplayMixin):
         content = {
             "robot": self.robot.name,
             "model": motion.model.name,
+            "model_reason": IN_CHANNEL,
             "forward_velocity": quantity(motion.forward_velocity, "m/s"),
             "tail_rotation_rate": quantity(motion.tail_rotation_rate, "rad/s"),
             "body_rotation_rate": quantity(motion.body_rotation_rate, "rad/s"),

@@ -40,11 +40,11 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
-from spirillum.swimming.preparation import table_for, why_no_table
+from spirillum.swimming.preparation import preparation_minutes, table_for, why_no_table
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
-from spirillum.units import KINDS, display_unit, parse_option, show
+from spirillum.units import KINDS, parse_option, show, speed_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,6 +56,9 @@ ASSUMPTION = "contact assumed, not validated"
 """What a released motion rests on."""
 _POSE = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "azimuth": "azimuth"}
 """The pose of an answer, and where a run has it."""
+_OF_ONE_POSE = ("hydrodynamic_efficiency", "propulsive_power", "overall_efficiency")
+"""Quantities that a trial does not have."""
+_MANY_POSES = "they follow from the body's drag at one pose, and a trial passes through many"
 _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
@@ -70,8 +73,10 @@ def why_not_released(held: Prediction) -> str:
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
     batch = RobotBatch.of(held.robot, held.batch.placement)
     if not has_table(batch, "yaw"):
-        made = "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
-        return why_no_table(batch) or made
+        return why_no_table(batch) or (
+            "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
+            f"{' to '.join(map(str, preparation_minutes(batch, 'yaw')))} min, `simulate` and `settle` too"
+        )
     return ""
 
 
@@ -107,6 +112,7 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     values |= {name: float(run[of]) for name, of in exact.items() if of in run}
     notes = notes_in(run.attrs)
     basis = {
+        **{name: quantity(None, QUANTITIES[name].unit, reason=_MANY_POSES) for name in _OF_ONE_POSE},
         "assumption": ASSUMPTION,
         "state": "standing" if is_held(notes) else "swimming",
         "wait": quantity(float(run.attrs["wait"]), QUANTITIES["wait"].unit),
@@ -407,6 +413,9 @@ def quick_run(
     )
 
 
+_ANNOUNCED = ("forward_velocity", "tail_rotation_rate")
+
+
 @dataclass(frozen=True)
 class TrialRequest:
     """Arguments of `spirillum.predict` that decide the released motions of a robot."""
@@ -437,13 +446,13 @@ class TrialRequest:
             return held
         if reason:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
-        self._announce("held", held.forward_velocity)
+        self._announce("held", held.forward_velocity, held.tail_rotation_rate)
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
         nominal = self._run(held)
-        self._announce("trial", nominal.values.get("forward_velocity"))
+        self._announce("trial", *map(nominal.values.get, _ANNOUNCED))
         return self._with_interval(held, nominal) if self.interval else nominal
 
     def steady(self) -> ReleasedMotion:
@@ -453,7 +462,7 @@ class TrialRequest:
         still = self.in_tube.model_copy(update={"wait": None})
         shared = {**self._shared(), "progress": None}
         found = steady_of(lambda: free_motion(self._resolved(), in_tube=still, fit=self.fit, **shared).prediction)
-        self._announce("steady", found.values.get("forward_velocity"))
+        self._announce("steady", *map(found.values.get, _ANNOUNCED))
         return found
 
     def _run(self, held: Prediction) -> ReleasedMotion:
@@ -526,10 +535,10 @@ class TrialRequest:
         rng = np.random.default_rng(1)
         return discrepancy_factors(kept, self.fit.central(self.robot), predicted, rng, whose=self.posterior_for)
 
-    def _announce(self, column: str, speed: float | None) -> None:
+    def _announce(self, column: str, speed: float | None, rate: float | None) -> None:
         """Tell of a column as soon as it is there."""
         if self.progress is not None and speed is not None:
-            self.progress(f"{SPEED_OF}{column}: {show(speed, display_unit(speed, 'm/s'))}", 1, 1)
+            self.progress(f"{SPEED_OF}{column}: {show(speed, speed_unit(speed, rate))}", 1, 1)
 
     def _check_unused(self, reason: str) -> None:
         """Refuse settings of a released motion for an answer without one, with the reason."""

@@ -52,7 +52,7 @@ class InTube(Options):
     wait: Time | None = None
     """Waiting time after release with the drive off, before the run; None: 60 s, as in a trial, in a flow none."""
     friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
-    """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
+    """Coefficient of dry friction where asperities touch; None: 0.1, assumed; plausible 0 to 0.3, allowed 0 to 10."""
     flow: Annotated[str | Path | None, _file("a flow file; a constant flow is placement.flow")] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
     continued: Annotated[str | Path | None, _file("the file of a run in a tube, by `spirillum simulate`")] = None

@@ -46,8 +46,10 @@ MOST_WARNINGS = 100
 
 def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
     """The ranking as people read it: what it rests on, the best robots, a row for each of the first."""
-    sizes = {name: [robot.values[name] for robot in ranking.robots] for name in ranking.quantities}
-    units = {name: _unit_among(name, values) for name, values in sizes.items() if values}
+    sizes: dict[str, list[float]] = {}  # by SI unit: all speeds have one unit
+    for name in ranking.quantities:
+        sizes.setdefault(unit_of_ranked(name), []).extend(robot.values[name] for robot in ranking.robots)
+    units = {name: _unit_among(name, sizes[unit_of_ranked(name)]) for name in ranking.quantities if ranking.robots}
     first = ranking.robots[:most]
     return {
         "message": ranking.message,

@@ -44,7 +44,11 @@ COLOURS: dict[str, Colour] = {
     "arm": (0.72, 0.45, 0.20),
     "tail": (0.72, 0.45, 0.20),
 }
-"""sRGB of the pieces, 0 to 1; for pictures only."""
+"""sRGB of the pieces, 0 to 1, the wire of copper; for pictures only."""
+_STEEL: Colour = (0.62, 0.64, 0.67)
+_WIRES = ("stub", "arm", "tail")
+_STEELS = (7000.0, 8300.0)
+"""Densities between which a wire is taken for steel, kg/m^3: brass begins at 8400."""
 
 _AROUND_BODY, _AROUND_WIRE, _PER_TURN = 96, 24, 48
 """Sides of a body and of a wire, and points along a turn of the tail, at fineness 1."""
@@ -104,6 +108,11 @@ class TailLine:
     """Axial distance from the root, m, (k,)."""
 
 
+def is_steel(density: float | None) -> bool:
+    """Whether a wire of this density, kg/m^3, is shown as steel, not as copper."""
+    return density is not None and _STEELS[0] <= density <= _STEELS[1]
+
+
 def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tuple[RobotMesh, ...]:
     """The robot's pieces, each one closed surface by itself; neighbours overlap where they are joined.
 
@@ -123,7 +132,8 @@ def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tu
         cos, sin = np.cos(phase), np.sin(phase)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
         turned = surface._replace(vertices=surface.vertices @ turn.T)
-        pieces.append(_piece(name, "rotor", turned, (name,), (COLOURS[name],)))
+        colour = _STEEL if name in _WIRES and is_steel(robot.tail.density) else COLOURS[name]
+        pieces.append(_piece(name, "rotor", turned, (name,), (colour,)))
     return tuple(pieces)
 
 

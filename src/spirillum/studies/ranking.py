@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.display import percent
 from spirillum.envelope import quantity
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
@@ -121,6 +122,10 @@ class Best(NamedTuple):
     """Number of robots in the ranking."""
     ties: tuple[str, ...] = ()
     """Names of the other robots that have the same value, to rounding."""
+    lead: float = np.nan
+    """Of a speed: by how much it leads the next one, over its own value; NaN alone, or where an error is not known."""
+    error: float = np.nan
+    """Error of the model in that speed, relative."""
 
     @property
     def alike(self) -> bool:
@@ -133,6 +138,8 @@ class Best(NamedTuple):
         found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
         found |= {"robots": self.known, "of_robots": self.robots}
         found |= {"ties": list(self.ties)} if self.ties else {}
+        if np.isfinite(self.lead):
+            found |= {"lead": quantity(self.lead, "1"), "model_error": quantity(self.error, "1")}
         return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
 
 
@@ -198,7 +205,9 @@ def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
     ties = best.get("ties", [])
     more = f" and {len(ties) - _NAMED} more" if len(ties) > _NAMED else ""
     equal = f"no better than {'; '.join(ties[:_NAMED])}{more}" if ties else ""
-    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, equal, sure, among)))
+    lead, error = (best.get(name, {"value": 0.0})["value"] for name in ("lead", "model_error"))
+    within = "" if lead >= error or ties else f"by {percent(lead)}, within the model's error of {percent(error)}"
+    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, within, equal, sure, among)))
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
@@ -306,11 +315,33 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
     near = np.abs(values[among] - values[winner]) <= _EQUAL * abs(values[winner])
     ties = tuple(ranked[int(place)].name for place in among[near] if place != winner)
+    error = _speed_error(chosen, name, winner)
+    lead = _lead(sign * finite) if np.isfinite(error) else np.nan
     places = chosen.get(f"{name}_at_place")
     if places is None:
-        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties)
+        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties, lead, error)
     others = places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = sign * np.column_stack([values, others])[among]
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(among[np.argmax(there, axis=0)] == winner)) if there.shape[1] else 0
-    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties)
+    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties, lead, error)
+
+
+def _lead(values: Values) -> float:
+    """By how much the largest value leads the next one, over its own size."""
+    if values.size < 2:
+        return np.nan
+    second, first = np.sort(values)[-2:]
+    return float((first - second) / max(abs(first), 1e-300))
+
+
+def _speed_error(chosen: xr.Dataset, name: str, place: int) -> float:
+    """The error of a robot's speed by the model's own estimate, else by its stated one; NaN where none is known."""
+    own = {"forward_velocity": "error_estimate", STEADY_SPEED: "error_estimate_settled"}.get(name)
+    if own is None:
+        return np.nan
+    estimate = np.nan
+    if own in chosen and set(chosen[own].dims) == set(robot_dims(chosen)):
+        estimate = float(chosen[own].transpose(*robot_dims(chosen)).values.ravel()[place])
+    stated = SWIMMER_MODELS[str(chosen["model"].values)].known_speed_error if name == "forward_velocity" else None
+    return estimate if np.isfinite(estimate) or stated is None else stated

@@ -52,7 +52,7 @@ class LaidDown(Section):
     roughness: tuple[Length, Length] = (1e-6, 3e-5)
     """Height of the asperities: of a smooth hull, and of glued and printed stripes."""
     friction_coefficient: tuple[_Coefficient, _Coefficient] = (0.0, 0.3)
-    """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
+    """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15, allowed 0 to 10."""
     duration: Time = 12.0
     """Length of each run with the motor on."""
 

@@ -236,14 +236,23 @@ def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]])
     named = []
     for robot, fields, given in zip(robots, every, varied, strict=True):
         told = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
+        tail = _tail_words([fields.get(path) for path in _VARIED]) if set(_VARIED) <= set(told) else ""
+        told = [path for path in told if not tail or path not in _VARIED]
         short = [path.rpartition(".")[2] for path in told]
-        words = [
+        words = [tail] if tail else []
+        words += [
             f"{name if short.count(name) == 1 else path.replace('.', ' ')} {fields[path]}"
             for name, path in zip(short, told, strict=True)
         ]
         name = ", ".join([robot.name, *words] if several or not words else words)
         named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
     return tuple(named)
+
+
+def _tail_words(lengths: Sequence[Any]) -> str:
+    """Wavelength and amplitude in one unit, as `20 x 2.5 mm`; empty where they are stated otherwise."""
+    (one, unit, *_), (other, same, *_) = ((*str(length).split(), "", "") for length in lengths)
+    return f"{one} x {other} {unit}" if unit and unit == same else ""
 
 
 def _flat(fields: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

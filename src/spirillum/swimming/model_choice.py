@@ -26,6 +26,13 @@ WALLED, UNBOUNDED = "tube", "slender"
 """What answers for a robot in a channel, and for one without."""
 IN_CHANNEL = "the robot is in a channel, whose walls this model computes"
 """Why the model with walls is taken."""
+NO_CHANNEL = "the robot has no channel"
+"""Why the model of unbounded fluid is taken."""
+
+
+def fitted_with(source: str) -> str:
+    """Return the reason of a model that a calibration or a posterior of that name was fitted with."""
+    return f"{source} was fitted with it"
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,7 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
     if fitted is not None:
         return fitted
     if robot.channel is None:
-        return ModelChoice(UNBOUNDED, "the robot has no channel")
+        return ModelChoice(UNBOUNDED, NO_CHANNEL)
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):  # a pose is refused by the model that takes poses
@@ -83,4 +90,4 @@ def _fitted_choice(fit: Fit) -> ModelChoice | None:
     names = fit.models
     if len(names) > 1:
         raise InputError(f"{fit.name} holds factors for models {', '.join(names)}; allowed: --model with one of them")
-    return ModelChoice(names[0], f"{fit.name} was fitted with it", fitted=True) if names else None
+    return ModelChoice(names[0], fitted_with(fit.name), fitted=True) if names else None

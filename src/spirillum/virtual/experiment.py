@@ -8,7 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -104,11 +104,16 @@ class VirtualExperiment(DisplayMixin):
     """The true rates of all trials as an observations file."""
     rates: Mapping[str, Mapping[str, float]]
     """Rates of each robot without the planted differences, SI."""
+    models: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """Of each robot, what its rates are from, and why that model was taken."""
     warnings: tuple[Note, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's facts, as ``virtual-experiment --json`` prints them."""
-        robots = [{"robot": name, **rate_quantities(self.rates[name])} for name in self.robots]
+        robots = [
+            {"robot": name, **_answered_by(*self.models.get(name, ("", ""))), **rate_quantities(self.rates[name])}
+            for name in self.robots
+        ]
         content = {
             "synthetic": True,
             "folder": str(self.folder),
@@ -168,9 +173,10 @@ def virtual_experiment(
     robots, default_model, placement = _robots(study)
     if len(robots) * plan.trials > _MOST:
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
-    steady, warnings = {}, []
+    steady, models, warnings = {}, {}, []
     for name, robot in robots.items():
-        steady[name], _, said, _ = steady_rates(robot, motion, default_model, placement)
+        steady[name], source, said, reason = steady_rates(robot, motion, default_model, placement)
+        models[name] = source, reason
         warnings += [note.prefixed(f"{name}: ") for note in said]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
@@ -210,8 +216,14 @@ def virtual_experiment(
         spread=plan.spread,
         observations=table,
         rates=steady,
+        models=models,
         warnings=tuple(dict.fromkeys(warnings)),
     )
+
+
+def _answered_by(source: str, reason: str) -> dict[str, str]:
+    """What a robot's rates are from, and why where a model was chosen."""
+    return ({"model": source} if source else {}) | ({"model_reason": reason} if reason else {})
 
 
 class _Filmed(NamedTuple):

@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.calibration.fit_warnings import CALLED
-from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid
+from spirillum.cli.tables.parts import Answer, Blocks, Detail, grid, reason_of
 from spirillum.display import counted, percent
 from spirillum.units import display_unit, in_unit
 
@@ -33,6 +33,7 @@ def calibration(answer: Answer) -> Blocks:
         sampler = answer["sampler"]
         worst, fewest = max(sampler["r_hat"].values()), min(sampler["effective_draws"].values())
         yield Detail(f"sampler: R-hat at most {worst:.3f}, at least {fewest:.0f} effective draws")
+    yield from reason_of(answer)
     yield f"{len(answer['files'])} files in {answer['folder']}, among them calibration.toml"
 
 
@@ -82,6 +83,7 @@ def model_ranking(answer: Answer) -> Blocks:
         rows.add_row(item["model"], density, _apart(item["difference"]), *shares)
     yield rows
     yield answer["verdict"]
+    yield from reason_of({"model": ", ".join(item["model"] for item in answer["models"]), **answer})
     yield from (Detail(_failures(item)) for item in answer["models"])
 
 
@@ -128,6 +130,7 @@ def suggestion(answer: Answer, rows: int = 10) -> Blocks:
         information = f"{item['expected_information']['value']:.3f}"
         found.add_row(channel, " x ".join(tail), information, apart, escape(remark))
     yield found
+    yield from reason_of(answer)
     tied = sum(item["tied_with_the_best"] for item in answer["candidates"]) - 1
     if tied > 0:
         others = "1 other is" if tied == 1 else f"{tied} others are"

@@ -27,13 +27,13 @@ from spirillum.cli.tables.parts import (
     resting_pose,
     unsteady,
 )
-from spirillum.display import fitted_words, percent, rows_of
+from spirillum.display import fitted_words, percent, rows_of, times
 from spirillum.dynamics.run_summary import told
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.released_motion import END_STATES
 from spirillum.swimming.steady import headline
-from spirillum.units import display_unit, in_unit
+from spirillum.units import display_unit, in_unit, speed_unit
 
 
 def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
@@ -53,10 +53,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
     if "trial" in answer:
         yield from released_columns(answer)
     for item in answer.get("published", ()):
-        ours = ", ".join(
-            f"{name} {in_words(value)}" for name, value in item["ours"].items() if value["value"] is not None
-        )
-        yield f"published ({item['source']}): {item['case']}: {in_words(item['published'])}; here: {ours}"
+        yield _beside_published(item)
     yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
     if "lying" in answer:
         yield from resting_pose(answer["lying"])
@@ -74,6 +71,21 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
             "likelier than another; value: the pose above; in free motion (--motion free) it may swim outside the band"
         )
     yield from error_of(answer["error_estimate"])
+
+
+def _beside_published(item: Answer) -> str:
+    """A published number with ours in its unit, and their ratios."""
+    paper = item["published"]
+    unit = display_unit(paper["value"], paper["unit"])
+    ours = ", ".join(
+        f"{name} {in_unit(own['value'], own['unit'], unit)} {unit} ({times(own['value'] / paper['value'])})"
+        for name, own in item["ours"].items()
+        if own["value"] is not None
+    )
+    return (
+        f"published ({item['source']}): {item['case']}: {in_unit(paper['value'], paper['unit'], unit)} {unit}; "
+        f"here: {ours}; {item['remark']}"
+    )
 
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
@@ -183,8 +195,14 @@ def _own_error(item: Answer) -> str:
 def _difference(share: float | None) -> str:
     if share is None:
         return "-"
-    text = f"{100.0 * share:+.1f}" if abs(100.0 * share) < 99.95 else f"{100.0 * share:+.0f}"
+    if not 1.0 / _FACTOR < 1.0 + share < _FACTOR:
+        return times(1.0 + share)
+    text = f"{100.0 * share:+.1f}"
     return "0.0%" if float(text) == 0 else f"{text}%"
+
+
+_FACTOR = 2.0
+"""Ratio from which on a difference is shown as a multiple."""
 
 
 def simulation(answer: Answer) -> Blocks:
@@ -235,6 +253,8 @@ def _averages(title: str, answer: Answer) -> Table:
         items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
         most = max((abs(item["value"]) for item in items if item["value"] is not None), default=None)
         unit = display_unit(most, items[1]["unit"])
+        if items[1]["unit"] == "m/s":
+            unit = speed_unit(most, answer.get("mean_tail_rotation_rate_on", _NONE)["value"])
         values = [in_unit(_rounded(item["value"], most), items[1]["unit"], unit) for item in items]
         table.add_row(name.removeprefix("mean_").replace("_", " "), *values, unit)
     return table
@@ -289,6 +309,7 @@ def magnetic_sweep(answer: Answer) -> Blocks:
         rows.add_row(*(in_unit(item["value"][index], item["unit"], unit) for item, unit in columns))
     yield rows
     step_out = in_unit(answer["step_out_rate"]["value"], "rad/s", "Hz")
+    yield from reason_of(answer)
     yield f"step-out in axial motion at {step_out} Hz; no lag where the robot slips"
     yield from files_of(answer, plot="plot", file="sweep")
 
@@ -315,6 +336,7 @@ def settling(answer: Answer) -> Blocks:
         for index in range(len(answer["film"]["gap"]["value"])):
             film.add_row(*(in_unit(values[index], item.unit, item.display_unit) for values, item in columns))
         yield film
+    yield from reason_of(answer)
     yield from placement_of(answer["placement"], RELEASED)
     yield from resting_pose(answer["lying"])
     yield from error_of(answer["error_estimate"])

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.display import percent, rows_of
-from spirillum.units import display_unit, in_unit
+from spirillum.units import display_unit, in_unit, speed_unit
 
 Answer = Mapping[str, Any]
 
@@ -23,17 +23,16 @@ class Detail(str):
 Block = str | Table
 """A line, a detail or a table of an answer; the first one is its title, or has it."""
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "band", "trial", "steady")
-"""Columns of numbers."""
-_BAND_WIDTH = 15
-"""Of a column with both ends of a band, so that names of quantities are whole at 80 columns."""
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "trial", "steady")
+"""Columns of numbers, which are never folded: names are."""
 
 
 def grid(title: str, *columns: str) -> Table:
     """An empty table in the look of all answers."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
     for column in columns:
-        table.add_column(column, justify="right" if column in _NUMBERS else "left", overflow="fold")
+        number = column in _NUMBERS
+        table.add_column(column, justify="right" if number else "left", overflow="fold", no_wrap=number)
     return table
 
 
@@ -66,16 +65,17 @@ def band_grid(title: str, items: Mapping[str, Any], only: Iterable[str] | None =
 
 def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) -> Table:
     """A row for each quantity of a held robot, or of `only` these, with its band, and those of its released motions."""
-    table = grid(title, "quantity", "held", "band", "trial", "steady")
-    table.columns[0].no_wrap, table.columns[2].max_width = True, _BAND_WIDTH
-    for name in answer if only is None else only:
-        for row in rows_of(answer, [name]):
-            released = (answer[column].get(name) for column in RELEASED_COLUMNS)
-            cells = [
-                "-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released
-            ]
-            band = f"{float(row.low):.3g} to {float(row.high):.3g}" if row.low and row.high else "-"
-            table.add_row(f"{row.name}, {row.unit}" if row.unit else row.name, row.value, band, *cells)
+    rows = {name: row for name in (answer if only is None else only) for row in rows_of(answer, [name])}
+    ends = ("low", "high") if any(row.low for row in rows.values()) else ()
+    table = grid(title, "quantity", "held", *ends, *RELEASED_COLUMNS)
+    if ends:
+        table.padding = (0, 1, 0, 0)  # six columns at 80 characters
+    for name, row in rows.items():
+        released = (answer[column].get(name) for column in RELEASED_COLUMNS)
+        cells = ["-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released]
+        words = "efficiency" if name == "hydrodynamic_efficiency" else row.name
+        label = f"{words}, {row.unit}" if row.unit else words
+        table.add_row(label, row.value, *(getattr(row, end) or "-" for end in ends), *cells)
     return table
 
 
@@ -93,10 +93,18 @@ def released_columns(answer: Answer) -> Iterator[Block]:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
         yield from _over_unknowns(answer["trial"])
+        yield from (Detail(f"no {names} of a trial: {reason}") for names, reason in _without_value(answer["trial"]))
     if "steady" in there and "steady" not in missing:
         constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
         after = f", approached with a time constant of {constant:.2g} s" if constant else ""
         yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
+
+
+def _without_value(motion: Answer) -> Iterator[tuple[str, str]]:
+    """Quantities that a motion does not have, by the reason that they share."""
+    reasons = {name: item["reason"] for name, item in motion.items() if isinstance(item, Mapping) and "reason" in item}
+    for reason in dict.fromkeys(reasons.values()):
+        yield ", ".join(name.replace("_", " ") for name in reasons if reasons[name] == reason), reason
 
 
 def _over_unknowns(trial: Answer) -> Iterator[str]:
@@ -107,7 +115,7 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
             standing, lost = trial["standing"], trial["without_answer"]
             yield f"no interval of the trial: of {trial['runs']} runs {standing} stand and {lost} have no answer"
         return
-    unit = display_unit(speed["high"], speed["unit"])
+    unit = speed_unit(speed["high"], trial.get("tail_rotation_rate", speed)["value"])
     low, high, middle = (in_unit(speed[key], speed["unit"], unit) for key in ("low", "high", "median"))
     parts = sorted(trial["unknowns"], key=lambda one: -float(one["share"]["value"]))
     words = [
@@ -117,6 +125,8 @@ def _over_unknowns(trial: Answer) -> Iterator[str]:
     over = "draws of the fit and what it leaves open" if "interval_of" in trial else "what is not stated"
     level = f"{100 * speed['level']:g} % interval of the speed over {over}"
     yield f"trial, {level}: {low} to {high} {unit}, median {middle} {unit}{stand}"
+    at = "the posterior median and nominal unknowns" if "interval_of" in trial else "nominal unknowns"
+    yield f"the column trial is one run, at {at}; the median is that of {trial['runs']} runs"
     if words:
         yield f"of its variance: {', '.join(words)}; state the first of them first"
 

@@ -9,7 +9,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid
+from spirillum.cli.tables.parts import Answer, Blocks, friendly, grid, placement_of, quantity_grid, reason_of
 from spirillum.results.installation import report_lines
 from spirillum.units import for_people, in_unit, shown_in
 
@@ -19,6 +19,7 @@ def robot(answer: Answer) -> Blocks:
     fields = answer["fields"]
     yield f"{fields['name']}  {fields['description']}"
     rows = grid("fields", "field", "value", "unit")
+    rows.columns[0].no_wrap, rows.columns[1].no_wrap = True, False  # values may be words
     for name, item in fields.items():
         word = "none" if name in ("tail.taper", "channel", "seal") and item is None else _word(item)
         value, unit = _quantity(item) if isinstance(item, Mapping) else (word, "")
@@ -85,6 +86,7 @@ def export(answer: Answer) -> Blocks:
         for name, item in answer["parameters"].items():
             rows.add_row(name, f"{item['value']:.6g}", item["unit"])
         yield rows
+        yield from reason_of(answer)
     else:
         links = answer["links"].items()
         masses = {f"{name} {key}": link[key] for name, link in links for key in ("mass", "displaced_volume")}

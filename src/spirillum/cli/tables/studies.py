@@ -91,10 +91,10 @@ def _basis(ranking: Answer) -> str:
 def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:
     """Titles and cells of a quantity: its values, of the speed also the ends of its band."""
     own = robots[0][name]["unit"]
-    sizes = [abs(item[name]["value"]) for item in robots if item[name]["value"]]
-    if not sizes:
+    if not any(item[name]["value"] for item in robots):
         return []
-    shown = display_unit(max(sizes), own)
+    alike = [other for other in robots[0] if other != "robot" and robots[0][other]["unit"] == own]  # speeds: one unit
+    shown = display_unit(max(abs(item[other]["value"] or 0.0) for item in robots for other in alike), own)
     with_ends = name == "forward_velocity" and STEADY_SPEED not in robots[0]  # else the table is wider than a terminal
     ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
     return [

@@ -25,6 +25,7 @@ def virtual_experiment(answer: Answer) -> Blocks:
         cells = [in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
         rows.add_row(escape(robot["robot"]), *cells)
     yield rows
+    yield from dict.fromkeys(line for robot in answer["robots"] for line in reason_of(robot))
 
 
 def virtual_trial(answer: Answer) -> Blocks:

@@ -27,6 +27,10 @@ VELOCITY_DROPS = {"lowest": VelocityDrop(0.0653, 10.0, 3.5), "largest": Velocity
 """Stated in the text on Figs 5 and 6."""
 _WIDE, _NARROW = "biorob2012-wide", "biorob2012-narrow"
 _SOURCE = "BioRob 2012, text on Figs 5 and 6"
+_REMARK = (
+    "the paper does not report how its robots were placed; in a trial the robot lies on the glass, where the film "
+    "slows it (contact assumed, not validated)"
+)
 
 
 def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> Prediction | None:
@@ -88,6 +92,7 @@ def _entry(published: float, found: Prediction, beside: Prediction, sign: float)
         "published": quantity(published, "m/s"),
         "ours": {name: quantity(value, "m/s") for name, value in ours.items()},
         "source": _SOURCE,
+        "remark": _REMARK,
     }
 
 

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
 
 from spirillum.arrays import Values
 from spirillum.display import percent
-from spirillum.dynamics.comparison import ModelComparison, estimated_error
+from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, estimated_error
 from spirillum.dynamics.trial import ASSUMPTION
 from spirillum.errors import InputError
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
@@ -284,7 +284,7 @@ def effects_figure(comparison: ModelComparison) -> Figure:
             columns=1,
             notes=[
                 "Each line keeps the effects above it; factor: speed over that of the line above.",
-                f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}.",
+                *([_TRIAL] if effects[-1].name == RELEASED_EFFECT else []),
             ],
         )
         axes = sheet.panels[0, 0]
@@ -296,6 +296,9 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
+
+
+_TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
 
 
 def _effect_label(place: int, name: str) -> str:

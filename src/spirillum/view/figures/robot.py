@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 
 from spirillum.robot.links import outlines_of
+from spirillum.robot.mesh import is_steel
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.scene import (
     FAINT,
@@ -214,7 +215,9 @@ def _draw_robot(axes: Axes, s: DrawingLayout) -> None:
         dashes=(9, 3, 2, 3),
         zorder=3,
     )
-    draw_wire(axes, robot, _COPPER, phase=PHASE, unit=unit, points=s.points)
+    draw_wire(
+        axes, robot, _COUPLING if is_steel(robot.tail.density) else _COPPER, phase=PHASE, unit=unit, points=s.points
+    )
     outlines = outlines_of(robot)
     for name, colours, order in (("coupling", _COUPLING, 7), ("body", _BODY, 8)):
         if name in outlines:

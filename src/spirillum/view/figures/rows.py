@@ -295,14 +295,17 @@ def _model_entries(shown: StudyView) -> Iterator[Line2D]:
 
 
 def _reading_entries(shown: StudyView) -> Iterator[Line2D]:
+    """Filled and hollow marks: those of the model, or of several models a grey circle."""
+    only = look_of_model(shown.models[0]) if len(shown.models) == 1 else None
+    colour, marker = ("#555555", "o") if only is None else (only.colour, only.marker)
     for number, reading in enumerate(shown.own_drive_readings):
         yield Line2D(
             [],
             [],
-            color="#555555",
+            color=colour,
             linestyle="none",
-            marker="o",
-            markerfacecolor="white" if number else "#555555",
+            marker=marker,
+            markerfacecolor="white" if number else colour,
             label=shown.reading_label(reading),
         )
 
