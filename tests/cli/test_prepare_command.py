@@ -82,11 +82,11 @@ def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[
     shown = capsys.readouterr()
     assert shown.out == ""
     assert " ".join(shown.err.split()).startswith(
-        "no table of this tube yet: it is computed once from 60 nodes, in 5 to 8 min with 2 processes"
+        "no table of this tube yet: it is computed once from 60 poses, in 5 to 8 min with 2 processes"
     )
 
 
 def test_what_an_interrupted_preparation_has_kept_is_announced() -> None:
     """The time is that of the rest."""
     said = progress_message(60, 2, kept=48)
-    assert "from 60 nodes, 48 of them saved before, 12 remaining, in 1 to 2 min" in said
+    assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min" in said

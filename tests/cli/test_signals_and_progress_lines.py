@@ -74,19 +74,19 @@ def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: b
         assert [
             line for line in before if not line.startswith(("no table of this tube yet", "table of the tube: "))
         ] == []
-        places = re.search(r"from (\d+) nodes", before[0])
+        places = re.search(r"from (\d+) poses", before[0])
         assert places is not None
-        assert re.search(rf"\d+ of {places[1]} nodes are saved; the same command resumes the computation$", last)
+        assert re.search(rf"\d+ of {places[1]} poses are saved; the same command resumes the computation$", last)
 
 
 @pytest.mark.slow
 def test_signal_ends_work_of_one_process_too(tmp_path: Path) -> None:
     ended, said = _ended(LONG["a table by this process"], tmp_path, signal.SIGTERM, group=False)
-    assert (ended, "nodes are saved" in said) == (143, True)
+    assert (ended, "poses are saved" in said) == (143, True)
 
 
 def test_what_is_kept_is_counted() -> None:
-    assert kept_after(60, 12) == "12 of 60 nodes are saved; the same command resumes the computation"
+    assert kept_after(60, 12) == "12 of 60 poses are saved; the same command resumes the computation"
 
 
 class _Clock:

@@ -40,7 +40,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
-from spirillum.swimming.preparation import preparation_minutes, table_for, why_no_table
+from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
@@ -75,7 +75,7 @@ def why_not_released(held: Prediction) -> str:
     if not has_table(batch, "yaw"):
         return why_no_table(batch) or (
             "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
-            f"{' to '.join(map(str, preparation_minutes(batch, 'yaw')))} min, `simulate` and `settle` too"
+            f"{preparation_time(batch, 'yaw')}, `simulate` and `settle` too"
         )
     return ""
 

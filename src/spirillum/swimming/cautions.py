@@ -14,7 +14,7 @@ from spirillum.robot.tables import FrictionReading
 from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import has_table
-from spirillum.swimming.preparation import preparation_minutes, why_no_table
+from spirillum.swimming.preparation import preparation_time, why_no_table
 from spirillum.swimming.reynolds import reynolds_limits
 from spirillum.swimming.steady import Swimming
 from spirillum.units import show
@@ -99,11 +99,8 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[Note]:
     are = "is" if len(over) == 1 else "are"
     more = "--band gives the band over them, in minutes"
     if not has_table(batch) and not why_no_table(batch):
-        whole, band = (preparation_minutes(batch, stage) for stage in ("yaw", "straight"))
-        more = (
-            f"`spirillum prepare ROBOT` adds band, trial, steady in {whole[0]} to {whole[1]} min "
-            f"(--stage straight: band, {band[0]} to {band[1]})"
-        )
+        whole, band = (preparation_time(batch, stage) for stage in ("yaw", "straight"))
+        more = f"`spirillum prepare ROBOT` adds band, trial, steady in {whole} (--stage straight: band, {band})"
     return [Note("pose-unknown", f"{' and '.join(over)} {are} unknown: this answer is for one pose; {more}", over)]
 
 

@@ -23,7 +23,7 @@ from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import YAW_SHARES, range_of
+from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
@@ -301,17 +301,9 @@ def why_no_table(batch: RobotBatch) -> str:
     return _why_no_table(RobotGeometry.of(batch), tube_radius(batch))
 
 
-def preparation_minutes(batch: RobotBatch, stage: StageName) -> tuple[int, int]:
-    """Return about how long the table of the first robot of a batch takes, on a fast and on a slow machine, min.
-
-    With two processes, and no node solved for before.
-    """
-    places = Places(RobotGeometry.of(batch), tube_radius(batch), STAGES[stage])
-    nodes = (len(places.gaps) - 1) * (len(places.up) + len(places.down) - 1) + len(places.up)
-    if places.stage.yawed:
-        nodes += (len(places.yaw_gaps) - 1) * len(places.yaw_pitches) * len(YAW_SHARES)
-    least, most = (max(round(nodes * each / (2 * 60.0)), 1) for each in places.stage.seconds)
-    return least, most
+def preparation_time(batch: RobotBatch, stage: StageName) -> str:
+    """Return about how long the table of the first robot of a batch takes with two processes, in words."""
+    return Places(RobotGeometry.of(batch), tube_radius(batch), STAGES[stage]).time_to_solve()
 
 
 def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:

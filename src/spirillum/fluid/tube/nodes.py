@@ -16,11 +16,12 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.tube.film_surface import FilmBody
+from spirillum.fluid.tube.progress_messages import time_span
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import FINE, Stage
 from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
+from spirillum.kernels.tube_table import STEEPEST, YAW_SHARES, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.outline import Arc, Outline, Segment, Smooth
 from spirillum.robot.tube_pose import Seat, last_clear
 from spirillum.units import show
@@ -122,6 +123,18 @@ class Places:
     def down(self) -> Samples:
         """Nodes f nose down."""
         return np.array(self.stage.down)
+
+    @property
+    def solutions(self) -> int:
+        """Number of poses that are solved for: nodes, those on the axis without the lowered ones, and check poses."""
+        count = (len(self.gaps) - 1) * (len(self.up) + len(self.down) - 1) + len(self.up) + self.stage.held_out
+        if self.stage.yawed:
+            count += (len(self.yaw_gaps) - 1) * len(self.yaw_pitches) * len(YAW_SHARES) + self.stage.held_out
+        return count
+
+    def time_to_solve(self, workers: int = 2) -> str:
+        """How long a fast and a slow machine need for them, in words."""
+        return time_span(*(self.solutions * each / workers for each in self.stage.seconds))
 
     @cached_property
     def yaw_gaps(self) -> Samples:

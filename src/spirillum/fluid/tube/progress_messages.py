@@ -11,18 +11,29 @@ OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of
 """Progress messages that are to be read, too."""
 
 
-def progress_message(places: int, workers: int, kept: int, seconds: tuple[float, float] = (10.0, 17.0)) -> str:
-    """Return the announcement of a table that is made: from how many places, and about how long it takes."""
-    remaining = places - kept
-    least, most = (max(round(remaining * each / max(workers, 1) / 60.0), 1) for each in seconds)
-    minutes = f"about {least} min" if least == most else f"{least} to {most} min"
+def time_span(least: float, most: float) -> str:
+    """Return a span of two times given in seconds, in words: "20 to 60 s", "50 s to 2 min"."""
+    (low, unit), (high, last) = map(_rounded, (least, most))
+    if (low, unit) == (high, last):
+        return f"about {low} {unit}"
+    return f"{low} to {high} {last}" if unit == last else f"{low} {unit} to {high} {last}"
+
+
+def _rounded(seconds: float) -> tuple[int, str]:
+    return (max(round(seconds / 10.0), 1) * 10, "s") if seconds < 95.0 else (round(seconds / 60.0), "min")
+
+
+def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, float] = (10.0, 17.0)) -> str:
+    """Return the announcement of a table that is made: from how many poses, and about how long it takes."""
+    remaining = poses - kept
     before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
+    takes = time_span(*(remaining * each / max(workers, 1) for each in seconds))
     return (
-        f"{ANNOUNCED}: it is computed once from {places} nodes{before}, in {minutes} with "
+        f"{ANNOUNCED}: it is computed once from {poses} poses{before}, in {takes} with "
         f"{'1 process' if workers == 1 else f'{workers} processes'}"
     )
 
 
-def kept_after(places: int, kept: int) -> str:
+def kept_after(poses: int, kept: int) -> str:
     """Describe the saved state of an interrupted preparation, and how to resume it."""
-    return f"{kept} of {places} nodes are saved; the same command resumes the computation"
+    return f"{kept} of {poses} poses are saved; the same command resumes the computation"
