@@ -309,7 +309,7 @@ _FIRST = ("posterior-unusable", "synthetic")
 """What outweighs all that a video shows."""
 _LIGHT = (
     *("stray-frames", "pixels-not-square", "pixel-aspect-replaced", "pictures-turned", "slant-left-out"),
-    *("sixteen-bit-images", "several-films", "by-hand", "corrected-by-hand", "imported"),
+    *("sixteen-bit-images", "several-films", "by-hand", "corrected-by-hand", "imported", "no-video"),
 )
 """What a video shows and hardly changes its numbers."""
 KINDS: dict[str, NoteKind] = {
