@@ -103,6 +103,7 @@ class BodyFinder:
         self._scatter = self.contour.floor.copy()
         self.seal = SealEdges(self.contour, colours) if colours else None
         self._on_seal = np.empty(0, dtype=np.int64) if self.seal is None else self.seal.chosen
+        self._seal_contour = self.contour.some(self._on_seal)
         group = self.contour.group
         self._cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
         self._ends = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
@@ -175,8 +176,8 @@ class BodyFinder:
 
     def _seal_places(self, pose: BodyPose) -> tuple[Samples, Samples]:
         """Pixels and normals of the seal's edges."""
-        pixels, normals, _, _ = self.contour.places(pose, self.optics)
-        return pixels[self._on_seal], normals[self._on_seal]
+        pixels, normals, _, _ = self._seal_contour.places(pose, self.optics)
+        return pixels, normals
 
     def profiles(self, image: np.ndarray, pose: BodyPose) -> Samples:
         """Brightness across each edge of a body at a pose, of 255, (n, m); NaN out of view."""
@@ -244,9 +245,10 @@ class BodyFinder:
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
             return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None)
         bounds = ends[0], ends[1], stops[0], stops[1]
-        grey = grey_part(image, bounds, OUTLINE.blur)
-        colours = None if self.seal is None else colour_part(image, bounds, OUTLINE.blur)
-        return _Part(grey, np.array(ends, dtype=float), colours)
+        if self.seal is None:
+            return _Part(grey_part(image, bounds, OUTLINE.blur), np.array(ends, dtype=float), None)
+        colours = colour_part(image, bounds, OUTLINE.blur)
+        return _Part(grey_of(colours.picture), colours.origin, colours)
 
     def _profiles(self, part: _Part, pixels: Samples, normals: Samples) -> Samples:
         out = np.empty((1, len(pixels), self.offsets.size))
@@ -334,20 +336,28 @@ class BodyFinder:
 
     def _seen_edges(self, part: _Part, pose: BodyPose, *, seal_only: bool, rough: bool) -> _Edges:
         """Displacements of all edges: of the outline by brightness, and of the seal by its colours too."""
+        if seal_only:
+            pixels, normals, _, slopes = self._seal_contour.places(pose, self.optics)
+            return self._edges_of_seal(part, pixels, normals, slopes, rough=rough)
         pixels, normals, _, slopes = self.contour.places(pose, self.optics)
-        found = []
-        if not seal_only:
-            shifts, known, variance = self._shifts(part, pixels, normals)
-            found.append(_Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter)))
-        if self.seal is not None and part.colours is not None:
-            here = self._on_seal
-            seen = self.seal.shifts(part.colours, pixels[here], normals[here], rough=rough)
-            variance = np.where(seen.known, seen.variance + self._seal_scatter**2, np.inf)
-            inside = np.isfinite(seen.shifts)
-            found.append(
-                _Edges(seen.shifts, seen.known, variance, slopes[here], inside, np.isfinite(self._seal_scatter))
-            )
-        return found[0] if len(found) == 1 else _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
+        shifts, known, variance = self._shifts(part, pixels, normals)
+        outline = _Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter))
+        if self.seal is None or part.colours is None:
+            return outline
+        seal = self._edges_of_seal(part, *(values[self._on_seal] for values in (pixels, normals, slopes)))
+        return _Edges(*(np.concatenate(values) for values in zip(outline, seal, strict=True)))
+
+    def _edges_of_seal(
+        self, part: _Part, pixels: Samples, normals: Samples, slopes: Samples, *, rough: bool = False
+    ) -> _Edges:
+        """Displacements of the seal's edges at their places."""
+        assert self.seal is not None  # noqa: S101 - checked by the caller
+        assert part.colours is not None  # noqa: S101
+        seen = self.seal.shifts(part.colours, pixels, normals, rough=rough)
+        variance = np.where(seen.known, seen.variance + self._seal_scatter**2, np.inf)
+        return _Edges(
+            seen.shifts, seen.known, variance, slopes, np.isfinite(seen.shifts), np.isfinite(self._seal_scatter)
+        )
 
     def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0
@@ -424,8 +434,14 @@ def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float)
     """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255, (h, w, 1)."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
-    grey = cv2.cvtColor(image[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
+    grey = grey_of(image[top:bottom, left:right].astype(np.float32))
     return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))[..., None]
+
+
+def grey_of(colours: np.ndarray) -> np.ndarray:
+    """Brightness of a picture in single precision, (h, w, 1)."""
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY))[..., None]
 
 
 def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:
