@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -41,8 +42,9 @@ class PoseFit(NamedTuple):
         return bool(np.isfinite(self.error.x))
 
 
-class _Part(NamedTuple):
-    """A part of a picture, blurred a little."""
+@dataclass
+class _Part:
+    """A part of a picture, blurred a little, and the outline there at the last pose that was looked at."""
 
     grey: np.ndarray
     """Brightness, (h, w, 1), single precision."""
@@ -50,6 +52,12 @@ class _Part(NamedTuple):
     """Pixel (u, v) of its upper left corner, (2,)."""
     colours: ColourPart | None
     """Its colours; None where they are not needed, or nothing is in view."""
+    pose: BodyPose
+    """The pose."""
+    places: tuple[Samples, Samples, Samples, Samples]
+    """The edges at this pose: see `Contour.places`."""
+    profiles: Samples | None = None
+    """Brightness across them; None where it was not needed yet."""
 
 
 class _Edges(NamedTuple):
@@ -144,10 +152,7 @@ class BodyFinder:
             found = self._learn_seal(parts, poses)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
         for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
-            stack = []
-            for part, pose in zip(parts, poses, strict=True):
-                pixels, normals, _, _ = self.contour.places(pose, self.optics)
-                stack.append(self._profiles(part, pixels, normals))
+            stack = [self._profiles(part, pose) for part, pose in zip(parts, poses, strict=True)]
             self._learn_profiles(np.stack(stack))
             if self.seal is not None and turn == 0:
                 self._learn_biases(parts, found, SEAL.follows_seal)
@@ -181,8 +186,7 @@ class BodyFinder:
 
     def profiles(self, image: np.ndarray, pose: BodyPose) -> Samples:
         """Brightness across each edge of a body at a pose, of 255, (n, m); NaN out of view."""
-        pixels, normals, _, _ = self.contour.places(pose, self.optics)
-        return self._profiles(self._part(image, pose), pixels, normals)
+        return self._profiles(self._part(image, pose), pose)
 
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
         """Squared gradient of each edge's template along its normal, and weights of the edges.
@@ -237,23 +241,34 @@ class BodyFinder:
         return bool(moves.mean() > SEAL.outline_share and nose.mean() > SEAL.nose_share)
 
     def _part(self, image: np.ndarray, pose: BodyPose) -> _Part:
-        pixels = self.contour.places(pose, self.optics)[0]
+        places = self.contour.places(pose, self.optics)
+        pixels = places[0]
         low, high = pixels.min(axis=0) - self.margin, pixels.max(axis=0) + self.margin
         left, top, right, bottom = self.bounds
         ends = [int(np.clip(value, a, b)) for value, a, b in ((low[0], left, right), (low[1], top, bottom))]
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
-            return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None)
+            return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None, pose, places)
         bounds = ends[0], ends[1], stops[0], stops[1]
         if self.seal is None:
-            return _Part(grey_part(image, bounds, OUTLINE.blur), np.array(ends, dtype=float), None)
+            return _Part(grey_part(image, bounds, OUTLINE.blur), np.array(ends, dtype=float), None, pose, places)
         colours = colour_part(image, bounds, OUTLINE.blur)
-        return _Part(grey_of(colours.picture), colours.origin, colours)
+        return _Part(grey_of(colours.picture), colours.origin, colours, pose, places)
 
-    def _profiles(self, part: _Part, pixels: Samples, normals: Samples) -> Samples:
-        out = np.empty((1, len(pixels), self.offsets.size))
-        profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
-        return np.asarray(out[0])
+    def _places(self, part: _Part, pose: BodyPose) -> tuple[Samples, Samples, Samples, Samples]:
+        """The outline's edges at a pose: see `Contour.places`."""
+        if part.pose != pose:
+            part.pose, part.places, part.profiles = pose, self.contour.places(pose, self.optics), None
+        return part.places
+
+    def _profiles(self, part: _Part, pose: BodyPose) -> Samples:
+        """Brightness across each edge of the outline at a pose, of 255, (n, m)."""
+        pixels, normals, _, _ = self._places(part, pose)
+        if part.profiles is None:
+            out = np.empty((1, len(pixels), self.offsets.size))
+            profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
+            part.profiles = np.asarray(out[0])
+        return part.profiles
 
     def _learn_profiles(self, stack: Samples) -> None:
         """Learn each edge's template: the first principal component of its profiles and those of its neighbours."""
@@ -289,8 +304,7 @@ class BodyFinder:
         residuals = []
         for part, one in zip(parts, found, strict=True):
             if one.known:
-                pixels, normals, _, _ = self.contour.places(one.pose, self.optics)
-                shifts, known, _ = self._shifts(part, pixels, normals)
+                shifts, known, _ = self._shifts(part, one.pose)
                 residuals.append(np.where(known, shifts, np.nan))
         if len(residuals) < 6:
             return
@@ -317,12 +331,11 @@ class BodyFinder:
         _, spread, enough = _usual(residuals)
         self._seal_scatter = np.where(enough, np.hypot(self._seal_floor, spread), 0.5)
 
-    def _shifts(self, part: _Part, pixels: Samples, normals: Samples) -> tuple[Samples, np.ndarray, Samples]:
+    def _shifts(self, part: _Part, pose: BodyPose) -> tuple[Samples, np.ndarray, Samples]:
         """Displacement of each edge along its normal, pixels, its validity, and its variance."""
         assert self._template is not None  # noqa: S101 - learnt first
-        count = len(pixels)
+        count, profiles = len(self.contour.group), self._profiles(part, pose)
         shifts, strengths, misses = np.empty(count), np.empty(count), np.empty(count)
-        profiles = self._profiles(part, pixels, normals)
         shifts_of_profiles(profiles, self._template, self._derivative, shifts, strengths, misses)
         known = (
             np.isfinite(shifts)
@@ -339,8 +352,8 @@ class BodyFinder:
         if seal_only:
             pixels, normals, _, slopes = self._seal_contour.places(pose, self.optics)
             return self._edges_of_seal(part, pixels, normals, slopes, rough=rough)
-        pixels, normals, _, slopes = self.contour.places(pose, self.optics)
-        shifts, known, variance = self._shifts(part, pixels, normals)
+        pixels, normals, _, slopes = self._places(part, pose)
+        shifts, known, variance = self._shifts(part, pose)
         outline = _Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter))
         if self.seal is None or part.colours is None:
             return outline
