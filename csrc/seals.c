@@ -171,3 +171,46 @@ EXPORT void seal_shares(const double *colours, const double *offsets, const int6
         }
     }
 }
+
+/* Least squares of a profile of shares: level, contrast and slope of the template, and the residual. */
+typedef struct {
+    const double (*design)[3], *inverse; /* template's columns, (samples, 3), and their pseudoinverse, (3, samples) */
+    int64_t first;                       /* first sample that is used */
+} Template;
+
+static double fit_template(const Template *t, const double *share, int64_t samples, double numbers[3]) {
+    double misses = 0.0;
+    for (int a = 0; a < 3; a++) {
+        numbers[a] = 0.0;
+        for (int64_t k = t->first; k < samples; k++) numbers[a] += t->inverse[a * samples + k] * share[k];
+    }
+    for (int64_t k = t->first; k < samples; k++) {
+        const double *row = t->design[k];
+        misses += squared(share[k] - row[0] * numbers[0] - row[1] * numbers[1] - row[2] * numbers[2]);
+    }
+    return sqrt(misses / (double)(samples - t->first - 3));
+}
+
+EXPORT void seal_shifts(const double *share, const double *distance, const int64_t *kind, const int64_t (*sides)[3],
+                        const double *bias, const double (*design)[3], const double *inverses, const int64_t starts[2],
+                        double steepness, double largest, double weakest, double strongest, double noise,
+                        double *shifts, uint8_t *known, double *variance, int64_t edges, int64_t samples, int64_t count,
+                        int64_t kinds) {
+    for (int64_t i = 0; i < edges; i++) {
+        shifts[i] = variance[i] = NAN;
+        known[i] = 0;
+    }
+    for (int64_t s = 0; s < count; s++) {
+        const int64_t which = sides[s][FLANK] != 0;
+        const Template template = {design, inverses + which * 3 * samples, starts[which]};
+        for (int64_t i = sides[s][FIRST]; i < sides[s][END]; i++) {
+            double numbers[3];
+            const double miss = fit_template(&template, share + i * samples, samples, numbers);
+            const double strength = numbers[1], shift = -numbers[2] / numbers[1];
+            const double least = noise / sqrt(larger(distance[i], 1e-9));
+            known[i] = distance[i] > 0.0 && fabs(shift) < largest && weakest < strength && strength < strongest;
+            shifts[i] = shift - bias[s * kinds + kind[i]];
+            variance[i] = squared(larger(miss, least) / larger(fabs(strength) * steepness, 1e-9));
+        }
+    }
+}

@@ -17,6 +17,7 @@ from hypothesis import Phase, settings
 
 from browser import LEFT_OUT
 from commands import Outcome, run_command
+from learnt_once import learnt_once
 from remembered import remembered
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
@@ -116,6 +117,13 @@ def flat_pictures() -> ModuleType:
     import flat_pictures
 
     return flat_pictures
+
+
+@pytest.fixture(scope="module")
+def learning_shared() -> Iterator[None]:
+    """The tracker learns from the same frames once for all tests of a file."""
+    with learnt_once():
+        yield
 
 
 @pytest.fixture

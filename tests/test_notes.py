@@ -75,6 +75,8 @@ def test_the_weightiest_cautions_take_three_rows() -> None:
     ]
     assert [note.code for note in shown_cautions(notes)] == ["walls-left-out", "misfit"]
     assert [note.code for note in shown_cautions([*notes, Note("pose-unknown", "p" * 150)])] == ["walls-left-out"]
+    video = [Note(code, "v" * 100) for code in ("setup-incomplete", "intervals-incomplete", "robot-stands-still")]
+    assert [note.code for note in shown_cautions(video)] == ["robot-stands-still"]  # what it shows outweighs the rest
 
 
 def test_a_robot_that_does_not_rest_on_the_floor_says_so_first() -> None:

@@ -249,9 +249,13 @@ _FAMILIES = {
         "Over a grid or through glass the outline may follow what is not the body's: no coloured seal was found, or it "
         "moves otherwise. Speed and tail rate are less certain or not given. Use a bright seal or plain paper."
     ),
-    "two-robots not-the-robot something-else-followed robot-stands-still does-not-advance one-picture": (
+    "two-robots not-the-robot something-else-followed does-not-advance one-picture": (
         "What was tracked may not be the robot, or not the only one. Nothing, or less, is given. Crop the video to "
         "one robot."
+    ),
+    "robot-stands-still": (
+        "The robot is in view and does not move. Speed and rates are 0, or not given where too little of it is seen. "
+        "Check its motor, or film for longer."
     ),
     (
         "robot-not-seen robot-came-late robot-left-the-view robot-lost robot-partly-out-of-view edges-hidden standing-"
@@ -301,9 +305,18 @@ class NoteKind(NamedTuple):
     """What is assumed or violated, what follows, what to do."""
 
 
+_FIRST = ("posterior-unusable", "synthetic")
+"""What outweighs all that a video shows."""
+_LIGHT = (
+    *("stray-frames", "pixels-not-square", "pixel-aspect-replaced", "pictures-turned", "slant-left-out"),
+    *("sixteen-bit-images", "several-films", "by-hand", "corrected-by-hand", "imported", "no-video"),
+)
+"""What a video shows and hardly changes its numbers."""
 KINDS: dict[str, NoteKind] = {
-    **{code: NoteKind("caution", words) for code, words in CAUTIONS.items()},
-    **{code: NoteKind("caution", words) for code, words in TRACKING.items()},
+    **{
+        code: NoteKind("caution", (CAUTIONS | TRACKING)[code])
+        for code in (*_FIRST, *(name for name in TRACKING if name not in _LIGHT), *CAUTIONS, *_LIGHT)
+    },
     **{code: NoteKind("info", words) for code, words in INFORMATION.items()},
 }
 """Kinds of notes by code; cautions in the order in which a terminal shows them."""

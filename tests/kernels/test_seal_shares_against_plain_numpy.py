@@ -1,10 +1,10 @@
-"""Shares of a stripe's colour across the edges of a seal against a short NumPy reference, also out of view."""
+"""Edges of a seal, shares of colour across them and displacements, against short NumPy references."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from spirillum.kernels.edges import seal_shares
+from spirillum.kernels.edges import seal_shares, seal_shifts
 
 OFFSETS = np.arange(-6.0, 7.0)
 SIDES = np.array([[0, 12, 0], [12, 30, 1], [30, 36, 0]])
@@ -59,3 +59,35 @@ def test_shares_are_those_of_plain_numpy(kinds: int, hidden: float) -> None:
     assert distance[5] == 0.0
     assert np.isnan(share[SIDES[2, 0] :]).all()  # too few edges of this side
     assert not distance[SIDES[2, 0] :].any()
+
+
+@pytest.mark.parametrize("start", [0, 3])
+def test_shifts_are_those_of_linear_least_squares(start: int) -> None:
+    """At a silhouette, the second side, the first samples may be left out."""
+    rng = np.random.default_rng(4)
+    count, template = int(SIDES[1, 1]), -0.5 * np.tanh(OFFSETS / 2.0)
+    design = np.column_stack([np.ones(OFFSETS.size), template, np.gradient(template)])
+    starts, inverses = np.array([0, start]), np.zeros((2, 3, OFFSETS.size))
+    for inverse, first in zip(inverses, starts, strict=True):
+        inverse[:, first:] = np.linalg.pinv(design[first:])
+    share = 0.5 - 0.5 * np.tanh((OFFSETS - rng.uniform(-3.0, 3.0, (count, 1))) / 2.0)
+    share = rng.uniform(0.2, 1.5, (count, 1)) * share + 0.01 * rng.normal(size=share.shape)
+    share[4] = np.nan
+    distance, kind = rng.uniform(0.0, 9.0, count), rng.integers(0, 4, count)
+    distance[7] = 0.0
+    bias = rng.normal(size=(2, 4))
+    shifts, known, variance = np.empty(count), np.empty(count, dtype=bool), np.empty(count)
+    limits = 1.7, 2.5, 0.4, 1.2, 0.03  # steepness, largest shift, contrasts, noise
+    given = share, distance, kind, SIDES[:2], bias, design, inverses, starts
+    seal_shifts(*given, *limits, shifts, known.view(np.uint8), variance)
+    assert 0 < known.sum() < count - 2
+    for k in range(count):
+        side = int(k >= SIDES[0, 1])
+        rows = slice(starts[side], None)
+        numbers = np.linalg.pinv(design[rows]) @ share[k, rows]
+        shift, miss = -numbers[2] / numbers[1], share[k, rows] - design[rows] @ numbers
+        assert shifts[k] == pytest.approx(shift - bias[side, kind[k]], rel=1e-9, nan_ok=True)
+        assert known[k] == (distance[k] > 0.0 and abs(shift) < 2.5 and 0.4 < numbers[1] < 1.2)
+        if known[k]:
+            usual = max(np.sqrt(miss @ miss / (miss.size - 3)), 0.03 / np.sqrt(distance[k]))
+            assert variance[k] == pytest.approx((usual / (numbers[1] * 1.7)) ** 2, rel=1e-9)

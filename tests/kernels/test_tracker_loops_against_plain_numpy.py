@@ -12,7 +12,16 @@ from spirillum.kernels.edges import (
     shifts_of_profiles,
     sums_along,
 )
-from spirillum.kernels.pictures import profile_of_rows, ridge_of, sampled, stripe_fit, stripes_at, wave_fit, wave_scores
+from spirillum.kernels.pictures import (
+    profile_of_rows,
+    ridge_of,
+    sampled,
+    stripe_edges,
+    stripe_fit,
+    stripes_at,
+    wave_fit,
+    wave_scores,
+)
 from spirillum.vision.camera.optics import Optics
 
 
@@ -250,3 +259,32 @@ def test_a_fitted_wave_has_the_phase_offset_and_tilt_of_its_ridge(rng: np.random
     ridge[:] = np.nan
     wave_fit(ridge, XI, tilt, WAVE, 1.15, STEP, 9e-4, 30.0, 3e-4, 1.4e-3, np.empty((150, 10)), unseen)
     assert np.isnan(unseen).all()
+
+
+def test_edges_between_stripes_are_those_of_the_least_squares(rng: np.random.Generator) -> None:
+    count, width = 60, 2.0 * np.pi / 8
+    angles, tried = np.linspace(-1.3, 1.3, count), np.linspace(-0.25, 0.25, 41)
+    colours, blur = rng.uniform(0.0, 250.0, (8, 3)), rng.uniform(0.02, 0.06, count)
+    colours[3] = colours[2]  # no edge to be seen
+    shade = np.column_stack([rng.uniform(0.6, 1.0, (count, 3)), rng.uniform(0.0, 9.0, (count, 3))])
+    levels, roll, found = np.empty((count, 3)), 2.6, np.empty(8)
+    stripes_at(angles, blur, roll + 0.04, np.arange(8), colours, levels)
+    levels = shade[:, :3] * levels + shade[:, 3:] + rng.normal(size=levels.shape)
+    levels[-3, 1] = np.nan
+    limits = tried[1] - tried[0], 0.9, 0.42, 40.0, 8
+    stripe_edges(levels, angles, blur, shade, colours, roll, tried, *limits, np.empty(tried.size), found)
+    for edge in range(8):
+        place = np.remainder(roll + (edge - 0.5) * width + np.pi, 2.0 * np.pi) - np.pi
+        near = np.abs(angles - place) < 0.42 * width
+        if abs(place) > 0.9 or edge == 3 or not np.isfinite(levels[near]).all():
+            assert np.isnan(found[edge])
+            continue
+        share = ndtr((angles[near] - place - tried[:, None]) / blur[near])[..., None]
+        model = shade[near, :3] * (colours[edge - 1] + share * (colours[edge] - colours[edge - 1])) + shade[near, 3:]
+        losses = np.sum((levels[near] - model) ** 2, axis=(1, 2))
+        best = int(np.argmin(losses))
+        low, middle, high = losses[best - 1 : best + 2]
+        shift = tried[best] + 0.5 * limits[0] * (low - high) / (low - 2.0 * middle + high)
+        assert found[edge] == pytest.approx(shift, abs=1e-9)
+        assert shift == pytest.approx(0.04, abs=0.02)
+    assert np.isfinite(found).sum() >= 2

@@ -1,14 +1,13 @@
 """A flat drawing of a robot for the live tracker."""
 
 from collections.abc import Iterator
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from flat_pictures import Flat
-from spirillum.live import tracker
+from learnt_once import learnt_once
 
 
 @pytest.fixture(scope="session")
@@ -34,16 +33,7 @@ def filmed(swimmer: Any, pictures: Any, tmp_path_factory: pytest.TempPathFactory
 
 
 @pytest.fixture(scope="session", autouse=True)
-def learnt_once() -> Iterator[None]:
-    """The same frames are learnt from once; what is learnt changes while a robot is followed, so each has a copy."""
-    learn, known = tracker.learnt_from, {}
-
-    def learnt(video: Any, frames: list[Any], setup: Any, *more: Any, **how: Any) -> Any:
-        key = repr(setup), repr(how), *(frame.image.tobytes() for frame in frames)
-        if key not in known:
-            known[key] = learn(video, frames, setup, *more, **how)
-        return deepcopy(known[key])
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tracker, "learnt_from", learnt)
+def shared_learning() -> Iterator[None]:
+    """All tests of a worker learn from its frames once."""
+    with learnt_once():
         yield

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.measurement.outliers import outlying_frames, outlying_trial
-from spirillum.measurement.rates import PeriodicError, mean_of, rate_of
+from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 
 FRAMES = 300
 TIME = np.arange(FRAMES) / 30.0
@@ -274,3 +274,19 @@ def test_a_fast_start_is_a_part_of_the_rate_and_no_outlier() -> None:
     assert rate.outliers == 0
     assert rate.low < truth < rate.high
     assert rate.value == pytest.approx(truth, rel=0.01)
+
+
+@pytest.mark.parametrize(("alike", "reach"), [(0.0, 0.5), (-1.0, 0.7), (1.0, 0.5)])
+def test_the_rate_of_a_difference_is_that_of_the_rates_and_as_sure_as_their_errors_allow(
+    alike: float, reach: float
+) -> None:
+    """Independent errors add up in quadrature, 0.3 and 0.4; those against each other add up, 0.3 + 0.4."""
+    own = np.array([1.0, -1.0, 1.0, -1.0])
+    other = alike * own if alike else np.array([1.0, 1.0, -1.0, -1.0])
+    one = Rate(5.0, 4.7, 5.3, 4, 0, steady=True, correlation_time=0.0, residual=own)
+    another = Rate(-2.0, -2.4, -1.6, 4, 1, steady=True, correlation_time=0.0, residual=other)
+    found = one.less(another)
+    assert (found.value, found.frames) == (7.0, 4)
+    assert (found.low, found.high) == pytest.approx((7.0 - reach, 7.0 + reach))
+    apart = Rate(-2.0, -2.4, -1.6, 4, 0, steady=True, correlation_time=0.0, residual=np.full(4, np.nan))
+    assert not one.less(apart).measured

@@ -15,6 +15,7 @@ from spirillum.results.measurement import measure
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")
+pytestmark = pytest.mark.usefixtures("learning_shared")
 
 
 class Scene(NamedTuple):
@@ -32,7 +33,7 @@ class Scene(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def scene(flat_pictures: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def scene(flat_pictures: ModuleType, tmp_path_factory: pytest.TempPathFactory, learning_shared: None) -> Scene:
     """A robot at 2 mm/s for 2 s; where it is, our own tracker says of the whole film."""
     film = tmp_path_factory.mktemp("tracks") / "a.mp4"
     setup = flat_pictures.Flat(frames=20, fps=10.0, velocity=2e-3, tail_rate=5.0, body_rate=-1.0).write(film)

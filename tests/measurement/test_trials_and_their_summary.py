@@ -1,5 +1,6 @@
 """What a trial measures, what a flag spoils, and what all trials share."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from spirillum.measurement.measure import compared, summary_of
+from spirillum.measurement.measure import Measurement, compared, summary_of
 from spirillum.measurement.outliers import without_lead
 from spirillum.measurement.series import observation_rows
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, Trial, trial_of
@@ -34,6 +35,8 @@ def test_motor_rate_is_tail_less_body_and_truth_is_inside(make_trial: MakeTrial)
         item = trial.quantities[name]
         assert item.low <= value <= item.high
         assert item.value == pytest.approx(value, rel=2e-3)
+    body, tail, motor = (trial.quantities[f"{part}_rotation_rate"].value for part in ("body", "tail", "motor"))
+    assert motor == pytest.approx(tail - body, rel=1e-12)
     assert trial.flags == ()
 
 
@@ -279,3 +282,15 @@ def test_the_first_frames_of_a_robot_whose_rate_changes_are_kept(make_track: Mak
     assert np.isfinite(trial.fits["body_rotation_rate"].residual[:6]).all()
     found = trial.quantities["body_rotation_rate"]
     assert found.low < -0.2 - 0.15 * (1.0 - np.exp(-time[-1] / 0.8)) / time[-1] < found.high
+
+
+def test_values_of_the_example_are_no_concern_where_a_video_confirms_the_scale(make_track: Make, robot: Any) -> None:
+    def remarks(size: float, *flags: Flag) -> list[str]:
+        track = make_track(span=2.0, flags=flags)
+        trial = trial_of(replace(track, scale=replace(track.scale, apparent_size=size)), robot)
+        found = Measurement((trial,), summary_of([trial]), robot, "setup.toml")
+        return [note for note in found.warnings if "as in the example of setup new" in note]
+
+    assert remarks(0.998) == []
+    assert len(remarks(math.nan)) == 1  # by hand: nothing shows how large the robot looks
+    assert len(remarks(1.06, Flag("size-does-not-fit", "too large"))) == 1

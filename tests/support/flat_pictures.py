@@ -118,27 +118,48 @@ class Flat:
         """The picture at a time, (height, width, 3), 8-bit RGB."""
         import cv2
 
-        width, height = self.size
-        canvas = self._still.copy()
-        self._draw_rotor(canvas, time)
-        self._draw_body(canvas, time)
-        picture = cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA).astype(float)
+        left, top, right, bottom = self._window(time)
+        still, canvas, picture = self._still
+        picture = picture.copy()
+        if right > left and bottom > top:
+            part = slice(top * self.fine, bottom * self.fine), slice(left * self.fine, right * self.fine)
+            self._draw_rotor(canvas, time)
+            self._draw_body(canvas, time)
+            box = (right - left, bottom - top)
+            picture[top:bottom, left:right] = cv2.resize(canvas[part], box, interpolation=cv2.INTER_AREA)
+            canvas[part] = still[part]
+        if not self.lamp and not self.noise:
+            return picture
         duration = self.frames / self.fps
-        picture *= 1.0 + self.lamp * np.sin(1.5 * np.pi * time / duration)
+        bright = picture * (1.0 + self.lamp * np.sin(1.5 * np.pi * time / duration))
         if self.noise:
             rng = np.random.default_rng([self.seed, round(1e6 * time)])
-            picture += rng.normal(0.0, self.noise, picture.shape)
-        return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+            bright += rng.normal(0.0, self.noise, bright.shape)
+        return np.clip(np.rint(bright), 0, 255).astype(np.uint8)
+
+    def _window(self, time: float) -> tuple[int, int, int, int]:
+        """Pixels about all of the robot: left, top, right, bottom; the rest of the picture is still."""
+        robot, tail = self.robot, self.robot.tail
+        front, wire = 0.5 * robot.body.length, tail.wire_diameter
+        ends = -front - robot.coupling.length - tail.length - wire, front
+        reach = max(0.5 * robot.body.diameter, 0.5 * robot.coupling.diameter, tail.amplitude + wire)
+        box = [[x, y, z] for x in ends for y in (-reach, reach) for z in (-reach, reach)]
+        corners = self.pixels(self.placed(np.array(box), time))
+        low = np.clip(np.floor(corners.min(axis=0)).astype(int) - 2, 0, None)
+        high = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 3, self.size)
+        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     @cached_property
-    def _still(self) -> np.ndarray:
-        """What stays from picture to picture: floor and ruler, on the fine canvas."""
+    def _still(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What stays from picture to picture, floor and ruler: a fine canvas, one to draw on, and the picture."""
+        import cv2
+
         width, height = self.size
         canvas = np.empty((height * self.fine, width * self.fine, 3), dtype=np.uint8)
         canvas[:] = self.floor
         if self.ruler:
             self._draw_ruler(canvas)
-        return canvas
+        return canvas, canvas.copy(), cv2.resize(canvas, self.size, interpolation=cv2.INTER_AREA)
 
     def _fill(self, canvas: np.ndarray, corners: np.ndarray, colour: Any) -> None:
         """Fill a polygon given in pixels; of several, (n, corners, 2), one after the other."""

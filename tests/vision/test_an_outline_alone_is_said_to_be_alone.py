@@ -1,5 +1,7 @@
 """Where no coloured seal leads, an outline over a grid or of glass is said to be less sure; over a plain floor not."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -23,6 +25,7 @@ RATES = {"forward_velocity": "2 mm/s", "body_rate": "-0.12 Hz", "tail_rate": "1.
 def film(tmp_path_factory):
     """A film of the virtual camera of a robot with stripes without colour, and its setup file."""
 
+    @cache
     def render(troubles):
         path = tmp_path_factory.mktemp("alone") / "a.mp4"
         robot = load("biorob2012-wide", **{"seal.stripes": ["white", "black"]})

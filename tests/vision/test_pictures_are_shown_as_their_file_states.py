@@ -215,14 +215,15 @@ def test_densities_without_a_unit_are_asked_for(tmp_path):
     assert open_video(tmp_path, 25.0, 4 / 3).size == SHOWN
 
 
+@pytest.mark.usefixtures("learning_shared")
 def test_rates_do_not_depend_on_the_shape_of_pixels(flat_pictures, tmp_path):
     """A drawn film, stored in a quarter more columns: planted speed and rates are in their intervals."""
     from spirillum.measurement.setup_template import setup_answer
     from spirillum.results.measurement import measure
 
     flat = flat_pictures.Flat(frames=40, fps=10.0, velocity=2e-3, tail_rate=5.0, body_rate=-1.0)
-    setup = flat.write(tmp_path / "square.avi")
-    path = tmp_path / "wide.mkv"
+    setup, path = tmp_path / "setup.toml", tmp_path / "wide.mkv"
+    setup.write_text(flat.setup_text())
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=10, options={"crf": "4"})
         stream.width, stream.height, stream.pix_fmt = 400, 240, "yuv444p"

@@ -16,6 +16,7 @@ from spirillum.vision.track.initial_detection import SealSearch
 from spirillum.vision.track.track import agreement_of, cue_shifts
 
 cv2 = pytest.importorskip("cv2")
+pytestmark = pytest.mark.usefixtures("learning_shared")
 
 CAMERA = Optics((320, 240), 350.0, 0.2, 0.015)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spirillum.kernels.native import Array, Float32, Float64, Int64, native
+from spirillum.kernels.native import Array, Float32, Float64, Int64, UInt8, native
 
 
 @native("profiles")
@@ -211,4 +211,45 @@ def seal_shares(
         share: 1 in the stripe to 0 beside it; NaN where unknown.
         distance: squared distance of the stripe from its surroundings; 0 where they look alike.
         kind: index into the palette of the nearest colour; 0 without one.
+    """
+
+
+@native("shifts", "known", "variance")
+def seal_shifts(
+    share: Float64[Array, "edges samples"],
+    distance: Float64[Array, "edges"],
+    kind: Int64[Array, "edges"],
+    sides: Int64[Array, "count 3"],
+    bias: Float64[Array, "count kinds"],
+    design: Float64[Array, "samples 3"],
+    inverses: Float64[Array, "2 3 samples"],
+    starts: Int64[Array, "2"],
+    steepness: float,
+    largest: float,
+    weakest: float,
+    strongest: float,
+    noise: float,
+    shifts: Float64[Array, "edges"],
+    known: UInt8[Array, "edges"],
+    variance: Float64[Array, "edges"],
+) -> None:
+    """Displacement of each edge of a seal along its normal, by least squares of a template.
+
+    Args:
+        share: share of the stripe's colour in the samples across each edge.
+        distance: squared distance of the stripe from its surroundings; 0 where they look alike.
+        kind: class of the colour at each edge.
+        sides: first edge of each side, the one after its last, and whether the side is a silhouette.
+        bias: displacement by each class of colour at each side, samples.
+        design: the template's columns: level, the edge of contrast 1, its slope.
+        inverses: their pseudoinverses, at other sides and at silhouettes.
+        starts: first sample that is used at these.
+        steepness: root sum square of the slope.
+        largest: largest valid displacement, samples.
+        weakest: least valid contrast.
+        strongest: largest one.
+        noise: least residual, times the distance.
+        shifts: the displacements, samples; NaN out of view.
+        known: 1 where the displacement is valid.
+        variance: its variance, samples^2.
     """

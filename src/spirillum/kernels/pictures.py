@@ -1,4 +1,4 @@
-"""Stripes, travelling waves and refracted rays in pictures: csrc/pictures.c, waves.c, snell.c.
+"""Stripes, travelling waves and refracted rays in pictures: csrc/pictures.c, widths.c, waves.c, snell.c.
 
 Columns of the strip run across the tail, rows along it. A wave is packed as K, a_0, c/L_t (0 or less: no taper) and
 amplitude; the tilt of a row as the derivatives with height e and f of the shift along and across, and g of the
@@ -96,6 +96,43 @@ def stripe_fit(
         losses: loss at each angle of the grid, 0 to 1.
         answer: angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour, gains of the
             channels; unchanged where too little is visible.
+    """
+
+
+@native("losses", "found")
+def stripe_edges(
+    levels: Float64[Array, "n 3"],
+    angles: Float64[Array, "n"],
+    blur: Float64[Array, "n"],
+    shade: Float64[Array, "n 6"],
+    colours: Float64[Array, "s 3"],
+    roll: float,
+    tried: Float64[Array, "t"],
+    step: float,
+    steepest: float,
+    around: float,
+    contrast: float,
+    fewest: int,
+    losses: Float64[Array, "t"],
+    found: Float64[Array, "s"],
+) -> None:
+    """Angles by which the edges between stripes lie beyond their even places, by least squares one by one.
+
+    Args:
+        levels: colours along the angle; NaN where nothing is seen.
+        angles: angles about the axis, ascending, rad.
+        blur: standard deviation of the blur at each angle, rad.
+        shade: shading factor and additive sheen at each angle, in each channel.
+        colours: of the stripes in their order.
+        roll: angle of the first stripe's middle, rad.
+        tried: shifts that are tried, evenly spaced, rad.
+        step: between them, rad.
+        steepest: largest angle from the direction towards the camera at which an edge is located, rad.
+        around: half width over that of a stripe of the surroundings.
+        contrast: least distance of the colours on either side.
+        fewest: fewest samples in the surroundings.
+        losses: memory.
+        found: the shifts, rad; NaN of edges that are out of view.
     """
 
 

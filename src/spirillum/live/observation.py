@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
-from spirillum.measurement.setup_template import setup_remarks
+from spirillum.measurement.setup_template import scale_confirmed, setup_remarks
 from spirillum.measurement.trials import RATE_NAMES, Measured, Trial
 from spirillum.notes import Note
 from spirillum.vision.flag import Flag
@@ -122,7 +122,9 @@ class Tracked(DisplayMixin):
         found = [*self.source_notes, *([Note("run-cut-short", self.stopped)] if self.stopped else [])]
         if self.trial is not None:
             said = [flag.note for flag in self.trial.flags]
-            found += [*said, *setup_remarks(self.trial.track.setup)]
+            track = self.trial.track
+            confirmed = scale_confirmed(track.scale.apparent_size, self.trial.flags)
+            found += [*said, *setup_remarks(track.setup, confirmed=confirmed)]
             for name in RATE_NAMES:
                 item = self.trial.quantities[name]
                 if not math.isfinite(item.value) and item.reason not in said:

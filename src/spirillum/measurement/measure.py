@@ -27,7 +27,7 @@ from spirillum.measurement.marks import (
     untracked,
 )
 from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
-from spirillum.measurement.setup_template import setup_remarks
+from spirillum.measurement.setup_template import scale_confirmed, setup_remarks
 from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial, trial_of
 from spirillum.notes import Note
@@ -152,7 +152,8 @@ class Measurement(DisplayMixin):
         """What to be careful about."""
         found = [note for trial in self.trials for note in _notes(trial)]
         if any(math.isfinite(trial.track.scale.length_per_pixel) for trial in self.trials):
-            found += setup_remarks(self.trials[0].track.setup)
+            confirmed = all(scale_confirmed(trial.track.scale.apparent_size, trial.flags) for trial in self.trials)
+            found += setup_remarks(self.trials[0].track.setup, confirmed=confirmed)
         found += [Note("not-measured", f"{video}: not measured: {sentence}") for video, sentence in self.failures]
         total = self.summary.trials
         few = {name: count for name, count in self.summary.counts.items() if name in RATE_NAMES and 0 < count < total}

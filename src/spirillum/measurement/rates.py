@@ -85,6 +85,28 @@ class Rate:
         """Whether there is a value."""
         return bool(np.isfinite(self.value))
 
+    def less(self, other: Rate) -> Rate:
+        """The rate of the difference of two series over the same times, both steady.
+
+        Errors of the two are independent but for what their residuals show: where one runs ahead while the other lags
+        behind, the interval is wider.
+        """
+        left = self.residual - other.residual if self.measured and other.measured else np.zeros(0)
+        both = np.isfinite(left)
+        if (count := int(both.sum())) < 2:
+            return replace(_NOTHING, frames=count)
+        own, theirs = self.residual[both], other.residual[both]
+        opposite = -float(own @ theirs) / max(float(np.sqrt((own @ own) * (theirs @ theirs))), 1e-300)
+
+        def reach(one: float, another: float) -> float:
+            return float(np.sqrt(one**2 + another**2 + 2.0 * max(opposite, 0.0) * one * another))
+
+        value, outliers = self.value - other.value, max(self.outliers, other.outliers)
+        low = value - reach(self.value - self.low, other.high - other.value)
+        high = value + reach(self.high - self.value, other.value - other.low)
+        time = max(self.correlation_time, other.correlation_time)
+        return Rate(value, low, high, count, outliers, steady=True, correlation_time=time, residual=left)
+
 
 _NOTHING = Rate(np.nan, np.nan, np.nan, 0, 0, steady=True, correlation_time=0.0)
 """The rate of a series of fewer than two frames."""

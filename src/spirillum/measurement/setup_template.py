@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +203,7 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     }
     shares = depth_shares(setup)
     total = sum(share**2 for share in shares.values()) ** 0.5
-    warnings = setup_remarks(setup)
+    warnings, confirmed = [], False
     if robot.seal is None or not (setup.robot.stripes or robot.seal.stripes):
         words = "the robot has no stripes: its body's rotation cannot be seen; add seal.stripes"
         warnings.append(Note("setup-incomplete", words, ("seal.stripes",)))
@@ -216,12 +217,27 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     }
     if film is not None:
         content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
+        confirmed = scale_confirmed(content["film"]["apparent_body_size"], flags)
         warnings += [flag.note for flag in flags]
-    return envelope("setup-check", content, warnings)
+    return envelope("setup-check", content, [*setup_remarks(setup, confirmed=confirmed), *warnings])
 
 
-def setup_remarks(setup: Setup) -> list[Note]:
-    """Notes on the uncertainties of a setup for users of its lengths."""
+_DOUBTS = {"size-does-not-fit", "outline-does-not-fit", "scale-does-not-fit", "focal-lengths-differ"}
+"""Flags of a video that contradicts the scale of its setup."""
+
+
+def scale_confirmed(size: float, flags: Iterable[Flag]) -> bool:
+    """Whether a video shows the robot as large as its file and the setup say."""
+    return math.isfinite(size) and not any(flag.name in _DOUBTS for flag in flags)
+
+
+def setup_remarks(setup: Setup, *, confirmed: bool = False) -> list[Note]:
+    """Notes on the uncertainties of a setup for users of its lengths.
+
+    Args:
+        setup: the setup.
+        confirmed: whether videos show the robot as large as they should: values of the example are then no concern.
+    """
     found = []
     if not depth_shares(setup):
         words = (
@@ -229,7 +245,7 @@ def setup_remarks(setup: Setup) -> list[Note]:
             "fields"
         )
         found.append(Note("setup-incomplete", words))
-    if same := _as_in_example(setup):
+    if not confirmed and (same := _as_in_example(setup)):
         words = f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own"
         found.append(Note("setup-incomplete", words, same))
     return found

@@ -213,22 +213,28 @@ def _fits_of(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, R
         for multiple in (1, 2)
         if _turns(tail)
     ]
-    difference = track.tail_phase - track.body_angle
-    error = np.hypot(track.tail_phase_error, track.body_angle_error)
     of_both = (
         rate_of(time, track.body_angle, track.body_angle_error, of_body, read=read),
         rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
     )
-    unsteady = not all(rate.steady for rate in of_both)
-    for rate in of_both:  # what is left out of one angle is left out of their difference
-        if rate.residual.size == time.size:
-            difference = np.where(np.isfinite(rate.residual), difference, np.nan)
     return {
         "forward_velocity": rate_of(time, x, track.position_error, of_x, read=read),
         "body_rotation_rate": of_both[0],
         "tail_rotation_rate": of_both[1],
-        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read, unsteady=unsteady),
+        "motor_rotation_rate": _motor_rate(track, *of_both, [*of_body, *of_tail], read),
     }
+
+
+def _motor_rate(track: Track, body: Rate, tail: Rate, periodic: list[PeriodicError], read: np.ndarray | None) -> Rate:
+    """Tail less body rate; where one of them changes, the mean over the frames on which both angles were read."""
+    if body.steady and tail.steady:
+        return tail.less(body)
+    difference = track.tail_phase - track.body_angle
+    for rate in (body, tail):  # what is left out of one angle is left out of their difference
+        if rate.residual.size == track.time.size:
+            difference = np.where(np.isfinite(rate.residual), difference, np.nan)
+    error = np.hypot(track.tail_phase_error, track.body_angle_error)
+    return rate_of(track.time, difference, error, periodic, read=read, unsteady=True)
 
 
 def _smooth(time: Samples, angle: Samples) -> Samples:

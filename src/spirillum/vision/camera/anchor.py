@@ -189,8 +189,9 @@ def _flat(image: np.ndarray) -> Samples:
     small = grey if few == 1 else cv2.resize(grey, (size[0] // few, size[1] // few), interpolation=cv2.INTER_AREA)
     ground = cv2.GaussianBlur(small, (0, 0), wide / few)
     ground = ground if few == 1 else cv2.resize(ground, size)
-    flat = np.clip(grey / np.maximum(ground, 1.0) - 1.0, -0.6, 0.6)
-    return np.asarray(cv2.GaussianBlur(flat, (0, 0), 1.0))
+    flat = np.divide(grey, np.maximum(ground, 1.0, out=ground), out=grey)
+    flat -= 1.0
+    return np.asarray(cv2.GaussianBlur(np.clip(flat, -0.6, 0.6, out=flat), (0, 0), 1.0))
 
 
 def _texture(flat: Samples) -> Samples:

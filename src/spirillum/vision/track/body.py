@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -41,8 +42,9 @@ class PoseFit(NamedTuple):
         return bool(np.isfinite(self.error.x))
 
 
-class _Part(NamedTuple):
-    """A part of a picture, blurred a little."""
+@dataclass
+class _Part:
+    """A part of a picture, blurred a little, and the outline there at the last pose that was looked at."""
 
     grey: np.ndarray
     """Brightness, (h, w, 1), single precision."""
@@ -50,6 +52,12 @@ class _Part(NamedTuple):
     """Pixel (u, v) of its upper left corner, (2,)."""
     colours: ColourPart | None
     """Its colours; None where they are not needed, or nothing is in view."""
+    pose: BodyPose
+    """The pose."""
+    places: tuple[Samples, Samples, Samples, Samples]
+    """The edges at this pose: see `Contour.places`."""
+    profiles: Samples | None = None
+    """Brightness across them; None where it was not needed yet."""
 
 
 class _Edges(NamedTuple):
@@ -103,6 +111,7 @@ class BodyFinder:
         self._scatter = self.contour.floor.copy()
         self.seal = SealEdges(self.contour, colours) if colours else None
         self._on_seal = np.empty(0, dtype=np.int64) if self.seal is None else self.seal.chosen
+        self._seal_contour = self.contour.some(self._on_seal)
         group = self.contour.group
         self._cue = np.concatenate([self.contour.cue, self.contour.cue[self._on_seal]])
         self._ends = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
@@ -143,10 +152,7 @@ class BodyFinder:
             found = self._learn_seal(parts, poses)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
         for turn in range(OUTLINE.learning_rounds if self.seal is None else SEAL.joint_rounds):
-            stack = []
-            for part, pose in zip(parts, poses, strict=True):
-                pixels, normals, _, _ = self.contour.places(pose, self.optics)
-                stack.append(self._profiles(part, pixels, normals))
+            stack = [self._profiles(part, pose) for part, pose in zip(parts, poses, strict=True)]
             self._learn_profiles(np.stack(stack))
             if self.seal is not None and turn == 0:
                 self._learn_biases(parts, found, SEAL.follows_seal)
@@ -175,13 +181,12 @@ class BodyFinder:
 
     def _seal_places(self, pose: BodyPose) -> tuple[Samples, Samples]:
         """Pixels and normals of the seal's edges."""
-        pixels, normals, _, _ = self.contour.places(pose, self.optics)
-        return pixels[self._on_seal], normals[self._on_seal]
+        pixels, normals, _, _ = self._seal_contour.places(pose, self.optics)
+        return pixels, normals
 
     def profiles(self, image: np.ndarray, pose: BodyPose) -> Samples:
         """Brightness across each edge of a body at a pose, of 255, (n, m); NaN out of view."""
-        pixels, normals, _, _ = self.contour.places(pose, self.optics)
-        return self._profiles(self._part(image, pose), pixels, normals)
+        return self._profiles(self._part(image, pose), pose)
 
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
         """Squared gradient of each edge's template along its normal, and weights of the edges.
@@ -236,22 +241,34 @@ class BodyFinder:
         return bool(moves.mean() > SEAL.outline_share and nose.mean() > SEAL.nose_share)
 
     def _part(self, image: np.ndarray, pose: BodyPose) -> _Part:
-        pixels = self.contour.places(pose, self.optics)[0]
+        places = self.contour.places(pose, self.optics)
+        pixels = places[0]
         low, high = pixels.min(axis=0) - self.margin, pixels.max(axis=0) + self.margin
         left, top, right, bottom = self.bounds
         ends = [int(np.clip(value, a, b)) for value, a, b in ((low[0], left, right), (low[1], top, bottom))]
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
-            return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None)
+            return _Part(np.zeros((1, 1, 1), dtype=np.float32), np.zeros(2), None, pose, places)
         bounds = ends[0], ends[1], stops[0], stops[1]
-        grey = grey_part(image, bounds, OUTLINE.blur)
-        colours = None if self.seal is None else colour_part(image, bounds, OUTLINE.blur)
-        return _Part(grey, np.array(ends, dtype=float), colours)
+        if self.seal is None:
+            return _Part(grey_part(image, bounds, OUTLINE.blur), np.array(ends, dtype=float), None, pose, places)
+        colours = colour_part(image, bounds, OUTLINE.blur)
+        return _Part(grey_of(colours.picture), colours.origin, colours, pose, places)
 
-    def _profiles(self, part: _Part, pixels: Samples, normals: Samples) -> Samples:
-        out = np.empty((1, len(pixels), self.offsets.size))
-        profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
-        return np.asarray(out[0])
+    def _places(self, part: _Part, pose: BodyPose) -> tuple[Samples, Samples, Samples, Samples]:
+        """The outline's edges at a pose: see `Contour.places`."""
+        if part.pose != pose:
+            part.pose, part.places, part.profiles = pose, self.contour.places(pose, self.optics), None
+        return part.places
+
+    def _profiles(self, part: _Part, pose: BodyPose) -> Samples:
+        """Brightness across each edge of the outline at a pose, of 255, (n, m)."""
+        pixels, normals, _, _ = self._places(part, pose)
+        if part.profiles is None:
+            out = np.empty((1, len(pixels), self.offsets.size))
+            profiles_across(part.grey, part.origin, pixels, normals, self.offsets, out)
+            part.profiles = np.asarray(out[0])
+        return part.profiles
 
     def _learn_profiles(self, stack: Samples) -> None:
         """Learn each edge's template: the first principal component of its profiles and those of its neighbours."""
@@ -287,8 +304,7 @@ class BodyFinder:
         residuals = []
         for part, one in zip(parts, found, strict=True):
             if one.known:
-                pixels, normals, _, _ = self.contour.places(one.pose, self.optics)
-                shifts, known, _ = self._shifts(part, pixels, normals)
+                shifts, known, _ = self._shifts(part, one.pose)
                 residuals.append(np.where(known, shifts, np.nan))
         if len(residuals) < 6:
             return
@@ -315,12 +331,11 @@ class BodyFinder:
         _, spread, enough = _usual(residuals)
         self._seal_scatter = np.where(enough, np.hypot(self._seal_floor, spread), 0.5)
 
-    def _shifts(self, part: _Part, pixels: Samples, normals: Samples) -> tuple[Samples, np.ndarray, Samples]:
+    def _shifts(self, part: _Part, pose: BodyPose) -> tuple[Samples, np.ndarray, Samples]:
         """Displacement of each edge along its normal, pixels, its validity, and its variance."""
         assert self._template is not None  # noqa: S101 - learnt first
-        count = len(pixels)
+        count, profiles = len(self.contour.group), self._profiles(part, pose)
         shifts, strengths, misses = np.empty(count), np.empty(count), np.empty(count)
-        profiles = self._profiles(part, pixels, normals)
         shifts_of_profiles(profiles, self._template, self._derivative, shifts, strengths, misses)
         known = (
             np.isfinite(shifts)
@@ -334,20 +349,28 @@ class BodyFinder:
 
     def _seen_edges(self, part: _Part, pose: BodyPose, *, seal_only: bool, rough: bool) -> _Edges:
         """Displacements of all edges: of the outline by brightness, and of the seal by its colours too."""
-        pixels, normals, _, slopes = self.contour.places(pose, self.optics)
-        found = []
-        if not seal_only:
-            shifts, known, variance = self._shifts(part, pixels, normals)
-            found.append(_Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter)))
-        if self.seal is not None and part.colours is not None:
-            here = self._on_seal
-            seen = self.seal.shifts(part.colours, pixels[here], normals[here], rough=rough)
-            variance = np.where(seen.known, seen.variance + self._seal_scatter**2, np.inf)
-            inside = np.isfinite(seen.shifts)
-            found.append(
-                _Edges(seen.shifts, seen.known, variance, slopes[here], inside, np.isfinite(self._seal_scatter))
-            )
-        return found[0] if len(found) == 1 else _Edges(*(np.concatenate(values) for values in zip(*found, strict=True)))
+        if seal_only:
+            pixels, normals, _, slopes = self._seal_contour.places(pose, self.optics)
+            return self._edges_of_seal(part, pixels, normals, slopes, rough=rough)
+        pixels, normals, _, slopes = self._places(part, pose)
+        shifts, known, variance = self._shifts(part, pose)
+        outline = _Edges(shifts, known, variance, slopes, np.isfinite(shifts), np.isfinite(self._scatter))
+        if self.seal is None or part.colours is None:
+            return outline
+        seal = self._edges_of_seal(part, *(values[self._on_seal] for values in (pixels, normals, slopes)))
+        return _Edges(*(np.concatenate(values) for values in zip(outline, seal, strict=True)))
+
+    def _edges_of_seal(
+        self, part: _Part, pixels: Samples, normals: Samples, slopes: Samples, *, rough: bool = False
+    ) -> _Edges:
+        """Displacements of the seal's edges at their places."""
+        assert self.seal is not None  # noqa: S101 - checked by the caller
+        assert part.colours is not None  # noqa: S101
+        seen = self.seal.shifts(part.colours, pixels, normals, rough=rough)
+        variance = np.where(seen.known, seen.variance + self._seal_scatter**2, np.inf)
+        return _Edges(
+            seen.shifts, seen.known, variance, slopes, np.isfinite(seen.shifts), np.isfinite(self._seal_scatter)
+        )
 
     def _place(self, part: _Part, guess: BodyPose, *, seal_only: bool = False, rough: int = 0) -> PoseFit:
         change, level = np.empty(3), 1.0
@@ -424,8 +447,14 @@ def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float)
     """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255, (h, w, 1)."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
-    grey = cv2.cvtColor(image[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
+    grey = grey_of(image[top:bottom, left:right].astype(np.float32))
     return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))[..., None]
+
+
+def grey_of(colours: np.ndarray) -> np.ndarray:
+    """Brightness of a picture in single precision, (h, w, 1)."""
+    cv2 = import_optional("cv2", "measuring a video", "video")
+    return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY))[..., None]
 
 
 def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:

@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.optional_dependencies import import_optional
 from spirillum.robot.robot import Robot
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
@@ -211,10 +212,9 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
         return 0.0
     columns, rows = np.clip(pixels, (left, top), (right - 1, bottom - 1)).T
     still = np.median([image[rows, columns].mean(axis=1) for image in images], axis=0).reshape(grid.shape[:2])
-    from scipy.ndimage import uniform_filter1d
-
+    cv2 = import_optional("cv2", "measuring a video", "video")
     wide = 2 * max(3, round(LONE_OUTLINE.flat * 2.0 * radius / step)) + 1
-    return float(mad_scale(still - uniform_filter1d(still, wide, axis=0, mode="nearest")))
+    return float(mad_scale(still - cv2.blur(still, (1, wide), borderType=cv2.BORDER_REPLICATE)))
 
 
 def _stays(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder, end: str) -> Samples:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.edges import profiles_across, seal_shares
+from spirillum.kernels.edges import profiles_across, seal_shares, seal_shifts
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
@@ -65,13 +65,18 @@ class SealEdges:
         groups = contour.group[self.chosen]
         self._sides = [np.flatnonzero(groups == side) for side in _SIDES]
         self._offsets = np.arange(-OUTLINE.half_profile, OUTLINE.half_profile + 1, dtype=float)
-        ends = [[side[0], side[-1] + 1, flank] for side, flank in zip(self._sides, _FLANKS, strict=True) if side.size]
-        self._ends = np.array(ends, dtype=np.int64).reshape(-1, 3)
+        self._ends = np.array(
+            [
+                [side[0], side[-1] + 1, flank] if side.size else [0, 0, flank]
+                for side, flank in zip(self._sides, _FLANKS, strict=True)
+            ]
+        )
         self._classes = classes + 1  # colours of thin stripes at the silhouette are mixed
         from scipy.special import erf
 
         self._palette: Samples | None = None
-        self._take(-0.5 * erf(self._offsets / (np.sqrt(2.0) * SEAL.edge_blur)))
+        self._template: Samples = -0.5 * erf(self._offsets / (np.sqrt(2.0) * SEAL.edge_blur))
+        self._take(self._template)
         self._bias = np.zeros((len(_SIDES), self._classes))
 
     def shifts(self, part: ColourPart, pixels: Samples, normals: Samples, *, rough: bool = False) -> SealShifts:
@@ -83,19 +88,28 @@ class SealEdges:
             normals: their outward normals, (n, 2).
             rough: displacements of several pixels, with the same variance at all edges.
         """
-        found = self._profiles(part, pixels, normals)
-        shifts, strengths, misses = self._fitted(found.share)
-        known = found.distance > 0.0
+        found, count = self._profiles(part, pixels, normals), len(pixels)
         if rough:
-            shifts, known = self._areas(found.share), known & np.isfinite(found.share[:, 0])
-            return SealShifts(shifts, known, np.ones(len(shifts)), found.kind)
-        known = known & np.isfinite(shifts) & (np.abs(shifts) < OUTLINE.largest_shift)
-        known &= (strengths > SEAL.strengths[0]) & (strengths < SEAL.strengths[1])
-        noise = OUTLINE.rounding_noise / np.sqrt(np.maximum(found.distance, 1e-9)) / SEAL.noise
-        with np.errstate(invalid="ignore"):
-            variance = (np.maximum(misses, noise) / np.maximum(np.abs(strengths) * self._steepness, 1e-9)) ** 2
-        for number, side in enumerate(self._sides):
-            shifts[side] -= self._bias[number, found.kind[side]]
+            known = (found.distance > 0.0) & np.isfinite(found.share[:, 0])
+            return SealShifts(self._areas(found.share), known, np.ones(count), found.kind)
+        shifts, known, variance = np.empty(count), np.empty(count, dtype=bool), np.empty(count)
+        seal_shifts(
+            found.share,
+            found.distance,
+            found.kind,
+            self._ends,
+            self._bias,
+            self._design,
+            self._inverses,
+            self._starts,
+            self._steepness,
+            OUTLINE.largest_shift,
+            *SEAL.strengths,
+            OUTLINE.rounding_noise / SEAL.noise,
+            shifts,
+            known.view(np.uint8),
+            variance,
+        )
         return SealShifts(shifts, known, variance, found.kind)
 
     def learn_colours(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
@@ -121,7 +135,8 @@ class SealEdges:
         shares = np.concatenate([self._profiles(part, *place).share for part, place in zip(parts, places, strict=True)])
         if len(shares := shares[np.isfinite(shares).all(axis=1)]):
             middle = np.median(shares, axis=0)
-            self._take(0.5 * (middle - middle[::-1]))
+            self._template = 0.5 * (middle - middle[::-1])
+        self._take(self._template)
 
     def learn_bias(self, residuals: Samples, kinds: np.ndarray) -> None:
         """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently.
@@ -198,30 +213,15 @@ class SealEdges:
             shifts[side] = np.clip(share[side][:, rows], 0.0, 1.0).sum(axis=1) + self._offsets[rows][0] - 0.5
         return shifts
 
-    def _fitted(self, share: Samples) -> tuple[Samples, Samples, Samples]:
-        """Displacement, contrast and root mean square residual of each profile, by least squares with the template."""
-        shifts, strengths, misses = np.full((3, len(share)), np.nan)
-        ends, flanks = (np.concatenate([self._sides[first], self._sides[last]]) for first, last in ((0, 3), (1, 2)))
-        sides: list[tuple[bool, slice | np.ndarray]] = [(False, ends), (True, flanks)]
-        if self._palette is not None:  # then all sides use the same samples
-            sides = [(False, slice(None))]
-        for flank, side in sides:
-            values = share[side][:, self._rows(flank)]
-            design, inverse = self._designs[values.shape[1]]
-            numbers = values @ inverse.T
-            with np.errstate(divide="ignore", invalid="ignore"):
-                shifts[side] = -numbers[:, 2] / numbers[:, 1]
-            strengths[side] = numbers[:, 1]
-            misses[side] = np.sqrt(np.sum((values - numbers @ design.T) ** 2, axis=1) / (len(design) - 3))
-        return shifts, strengths, misses
-
     def _take(self, template: Samples) -> None:
         """Take a profile of an edge, without displacement and of contrast 1, as the template."""
         slope = np.gradient(template)
         design = np.column_stack([np.ones(template.size), template, slope])
         self._steepness = float(np.sqrt(np.sum(slope**2)))
-        rows = [design[self._rows(flank)] for flank in (False, True)]
-        self._designs = {len(some): (some, np.linalg.pinv(some)) for some in rows}
+        self._design, self._inverses = design, np.zeros((2, 3, template.size))
+        self._starts = np.array([self._rows(flank).start for flank in (False, True)])
+        for inverse, start in zip(self._inverses, self._starts, strict=True):
+            inverse[:, start:] = np.linalg.pinv(design[start:])
 
 
 def colour_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> ColourPart:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.kernels.pictures import stripe_edges
 from spirillum.robust import mad_scale
 from spirillum.vision.flag import Flag
 
@@ -67,6 +68,8 @@ class WidthConstants:
 
 
 WIDTHS = WidthConstants()
+_TRIED = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
+"""Shifts of an edge that are tried, rad."""
 
 
 class Evened(NamedTuple):
@@ -94,30 +97,9 @@ def edge_shifts(
         colours: of the stripes in their order, (stripes, 3).
         angle: of the body, rad.
     """
-    from scipy.special import ndtr
-
-    count = len(colours)
-    width = 2.0 * np.pi / count
-    shifts = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
-    found = np.full(count, np.nan)
-    for edge in range(count):
-        place = (angle + (edge - 0.5) * width + np.pi) % (2.0 * np.pi) - np.pi
-        before, after = colours[edge - 1], colours[edge]
-        if abs(place) > WIDTHS.steepest or np.linalg.norm(after - before) < WIDTHS.contrast:
-            continue
-        near = np.abs(angles - place) < WIDTHS.around * width
-        seen = levels[near]
-        if near.sum() < WIDTHS.fewest or not np.isfinite(seen).all():
-            continue
-        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])  # of the stripe behind the edge
-        behind = seen - shade[near, 3:] - shade[near, :3] * before  # what a share of 0 misses, and of 1 besides
-        step = shade[near, :3] * (after - before)
-        losses = np.sum(behind**2) + share**2 @ np.sum(step**2, axis=1) - 2.0 * share @ np.sum(behind * step, axis=1)
-        best = int(np.argmin(losses))
-        if not 0 < best < shifts.size - 1:
-            continue
-        low, middle, high = losses[best - 1 : best + 2]
-        found[edge] = shifts[best] + 0.5 * WIDTHS.step * (low - high) / max(low - 2.0 * middle + high, 1e-300)
+    found = np.empty(len(colours))
+    limits = WIDTHS.step, WIDTHS.steepest, WIDTHS.around, WIDTHS.contrast, WIDTHS.fewest
+    stripe_edges(levels, angles, blur, shade, colours, angle, _TRIED, *limits, np.empty(_TRIED.size), found)
     return found
 
 
