@@ -21,7 +21,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
-from spirillum.dynamics.timing import TRIAL_DURATION, Timing
+from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
@@ -37,6 +37,7 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
@@ -426,10 +427,37 @@ class TrialRequest:
     posterior_for: PosteriorFor = "new"
     """Whose discrepancy the interval holds, with a posterior."""
 
-    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
-        """Return the held answer with what gives its released motions, or with the reason why there are none."""
+    def check(self) -> None:
+        """Refuse what no trial can have, before the held answer is computed."""
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
+        height, channel = self._height, self.robot.channel
+        if height is not None and channel is not None:
+            from spirillum.dynamics.start import check_roughness  # loads compiled loops
+
+            diameter = self.robot.body.diameter
+            check_roughness(height, gap_of(Placement.of(self.placement), diameter, 0.5 * channel.diameter), diameter)
+
+    def _check_length(self, held: Prediction) -> None:
+        """Refuse a requested duration of less than a millionth of a turn of the tail, or of more than a trial's."""
+        rate = abs(held.tail_rotation_rate)
+        if self.duration is None or not rate:
+            return
+        turn = 2.0 * np.pi / rate
+        duration_of(1.0, turn, self.duration)
+        if self.duration > _MOST_TURNS * turn:
+            raise InputError(
+                f"duration = {self.duration:g} s is {self.duration / turn:.4g} turns of the tail; allowed: at most "
+                f"{np.floor(_MOST_TURNS * turn):.6g} s, {_MOST_TURNS} turns of the tail, or `simulate`"
+            )
+
+    @property
+    def _height(self) -> float | None:
+        """Requested height of the asperities, m."""
+        return None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+
+    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
+        """Return the held answer with what gives its released motions, or with the reason why there are none."""
         reason = why_not_released(held)
         if not wanted or reason:
             self._check_unused(reason)
@@ -437,6 +465,7 @@ class TrialRequest:
             return held
         if reason:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
+        self._check_length(held)
         self._announce("held", held.forward_velocity)
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
@@ -484,7 +513,7 @@ class TrialRequest:
         known = self.fit.posterior
         robot = self.fit.central(self.robot)
         placed = self.fit.placed(robot, Placement.of(self.placement))
-        given = None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+        given = self._height
         rough, touching = with_contact(self.fit.contact(), given, self.in_tube)
         derived = robot.derived().get("submerged_weight")
         weight = 0.0 if derived is None else derived.value

@@ -315,7 +315,7 @@ def predict(
     if intervals is not None and scenario.posterior_for == "measured":
         result = with_middles(result, intervals)
     acts = friction_acts(scenario.friction, scenario.tail_rate)
-    idle = [] if over is None else fit.outside_warnings(ready, chosen, friction=acts)
+    idle = fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
         intervals = None
     warnings += idle or [*fit.answer_warnings(ready, chosen, scenario.friction, scenario.tail_rate), *torque]
