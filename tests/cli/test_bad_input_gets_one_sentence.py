@@ -107,6 +107,19 @@ WIDE = "biorob2012-wide"
         (["predict", WIDE, "--friction", "paper", "--tail-rate=-0.001Hz"], "tail-rate = -0.006283 rad/s"),
         (["predict", WIDE, "--tail-rate=238671 rad/s"], "positive battery voltage"),
         (["predict", WIDE, "--model", "x" * 50_000], "model = 'xxx"),
+        (
+            ["predict", WIDE, "--set", 'tail={amplitude="2 mm"}', "--set", "tail.amplitude=3mm"],
+            "tail.amplitude is set by tail and again by tail.amplitude; allowed: each field once",
+        ),
+        (
+            ["predict", WIDE, "--set", "body=none", "--set", "body.length=1mm"],
+            "body is set by body and again",
+        ),
+        (["predict", WIDE, "--set", "tail.length=1mm", "--set", "tail.length=2mm"], "names tail.length twice"),
+        (
+            ["control", WIDE, "--with", "camera.latency=1ms", "--with", "camera.latency=2ms"],
+            "names camera.latency twice",
+        ),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,7 +81,7 @@ class Fit:
     @property
     def of_trials(self) -> bool:
         """Whether it was fitted to trials of released robots."""
-        source = self.posterior or (self.file and self.file.provenance)
+        source = self.posterior or (None if self.file is None else self.file.provenance)
         return source is not None and source.answer == "trial"
 
     def central(self, robot: Robot) -> Robot:
@@ -349,19 +349,6 @@ def fit_of_posterior(posterior: PosteriorFile) -> Fit:
         channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
         friction_coefficient=None if coefficient is None else float(coefficient[0]),
     )
-
-
-def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
-    """Dotted names of the fields that overrides set, those of their tables one by one."""
-    return tuple(_leaves(overrides, ""))
-
-
-def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{above}{name}.")
-        else:
-            yield f"{above}{name}"
 
 
 def check_not_replaced(

@@ -16,6 +16,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.notes import Note
+from spirillum.robot.arguments import check_set_once
 from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Derived, Robot
@@ -93,6 +94,7 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
         if overrides:
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
+    check_set_once(overrides)
     table, source = raw_table(robot)
     folder = _folder_of(robot)
     table, changes = _extended(with_points_of_files(table, folder), source, folder)

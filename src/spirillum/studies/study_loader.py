@@ -16,7 +16,7 @@ from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import FittedFriction
-from spirillum.fitted.fit import NO_FIT, Fit, check_kept, read_fit, set_fields
+from spirillum.fitted.fit import NO_FIT, Fit, check_kept, read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.measurement.observations import (
     ObservationRow,
@@ -25,6 +25,7 @@ from spirillum.measurement.observations import (
     read_observations,
     summarised,
 )
+from spirillum.robot.arguments import set_fields
 from spirillum.robot.fields import problems_in, refused_table
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
