@@ -187,6 +187,9 @@ def test_what_no_trial_can_have_is_refused() -> None:
             {"duration": "1e9 s"},
             r"duration = 1e\+09 s .*; allowed: at most \d+ s, 2000 turns of the tail",
         ),
+        ({"duration": 2.0, "motion": "held"}, "duration = 2 s is of released motion"),
+        ({"in_tube": {"wait": "1 min"}, "motion": "held"}, r"in_tube\.wait = 60 s is of released motion"),
+        ({"roughness": 1e-5, "motion": "held"}, "roughness = 1e-05 m is of released motion"),
         ({"duration": 1e-9}, r"duration = 1e-09 s; allowed: at least [\d.e-]+ s, a millionth of a turn"),
     ):
         with pytest.raises(sp.InputError, match=words):

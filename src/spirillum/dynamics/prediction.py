@@ -21,7 +21,7 @@ from spirillum.swimming.drawn_resistance import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 
 def predict(  # noqa: PLR0913 - the options of the command
@@ -130,7 +130,9 @@ def predict(  # noqa: PLR0913 - the options of the command
         return request.beside(held, wanted=motion is None)
     for name, value in (("interval", interval or None), ("duration", duration)):
         if value is not None:
-            raise InputError(f"{name} = {str(value)[:40]} with motion 'free'; allowed: without a motion, of the trial")
+            raise InputError(
+                f"{name} = {as_given(value, 's')} with motion 'free'; allowed: without a motion, of the trial"
+            )
     check_not_resolved(own, resolution)
     if band:
         raise InputError(

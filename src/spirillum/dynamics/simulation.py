@@ -40,7 +40,7 @@ from spirillum.swimming.preparation import table_for
 from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.steady import friction_reading, requirements
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -265,7 +265,7 @@ def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *
         )
     given = [
         *(["a placement is given"] if placement.is_given else []),
-        *([f"roughness = {roughness}"] if roughness is not None else []),
+        *([f"roughness = {as_given(roughness, 'm')}"] if roughness is not None else []),
         *([] if weight else ["weight = False"]),
     ]
     if given:

@@ -31,6 +31,7 @@ from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.fields import field_values
 from spirillum.robot.geometry import CenterOfMass
 from spirillum.robot.links import links_of
 from spirillum.robot.load import with_resolution
@@ -45,7 +46,7 @@ from spirillum.swimming.preparation import table_for, why_no_table
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
-from spirillum.units import KINDS, display_unit, parse_option, show
+from spirillum.units import KINDS, as_given, display_unit, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -562,12 +563,17 @@ class TrialRequest:
 
     def _check_unused(self, reason: str) -> None:
         """Refuse settings of a released motion for an answer without one, with the reason."""
-        given = {"roughness": self.roughness, "duration": self.duration, "interval": self.interval or None}
-        given |= {f"in_tube.{name}": self.in_tube.model_dump()[name] for name in self.in_tube.model_fields_set}
+        stated = (one for one in field_values(self.in_tube) if one.path in self.in_tube.model_fields_set)
+        given = {
+            "roughness": None if self.roughness is None else as_given(self.roughness, "m"),
+            "duration": None if self.duration is None else as_given(self.duration, "s"),
+            "interval": self.interval or None,
+            **{f"in_tube.{one.path}": one.text for one in stated if one.value is not None},
+        }
         for name, value in given.items():
             if value is not None:
                 why = f" ({reason})" if reason else ""
                 raise InputError(
-                    f"{name} = {str(value)[:40]} is of released motion in the tube, which this request does not "
+                    f"{name} = {value} is of released motion in the tube, which this request does not "
                     f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
                 )

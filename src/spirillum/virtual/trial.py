@@ -29,6 +29,7 @@ from spirillum.files import (
 )
 from spirillum.formats.h264 import h264_writer
 from spirillum.notes import Note
+from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.model_choice import AUTO
@@ -189,10 +190,10 @@ def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
     """Refuse options that a run determines: all of a motion, and of a trial all but its length and start position."""
     for options in given:
         usual = type(options)()
-        for name in type(options).model_fields:
-            if name not in ("duration", "start") and getattr(options, name) not in (getattr(usual, name), AUTO):
-                value = str(getattr(options, name))[:60]
-                raise InputError(f"{name} = {value} with a run, which has its own; allowed: duration and start alone")
+        for item in field_values(options):
+            if item.path not in ("duration", "start") and item.value not in (getattr(usual, item.path), AUTO):
+                named = f"{item.path} = {item.text}"
+                raise InputError(f"{named} with a run, which has its own; allowed: duration and start alone")
 
 
 def _shown(
