@@ -32,7 +32,7 @@ _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.ERO
 """Errors of a name or location, not of the program."""
 _TERMINATED = 128 + signal.SIGTERM
 """Exit code after SIGTERM, which schedulers expect, however the command ends then."""
-_KEPT = "interrupted; what was done is kept"
+_KEPT = "interrupted; finished files are kept"
 _AGAIN = 0.02
 """After this time an interrupt that was dropped comes again, s."""
 _OBJECTS = 50_000

@@ -156,7 +156,7 @@ def control(
             files["movie"] = str(movie)
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
     if found.interrupted:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("" if output is None else f"the run until then is kept in {output}")
 
 
 def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import typer
-from typer.core import TyperCommand
 
 from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
     COMPLETIONS,
     LISTED,
@@ -200,7 +200,7 @@ def from_function(
     return decorate
 
 
-class FunctionCommand(TyperCommand):
+class FunctionCommand(InterruptibleCommand):
     """A command whose parameters are made when they are first needed."""
 
     @cached_property
