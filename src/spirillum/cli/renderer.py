@@ -94,10 +94,16 @@ class ProgressLines:
         return f"{what}: {self._done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
+_FINE = 10.0
+"""Minutes below which a duration is printed with its seconds."""
+
+
 def _duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     minutes = seconds / 60.0
+    if minutes < _FINE:
+        return "{} min {:02} s".format(*divmod(round(seconds), 60))
     return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
 
 

@@ -180,8 +180,23 @@ def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
     """The answer of `spirillum prepare --json` for several robots: that of each, and what to be careful about."""
-    notes = dict.fromkeys(note.prefixed(f"{one.robot.name}: ") for one in found for note in one.warnings)
-    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
+    return envelope("preparations", {"robots": [one.content for one in found]}, _notes_of_several(found))
+
+
+def _notes_of_several(found: Sequence[Prepared]) -> list[Note]:
+    """Notes with their robots; the first of each code counts the others, which a terminal does not show."""
+    several = len({one.robot.name for one in found}) < len(found)
+    named: dict[str, dict[str, list[Note]]] = {}
+    for one in found:
+        for note in one.warnings:
+            name = one.robot.with_tail if several else one.robot.name
+            named.setdefault(note.code, {}).setdefault(name, []).append(note)
+    notes = []
+    for robots in named.values():
+        first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
+        more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""
+        notes += [Note(first.code, f"{first}{more}", first.fields), *others]
+    return notes
 
 
 def prepare(
