@@ -218,9 +218,6 @@ INFORMATION = {
     "files": (
         "Files of an earlier result were removed or left in the folder, or a file is not written. The note says which."
     ),
-    "table-not-kept": (
-        "There is no folder in which the table could be kept. Set SPIRILLUM_CACHE to a folder that can be written to."
-    ),
     "lines-not-sent": "The network refused some of the lines. Check address and port.",
 }
 """Notes that explain numbers."""

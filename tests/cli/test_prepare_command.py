@@ -51,13 +51,6 @@ def test_of_several_robots_the_one_that_has_no_table_is_named() -> None:
         sp.prepare_all(["biorob2012-wide", wide])
 
 
-def test_a_table_that_is_not_kept_says_so() -> None:
-    found = sp.prepare("biorob2012-wide")
-    assert not [sentence for sentence in found.warnings if "SPIRILLUM_CACHE" in sentence]
-    lost = Prepared(found.robot, found.table, kept=False)
-    assert "SPIRILLUM_CACHE is off" in lost.warnings[-1]
-
-
 def test_a_caution_on_several_tables_says_on_how_many() -> None:
     """A study's robots share a name, and a terminal shows one caution of a code."""
     made = sp.prepare("biorob2012-wide")
