@@ -34,6 +34,7 @@ from spirillum.robot.tube_pose import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
+from spirillum.units import show_apart
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
@@ -166,6 +167,7 @@ def load_study(
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    _check_room(study, robots, name)
     _check_contact(study, robots, name)
     placements = _fitted_places(study, robots, fit)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
@@ -213,6 +215,17 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
                 for source, varied in (entries[first], entries[number])
             )
             raise InputError(f"{name}: robots {one} and {other} are the same; allowed: each once")
+
+
+def _check_room(study: Study, robots: Sequence[Robot], name: str) -> None:
+    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, and says so."""
+    rooms = [0.5 * (robot.channel.diameter - robot.body.diameter) for robot in robots if robot.channel is not None]
+    gap = study.placement.gap
+    if gap is not None and rooms and gap > max(rooms) * (1.0 + 1e-9):
+        given, most = show_apart(gap, max(rooms), "mm")
+        raise InputError(
+            f"{name}: placement.gap = {given}; allowed: at most {most}, because there is no more room in any channel"
+        )
 
 
 def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
