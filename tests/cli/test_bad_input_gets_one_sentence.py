@@ -120,6 +120,10 @@ WIDE = "biorob2012-wide"
             ["control", WIDE, "--with", "camera.latency=1ms", "--with", "camera.latency=2ms"],
             "names camera.latency twice",
         ),
+        (
+            ["compare-models", WIDE, "-o", "x.png", "--plot", "./x.png"],
+            "x.png is named for two results; allowed: a file",
+        ),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),

@@ -196,6 +196,17 @@ def test_what_no_trial_can_have_is_refused() -> None:
             sp.predict("biorob2012-wide", **settings)
 
 
+def test_a_trial_that_no_robot_or_model_has_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spirillum.swimming.prediction.predict", None)
+    for robot, settings in (
+        ("ecoli", {}),
+        ("biorob2012-wide", {"model": "sbt"}),
+        ("biorob2012-wide", {"tail_rate": 1.0}),
+    ):
+        with pytest.raises(sp.InputError, match="interval = True is of released motion in the tube"):
+            sp.predict(robot, interval=True, **settings)
+
+
 def test_the_page_of_unknowns_lists_all_of_them() -> None:
     page = (Path(__file__).parents[2] / "docs" / "unknowns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([\w.]+)` \| ([\w-]+) \| ([\d.e-]+) to ([\d.e-]+) \|", page, re.MULTILINE)

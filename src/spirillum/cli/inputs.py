@@ -171,6 +171,14 @@ def pairs_of(items: list[str], option: str) -> dict[str, str]:
     return each_once(map(pair, items), option)
 
 
+def check_apart(*files: Path | None) -> None:
+    """Refuse two results in one file, the second of which would replace the first."""
+    given = [path for path in files if path is not None]
+    for number, path in enumerate(given):
+        if any(path.resolve() == other.resolve() for other in given[:number]):
+            raise InputError(f"{path} is named for two results; allowed: a file for each")
+
+
 def time_window(text: str) -> tuple[float, float]:
     """FROM:TO, such as ``0s:2s``, in s."""
     start, colon, stop = text.partition(":")

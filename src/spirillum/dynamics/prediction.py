@@ -110,7 +110,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             interval=interval,
             progress=progress,
         )
-        request.check()
+        request.check(choice.model, tail_rate, wanted=motion is None)
         of_trials = fit.posterior is not None and fit.of_trials
         held = prediction.predict(
             fit.central(own) if of_trials else own,

@@ -62,19 +62,25 @@ _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
 
+def why_never_released(robot: Robot, model: str, tail_rate: str | float | None) -> str:
+    """Return why a request has no released motion, in a sentence; empty where it depends on the table of its tube."""
+    if robot.channel is None:
+        return "the robot has no channel in which it could be released"
+    if model != WALLED:
+        return f"model '{model}' has no walls on which a robot could rest; use model '{WALLED}'"
+    if tail_rate is not None:
+        return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
+    return ""
+
+
 def why_not_released(held: Prediction) -> str:
     """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
-    if held.robot.channel is None:
-        return "the robot has no channel in which it could be released"
-    if held.model.name != WALLED:
-        return f"model '{held.model.name}' has no walls on which a robot could rest; use model '{WALLED}'"
-    if held.tail_rate is not None:
-        return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
     batch = RobotBatch.of(held.robot, held.batch.placement)
-    if not has_table(batch, "yaw"):
+    never = why_never_released(held.robot, held.model.name, held.tail_rate)
+    if not never and not has_table(batch, "yaw"):
         made = "its tube has no table with yawed poses yet; `spirillum prepare` makes it, `simulate` and `settle` too"
         return why_no_table(batch) or made
-    return ""
+    return never
 
 
 def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -> ReleasedMotion:
@@ -428,8 +434,11 @@ class TrialRequest:
     posterior_for: PosteriorFor = "new"
     """Whose discrepancy the interval holds, with a posterior."""
 
-    def check(self) -> None:
+    def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:
         """Refuse what no trial can have, before the held answer is computed."""
+        reason = why_never_released(self.robot, model, tail_rate)
+        if not wanted or reason:
+            self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
         height, channel = self._height, self.robot.channel
@@ -460,7 +469,7 @@ class TrialRequest:
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
         reason = why_not_released(held)
-        if not wanted or reason:
+        if reason:
             self._check_unused(reason)
         if not wanted:
             return held
