@@ -124,6 +124,8 @@ WIDE = "biorob2012-wide"
             ["compare-models", WIDE, "-o", "x.png", "--plot", "./x.png"],
             "x.png is named for two results; allowed: a file",
         ),
+        (["simulate", WIDE, "-o", "run.nc", "--motion", "held", "--no-weight"], "--no-weight with motion = 'held'"),
+        (["study", ""], "an empty word after study; allowed: a name"),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),

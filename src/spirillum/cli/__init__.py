@@ -21,7 +21,7 @@ from typing import Any, TextIO
 
 __all__ = ["main"]
 
-_NAMING = ("measure", "setup", "virtual-experiment")
+_NAMING = ("measure", "observations", "robot", "setup", "study", "virtual-experiment")
 """Commands whose arguments name files and folders."""
 _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "

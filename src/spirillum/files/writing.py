@@ -266,7 +266,7 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, r
         if len(kinds) > _FEW:
             names = ", ".join(f"{ending} ({what})" for ending, what in kinds.items())
         raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
-    return writable_target(path, "any" if replace == "none" else replace)
+    return writable_target(path, replace)
 
 
 def writable_target(path: Path, replace: Replace = "own") -> Path:
