@@ -43,7 +43,8 @@ CAUTIONS = {
         "The model has no walls, and no drag factors that could replace their effect. Calibrate, or use model `tube`."
     ),
     "calibration-outside": (
-        "Drag factors were fitted to a body and a channel of other sizes. Calibrate again, or use model `tube`."
+        "Drag factors, or other fitted values, are of a body and a channel of other sizes. Calibrate again, or use "
+        "model `tube` without a calibration."
     ),
     "friction-unset": (
         "The effective friction B_eff of equation (18) is not given: rates, and the speeds that follow, are upper "
