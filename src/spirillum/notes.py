@@ -43,7 +43,8 @@ CAUTIONS = {
         "The model has no walls, and no drag factors that could replace their effect. Calibrate, or use model `tube`."
     ),
     "calibration-outside": (
-        "Drag factors were fitted to a body and a channel of other sizes. Calibrate again, or use model `tube`."
+        "Drag factors, or other fitted values, are of a body and a channel of other sizes. Calibrate again, or use "
+        "model `tube` without a calibration."
     ),
     "friction-unset": (
         "The effective friction B_eff of equation (18) is not given: rates, and the speeds that follow, are upper "
@@ -217,9 +218,6 @@ INFORMATION = {
     "input-unused": "Part of the input has no effect, as columns that are not read or a seed without anything random.",
     "files": (
         "Files of an earlier result were removed or left in the folder, or a file is not written. The note says which."
-    ),
-    "table-not-kept": (
-        "There is no folder in which the table could be kept. Set SPIRILLUM_CACHE to a folder that can be written to."
     ),
     "lines-not-sent": "The network refused some of the lines. Check address and port.",
 }

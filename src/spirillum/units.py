@@ -350,6 +350,16 @@ def show(value: float, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
+def as_given(value: object, unit: str) -> str:
+    """Text of a quantity as a caller gave it: words as they are, clipped, and a number with its SI unit."""
+    if not is_number(value):
+        return _clip(str(value), 40)
+    try:
+        return f"{float(value):g} {unit}"
+    except OverflowError:
+        return f"(huge) {unit}"
+
+
 def show_apart(one: float, other: float, unit: str, least: int = 4) -> tuple[str, str]:
     """Texts of two SI values in a display `unit`, with as many digits as distinguish them, and at least some."""
     for digits in range(least, 18):

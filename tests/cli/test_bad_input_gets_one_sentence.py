@@ -107,6 +107,25 @@ WIDE = "biorob2012-wide"
         (["predict", WIDE, "--friction", "paper", "--tail-rate=-0.001Hz"], "tail-rate = -0.006283 rad/s"),
         (["predict", WIDE, "--tail-rate=238671 rad/s"], "positive battery voltage"),
         (["predict", WIDE, "--model", "x" * 50_000], "model = 'xxx"),
+        (
+            ["predict", WIDE, "--set", 'tail={amplitude="2 mm"}', "--set", "tail.amplitude=3mm"],
+            "tail.amplitude is set by tail and again by tail.amplitude; allowed: each field once",
+        ),
+        (
+            ["predict", WIDE, "--set", "body=none", "--set", "body.length=1mm"],
+            "body is set by body and again",
+        ),
+        (["predict", WIDE, "--set", "tail.length=1mm", "--set", "tail.length=2mm"], "names tail.length twice"),
+        (
+            ["control", WIDE, "--with", "camera.latency=1ms", "--with", "camera.latency=2ms"],
+            "names camera.latency twice",
+        ),
+        (
+            ["compare-models", WIDE, "-o", "x.png", "--plot", "./x.png"],
+            "x.png is named for two results; allowed: a file",
+        ),
+        (["simulate", WIDE, "-o", "run.nc", "--motion", "held", "--no-weight"], "--no-weight with motion = 'held'"),
+        (["study", ""], "an empty word after study; allowed: a name"),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),
@@ -207,7 +226,29 @@ def test_interrupt_that_a_library_has_caught_leaves_with_130(
     monkeypatch.setattr(study_run, "map_tasks", interrupted)
     outcome = run("study", "-o", str(tmp_path / "out"))
     assert outcome.code == 130
-    assert outcome.err.endswith("spirillum: interrupted; what was done is kept\n")
+    assert outcome.err.endswith("spirillum: interrupted; finished files are kept\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "work", "words"),
+    [
+        ("study -o out", "spirillum.studies.run.map_tasks", "finished robots are kept in out; the same"),
+        ("prepare magnetic-helix", "spirillum.cli.renderer.progress_bar", "finished tables and nodes are kept"),
+        ("calibrate o.csv x.toml -o fit", "spirillum.robot.load.load", "nothing of this fit is kept"),
+        ("predict magnetic-helix", "spirillum.dynamics.prediction.predict", "finished files are kept"),
+    ],
+)
+def test_an_interrupt_says_what_is_kept(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, work: str, words: str
+) -> None:
+    def interrupted(*_: object, **_more: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(work, interrupted)
+    outcome = run(*command.split())
+    assert outcome.code == 130
+    assert outcome.err.splitlines()[-1].startswith(f"spirillum: interrupted; {words}")
 
 
 def test_our_own_errors_are_not_hidden(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:

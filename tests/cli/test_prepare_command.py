@@ -10,7 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum.cli.renderer import progress_bar
 from spirillum.fluid.tube.progress_messages import progress_message
-from spirillum.swimming.preparation import Prepared
+from spirillum.swimming.preparation import Prepared, preparations_answer
 
 
 def test_one_robot_and_several(run) -> None:  # type: ignore[no-untyped-def]
@@ -51,11 +51,16 @@ def test_of_several_robots_the_one_that_has_no_table_is_named() -> None:
         sp.prepare_all(["biorob2012-wide", wide])
 
 
-def test_a_table_that_is_not_kept_says_so() -> None:
-    found = sp.prepare("biorob2012-wide")
-    assert not [sentence for sentence in found.warnings if "SPIRILLUM_CACHE" in sentence]
-    lost = Prepared(found.robot, found.table, kept=False)
-    assert "SPIRILLUM_CACHE is off" in lost.warnings[-1]
+def test_a_caution_on_several_tables_says_on_how_many() -> None:
+    """A study's robots share a name, and a terminal shows one caution of a code."""
+    made = sp.prepare("biorob2012-wide")
+    worse = replace(made.table, error={**made.table.error, "sideways_force": 0.034})
+    other = sp.load("biorob2012-wide", **{"tail.wavelength": "30 mm"})
+    answer = preparations_answer([Prepared(made.robot, worse), Prepared(other, worse), made])
+    first, second = [note["sentence"] for note in answer["notes"] if note["code"] == "table-not-checked"]
+    assert first.startswith("biorob2012-wide, tail 25 x 2.5 mm: sideways force")
+    assert first.endswith("(and 1 more of 3 robots: --notes)")
+    assert second.startswith("biorob2012-wide, tail 30 x 2.5 mm: sideways force")
 
 
 def test_an_error_above_the_allowed_one_is_written_with_digits_that_differ() -> None:

@@ -348,7 +348,7 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
         ({"vary": {}}, "vary holds no field"),
         ({"vary": {"tail.wavelenth": "5 mm:9 mm"}}, "did you mean tail.wavelength"),
         ({"vary": {"tail.wavelength": "9 mm:5 mm"}}, "LOW below HIGH"),
-        ({"vary": {"tail.wavelength": "-9 mm:5 mm"}}, "vary tail.wavelength = -0.009:0.005 m"),
+        ({"vary": {"tail.wavelength": "-9 mm:5 mm"}}, "vary tail.wavelength = -9 mm:5 mm"),
         ({"vary": {"drive.rate": "1 Hz:5 Hz"}}, "is no number of this robot"),
         ({"tail_rate": "0 Hz"}, "at rest"),
         ({"minimise": "forward_velocity"}, "twice an objective"),

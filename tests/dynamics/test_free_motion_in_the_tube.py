@@ -195,7 +195,7 @@ def test_where_inertia_rules_no_motion_has_an_error_estimate() -> None:
         ({}, {"placement": {"tail_drop": "1 mm"}}, "placement.tail_drop"),
         ({}, {"until": "1 mm"}, "until = 1 mm; allowed: less than 0.5 mm"),
         ({}, {"until": "1"}, 'until = "1" has no unit'),
-        ({}, {"in_tube": {"wait": "1 s"}}, "in_tube.wait = 1.0 has no steady motion"),
+        ({}, {"in_tube": {"wait": "1 s"}}, "in_tube.wait = 1 s has no steady motion"),
         ({}, {"tail_rate": "0 Hz"}, "a tail at rest"),
     ],
 )

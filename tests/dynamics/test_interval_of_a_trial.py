@@ -161,6 +161,52 @@ def test_the_trial_of_a_posterior_is_the_run_of_its_median(tmp_path: Path) -> No
         sp.simulate("biorob2012-wide", posterior=path, motion="held")
 
 
+def test_a_posterior_of_another_channel_is_flagged_or_left_out(tmp_path: Path) -> None:
+    """A gap is that of its channel; a roughness acts in any, outside the geometry that it was fitted to."""
+    narrow: Any = {"duration": "0.1 s", "interval": True}
+    plain = sp.predict("biorob2012-narrow", **narrow).trial
+    fitted = {name: posteriors.write_trials(tmp_path / f"{name}.nc", {name: 3e-5}) for name in ("gap", "roughness")}
+    other = sp.predict("biorob2012-narrow", posterior=fitted["gap"], **narrow)
+    assert other.trial is not None
+    assert plain is not None
+    assert other.trial.intervals == plain.intervals
+    assert [note.code for note in other.warnings if note.code.startswith(("fit", "calibration"))] == ["fit-not-used"]
+    run = sp.simulate("biorob2012-narrow", posterior=fitted["gap"], timing={"duration": "0.1 s"})
+    assert "nothing in gap.nc" in str(run.attrs["notes"])
+    assert "mean_forward_velocity_low" not in run
+    acting = sp.simulate("biorob2012-narrow", posterior=fitted["roughness"], draws=0, timing={"duration": "0.1 s"})
+    assert "outside its geometry, channel.diameter = 30 mm (fitted to 40 mm)" in str(acting.attrs["notes"])
+
+
+def test_what_no_trial_can_have_is_refused() -> None:
+    """The trial that a request describes is refused; one that was not described has a reason in its column."""
+    for settings, words in (
+        ({"roughness": "6 mm"}, r"roughness = 6000 um with a gap of 500 um at the start"),
+        ({"roughness": "-1 mm"}, r'roughness = "-1 mm" is out of range; allowed: 1 nm to 100 m'),
+        (
+            {"duration": "1e9 s"},
+            r"duration = 1e\+09 s .*; allowed: at most \d+ s, 2000 turns of the tail",
+        ),
+        ({"duration": 2.0, "motion": "held"}, "duration = 2 s is of released motion"),
+        ({"in_tube": {"wait": "1 min"}, "motion": "held"}, r"in_tube\.wait = 60 s is of released motion"),
+        ({"roughness": 1e-5, "motion": "held"}, "roughness = 1e-05 m is of released motion"),
+        ({"duration": 1e-9}, r"duration = 1e-09 s; allowed: at least [\d.e-]+ s, a millionth of a turn"),
+    ):
+        with pytest.raises(sp.InputError, match=words):
+            sp.predict("biorob2012-wide", **settings)
+
+
+def test_a_trial_that_no_robot_or_model_has_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spirillum.swimming.prediction.predict", None)
+    for robot, settings in (
+        ("ecoli", {}),
+        ("biorob2012-wide", {"model": "sbt"}),
+        ("biorob2012-wide", {"tail_rate": 1.0}),
+    ):
+        with pytest.raises(sp.InputError, match="interval = True is of released motion in the tube"):
+            sp.predict(robot, interval=True, **settings)
+
+
 def test_the_page_of_unknowns_lists_all_of_them() -> None:
     page = (Path(__file__).parents[2] / "docs" / "unknowns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([\w.]+)` \| ([\w-]+) \| ([\d.e-]+) to ([\d.e-]+) \|", page, re.MULTILINE)

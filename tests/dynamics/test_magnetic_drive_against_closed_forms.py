@@ -163,9 +163,9 @@ def test_a_sweep_says_that_walls_are_left_out() -> None:
 @pytest.mark.parametrize(
     ("rates", "options", "words"),
     [
-        (["2 Hz", "1 Hz"], {}, "rates do not increase"),
-        (["0 Hz", "1 Hz"], {}, "rates do not increase"),
-        (["-1 Hz", "2 Hz"], {}, "rates do not increase"),
+        (["2 Hz", "1 Hz"], {}, "does not increase"),
+        (["0 Hz", "1 Hz"], {}, "does not increase"),
+        (["-1 Hz", "2 Hz"], {}, "does not increase"),
         (["1 m"], {}, "rates"),
         ([], {}, "rates has 0 values"),
         (None, {"turns": 1.0}, "turns = 1.0"),

@@ -192,6 +192,12 @@ def test_wrong_input_leaves_nothing(run: xr.Dataset, tmp_path: Path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+def test_events_of_the_wait_are_told_at_the_start(run: xr.Dataset, tmp_path: Path) -> None:
+    waited = run.assign_attrs(wait=60.0, events=json.dumps([{"time": -52.5, "what": "touches the wall"}]))
+    messages, _ = read(sp.export_run(waited, tmp_path / "run.mcap").path)
+    assert [(time, one["message"]) for time, one in messages["/events"]] == [(0.0, "touches the wall (52.5 s before)")]
+
+
 @pytest.mark.parametrize("time", [float("nan"), -1.0, 1e30])
 def test_a_time_that_no_recording_holds_is_a_sentence(run: xr.Dataset, tmp_path: Path, time: float) -> None:
     damaged = run.assign_attrs(events=json.dumps([{"time": time, "what": "touches the wall"}]))

@@ -121,7 +121,7 @@ def test_an_interrupt_while_modules_are_imported_is_one_too() -> None:
         "main()\n"
     )
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; what was done is kept\n")
+    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; finished files are kept\n")
 
 
 def test_an_interrupt_while_an_object_is_removed_is_not_lost() -> None:
@@ -143,7 +143,7 @@ def test_an_interrupt_while_an_object_is_removed_is_not_lost() -> None:
         "main()\n"
     )
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; what was done is kept\n")
+    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; finished files are kept\n")
 
 
 SETTINGS = "text.usetex: True\nfont.family: nowhere\nbackend: nonsense\nlines.nonsense: 1\nfigure.facecolor: red\n"

@@ -1,6 +1,7 @@
 """A file that this program has not written stays as it is, whatever a command is asked to do beside it."""
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -290,3 +291,49 @@ def test_frames_are_drawn_again_and_those_of_others_stay(tmp_path: Path) -> None
     with pytest.raises(InputError, match="not empty"):
         sp.render(WIDE, tmp_path / "r", **options)
     assert (tmp_path / "r" / "00000.png").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["study", "-o", "closed"],
+        ["study", "-o", "within"],
+        ["study", "--store", "closed.zarr"],
+        ["validate", "-o", "closed"],
+        ["measure", "film/a.mp4", "--setup", "film/a.setup.toml", "-o", "closed"],
+        ["calibrate", "o.csv", "biorob2012-wide", "-o", "within"],
+        ["virtual-experiment", "-o", "closed"],
+        ["render", "biorob2012-wide", "--run", "trial", "-o", "closed/trial.mp4"],
+        ["simulate", "biorob2012-wide", "-o", "closed/run.nc"],
+        [
+            "design",
+            "magnetic-helix",
+            "--maximise",
+            "forward_velocity",
+            "--vary",
+            "tail.length=1mm:2mm",
+            "-o",
+            "closed/b.toml",
+        ],
+    ],
+)
+def test_a_closed_folder_is_refused_before_the_work(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    """Tables, films and runs would be computed for nothing; `within` has closed `figures`."""
+    (tmp_path / "closed").mkdir()
+    (tmp_path / "within" / "figures").mkdir(parents=True)
+    (tmp_path / "film").mkdir()
+    sp.render(WIDE, tmp_path / "film" / "a.mp4", trial={"duration": 0.2}, camera={"size": "64x64", "fps": 10.0})
+    (tmp_path / "o.csv").write_text("")
+    (tmp_path / "closed.zarr").symlink_to("closed")
+    shut, access = {tmp_path / "closed", tmp_path / "within" / "figures"}, os.access
+
+    def closed(path: str, mode: int, **more: bool) -> bool:
+        return access(path, mode, **more) and not (mode & os.W_OK and Path(path).resolve() in shut)
+
+    monkeypatch.setattr(os, "access", closed)
+    monkeypatch.chdir(tmp_path)
+    for work in ("study.computed_study", "study.make_tables", "study_store.make_tables"):
+        monkeypatch.setattr(f"spirillum.results.{work}", None)
+    assert re.search(r"cannot be (written|written to) \(permission denied\); allowed: a folder", refused(*command))

@@ -196,7 +196,7 @@ def test_command(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, sentence in (
         (["/dev/no-such-port"], "cannot be opened"),
         ([far.port, "--duty", "nan"], "duty = nan"),
-        ([far.port, "--duration", "0s"], "duration = 0.0; allowed: above 0 s"),
+        ([far.port, "--duration", "0s"], "duration = 0 s; allowed: above 0 s"),
     ):
         with pytest.raises(SystemExit) as stopped:
             main(["remote", *arguments])

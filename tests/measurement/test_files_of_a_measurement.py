@@ -186,7 +186,7 @@ def test_an_interruption_keeps_what_was_finished(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
     followed |= {"a.mp4": make_track(span=SHORT), "b.mp4": KeyboardInterrupt()}
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match="1 of 2 trials are finished and kept in"):
         measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"a.nc", "a.movement.nc", "observations.csv"}
 

@@ -126,6 +126,23 @@ def test_a_mass_does_not_weigh_the_tail(overrides: dict[str, Any]) -> None:
     assert load("biorob2012-wide", **overrides).warnings == ()
 
 
+def test_a_coupling_of_another_body_that_no_longer_fits_warns(tmp_path: Path) -> None:
+    """Wider than the body, or longer; one that is set with or after the body is the user's own."""
+    small = {"body.diameter": "5 mm", "body.length": "12 mm"}
+
+    def said(robot: str | Path, **fields: str) -> list[str]:
+        return [note for note in load(robot, **fields).warnings if note.startswith("coupling.")]
+
+    words = "coupling.diameter = 6 mm is that of another body and wider than body.diameter = 5 mm; set it anew"
+    assert said("biorob2012-wide", **small) == [words]
+    assert said("biorob2012-wide", **{"body.length": "9 mm"})[0].startswith("coupling.length = 10 mm is that of")
+    assert not said("biorob2012-wide", **{"body.diameter": "6 mm"})
+    path = tmp_path / "small.toml"
+    path.write_text('extends = "biorob2012-wide"\nbody.diameter = "5 mm"\n')
+    assert said(path) == [words]
+    assert not said(path, **{"coupling.diameter": "5.5 mm"})
+
+
 def test_layers_of_a_stale_mass(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     text = 'extends = "biorob2012-wide"\n[body]\ndiameter = "17 mm"\n'

@@ -52,6 +52,13 @@ def test_a_tail_that_does_not_fit_takes_no_walls_from_the_others() -> None:
     assert nobody == "tube"
 
 
+def test_a_gap_that_no_channel_has_is_refused_before_the_work() -> None:
+    robots = ["biorob2012-wide", "biorob2012-narrow"]
+    words = r"placement\.gap = 11\.01 mm; allowed: at most 11 mm, because there is no more room in any channel"
+    with pytest.raises(InputError, match=words):
+        sp.study({"models": ["tube"], "robots": robots, "placement": {"gap": "11.01 mm"}})
+
+
 def test_robots_with_and_without_a_channel_need_a_named_model() -> None:
     mixed = {"robots": ["biorob2012-wide", "ecoli"], "friction": ["none"]}
     with pytest.raises(InputError, match=r"ecoli has no channel, but others have; allowed: .* models = \["):

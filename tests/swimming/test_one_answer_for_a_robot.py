@@ -72,6 +72,8 @@ def test_a_robot_that_does_not_fit_its_tube_is_refused_and_told_how_to_leave_wal
     tight = sp.load(WIDE, **{"channel.diameter": "18.5 mm"})
     with pytest.raises(sp.InputError, match=r"channel\.diameter = 18\.5 mm.*or model 'slender', which leaves out"):
         answer_of(tight)
+    with pytest.raises(sp.InputError, match=r"coupling\.length = 0 mm.*or model 'sbt', which leaves out"):
+        sp.predict(sp.load("biorob2012-wide", coupling="none"))  # slender refuses it, too
 
 
 def test_a_place_in_a_tube_that_is_too_tight_needs_walls() -> None:

@@ -50,6 +50,14 @@ def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, proposed):
         load_setup(written)
 
 
+def test_a_setup_that_is_there_is_refused_before_the_work(film, tmp_path):
+    (tmp_path / "setup.toml").touch()
+    looks: list[str] = []
+    with pytest.raises(sp.InputError, match=r"setup\.toml exists; allowed: a new file, or --force"):
+        sp.propose_setup(film, output=tmp_path / "setup.toml", progress=lambda what, *_: looks.append(what))
+    assert not looks
+
+
 def test_heights_to_fill_in_are_not_exact(film, proposed):
     """Each has an uncertainty that is active, as in the file of `setup new`."""
     import tomllib

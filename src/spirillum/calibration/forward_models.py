@@ -36,7 +36,7 @@ from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import Draws, TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import prepare_all, table_for
+from spirillum.swimming.preparation import passing_tables, prepare_all, table_for
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator
@@ -101,11 +101,7 @@ def _tables(
     if lacking and not prepare:
         otherwise = ", or model 'sbt', which leaves out the walls"
         raise without_tables(experiment, lacking, "model 'tube' asks a table", otherwise)
-    made = (
-        [one.table for one in prepare_all(experiment.robots, stage="straight", progress=on_progress)]
-        if lacking
-        else found
-    )
+    made = passing_tables(experiment.robots, progress=on_progress) if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})
 
 

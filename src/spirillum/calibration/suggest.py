@@ -32,6 +32,7 @@ from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.display import DisplayMixin, counted
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_choice, check_range
+from spirillum.fitted.fit import fit_of_posterior
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.library import TabledTube, tabled
@@ -253,7 +254,12 @@ def _check_channels(robots: Sequence[Robot]) -> None:
 
 
 def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[Note]:
-    said = [note.prefixed(f"{robot.name}: ") for robot in robots for note in calibration_warnings(robot, known.model)]
+    fit, model = fit_of_posterior(known), find_swimmer_model(known.model)
+    said = [
+        note.prefixed(f"{robot.name}: ")
+        for robot in robots
+        for note in (*calibration_warnings(robot, known.model), *fit.geometry_warnings([robot], [model]))
+    ]
     if known.synthetic:
         said.append(synthetic_warning(known.observations))
     return said

@@ -21,7 +21,7 @@ from typing import Any, TextIO
 
 __all__ = ["main"]
 
-_NAMING = ("measure", "setup", "virtual-experiment")
+_NAMING = ("measure", "observations", "robot", "setup", "study", "virtual-experiment")
 """Commands whose arguments name files and folders."""
 _INSTEAD = {
     ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "
@@ -32,7 +32,7 @@ _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.ERO
 """Errors of a name or location, not of the program."""
 _TERMINATED = 128 + signal.SIGTERM
 """Exit code after SIGTERM, which schedulers expect, however the command ends then."""
-_KEPT = "interrupted; what was done is kept"
+_KEPT = "interrupted; finished files are kept"
 _AGAIN = 0.02
 """After this time an interrupt that was dropped comes again, s."""
 _OBJECTS = 50_000

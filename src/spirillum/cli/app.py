@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from spirillum.cli.calibrate_commands import calibrate, design, rank_models, suggest
 from spirillum.cli.control_commands import control, remote
 from spirillum.cli.function_command import FunctionCommand, Request, from_function
-from spirillum.cli.inputs import overrides_from, refuse_conflicts
+from spirillum.cli.inputs import check_apart, overrides_from, refuse_conflicts
 from spirillum.cli.measurement_commands import measure, observations_app, render, setup_app, track, virtual_experiment
 from spirillum.cli.motion_commands import magnetic_sweep, settle, simulate
 from spirillum.cli.robot_commands import export, prepare, robot_app, validate
@@ -129,6 +129,7 @@ def compare_models(
 
     draw = renderer.picture(output, "models.png", "spirillum.view.figures.comparison:comparison_figure")
     draw_effects = renderer.picture(plot, "effects.png", "spirillum.view.figures.comparison:effects_figure")
+    check_apart(output, plot)
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
     files = {"file": draw(result), "plot": draw_effects(result)}

@@ -71,7 +71,7 @@ def calibrate(
     from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import renderer
-    from spirillum.fitted.fit import set_fields
+    from spirillum.robot.arguments import set_fields
     from spirillum.swimming.model_choice import AUTO
     from spirillum.swimming.released_motion import RELEASED
 
@@ -142,7 +142,7 @@ def rank_models(
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import free_by_model
     from spirillum.cli import renderer
-    from spirillum.fitted.fit import set_fields
+    from spirillum.robot.arguments import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
     from spirillum.swimming.released_motion import HELD, RELEASED
 
@@ -177,7 +177,7 @@ def suggest(
     """
     from spirillum.calibration.parameters import OBSERVED
     from spirillum.cli import renderer
-    from spirillum.fitted.fit import set_fields
+    from spirillum.robot.arguments import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
     if rows < 1:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
 from spirillum.cli.shared_options import PANELS, Json, starting
 
@@ -155,7 +156,7 @@ def control(
             files["movie"] = str(movie)
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
     if found.interrupted:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("" if output is None else f"the run until then is kept in {output}")
 
 
 def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
@@ -175,7 +176,8 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
     from spirillum.controllers.lab import Lab
     from spirillum.robot.load import parse_setting
 
-    return Lab.read(path, dict(parse_setting(text, "--with", "camera.latency=50ms") for text in changes or []))
+    given = [parse_setting(text, "--with", "camera.latency=50ms") for text in changes or []]
+    return Lab.read(path, each_once(given, "--with"))
 
 
 @from_function("spirillum.interfaces.serial_remote:remote", robot=None)

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import typer
-from typer.core import TyperCommand
 
 from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
     COMPLETIONS,
     LISTED,
@@ -200,7 +200,7 @@ def from_function(
     return decorate
 
 
-class FunctionCommand(TyperCommand):
+class FunctionCommand(InterruptibleCommand):
     """A command whose parameters are made when they are first needed."""
 
     @cached_property
@@ -285,7 +285,9 @@ def _with_options(error: InputError, items: Iterable[Declaration]) -> InputError
         on = not item.default if item.is_switch else True
         found = rf"{re.escape(item.path)}\b" if item.table in _IN_PYTHON else rf"{last} = {on}\b"
         found += rf"|{last}(?= = )" if "_" in last else ""
-        sentence = re.sub(rf"(?<![\w.-])(?:{found})", _name_of(item), sentence)
+        off = item.is_switch and item.default and item.path not in NAMES
+        name = f"--no-{_name_of(item)[2:]}" if off else _name_of(item)
+        sentence = re.sub(rf"(?<![\w.-])(?:{found})", name, sentence)
     return error if sentence == str(error) else InputError(sentence)
 
 

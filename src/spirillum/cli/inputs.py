@@ -123,10 +123,10 @@ def overrides_from(settings: list[str] | None) -> dict[str, Any]:
     """Fields of the robot by `--set`."""
     from spirillum.robot.load import parse_setting
 
-    return _each_once(map(parse_setting, settings or []), "--set")
+    return each_once(map(parse_setting, settings or []), "--set")
 
 
-def _each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
+def each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
     """Values by field."""
     found: dict[str, _V] = {}
     for field, value in pairs:
@@ -152,7 +152,8 @@ def loaded_robot(
     overrides = overrides_from(settings)
     found = load(robot, **overrides)
     if overrides and not (calibration is None and posterior is None):
-        from spirillum.fitted.fit import check_not_replaced, set_fields
+        from spirillum.fitted.fit import check_not_replaced
+        from spirillum.robot.arguments import set_fields
 
         check_not_replaced(set_fields(overrides), found, calibration, posterior)
     return found
@@ -167,7 +168,15 @@ def pairs_of(items: list[str], option: str) -> dict[str, str]:
             raise InputError(f"{option} {text[:60]!r} is not FIELD=LOW:HIGH, for example tail.wavelength=5mm:40mm")
         return name, value
 
-    return _each_once(map(pair, items), option)
+    return each_once(map(pair, items), option)
+
+
+def check_apart(*files: Path | None) -> None:
+    """Refuse two results in one file, the second of which would replace the first."""
+    given = [path for path in files if path is not None]
+    for number, path in enumerate(given):
+        if any(path.resolve() == other.resolve() for other in given[:number]):
+            raise InputError(f"{path} is named for two results; allowed: a file for each")
 
 
 def time_window(text: str) -> tuple[float, float]:

@@ -129,7 +129,7 @@ def simulate(
     found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
     renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
     if any(event["what"] == INTERRUPTED for event in found["events"]):
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(f"the run until then is kept in {output}")
 
 
 def check_movie(movie: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
-from threading import Event, Lock, Thread
+from threading import Event, Lock, Thread, Timer
 from time import monotonic
 from typing import Any
 
@@ -96,10 +96,16 @@ class ProgressLines:
         return f"{what}: {self._done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
+_FINE = 10.0
+"""Minutes below which a duration is printed with its seconds."""
+
+
 def _duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     minutes = seconds / 60.0
+    if minutes < _FINE:
+        return "{} min {:02} s".format(*divmod(round(seconds), 60))
     return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
 
 
@@ -236,18 +242,45 @@ def _print_line(line: str) -> None:
             sys.stderr.flush()
 
 
+_SOON = 2.0
+"""Time after which it is said why an answer is not there at once, s."""
+
+
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar on standard error with the time left, plain lines where it is no terminal; silent for `--json`.
 
     That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will take,
-    are lines of their own on standard error in any case.
+    are lines of their own on standard error in any case; so is, after two seconds, that there is no table.
     """
-    from spirillum.fluid.tube.progress_messages import ANNOUNCED, OF_A_RUN, TILTED
+    from spirillum.fluid.tube.progress_messages import LEVEL
+
+    waiting: list[Timer] = []
+    with _progress(quiet=quiet) as tell:
+
+        def told(what: str, done: int, total: int) -> None:
+            if not what.startswith(LEVEL):
+                tell(what, done, total)
+            elif not waiting:
+                waiting.append(Timer(_SOON, tell, (what, done, total)))
+                waiting[0].daemon = True
+                waiting[0].start()
+
+        try:
+            yield told
+        finally:
+            for timer in waiting:
+                timer.cancel()
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar, or lines, for messages as they come."""
+    from spirillum.fluid.tube.progress_messages import ANNOUNCED, LEVEL, OF_A_RUN, TILTED
     from spirillum.swimming.released_motion import SPEED_OF
     from spirillum.worker_pool import ESTIMATE
 
-    lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, TILTED)
+    lines = (ANNOUNCED, ESTIMATE, LEVEL, OF_A_RUN, TILTED)
     if quiet:
 
         def announce(what: str, _done: int, _total: int) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+
+from spirillum.cli.interrupts import InterruptibleCommand
 
 MODEL_PANEL = "Model"
 """Panel of the help: which model answers, with which friction and calibration, how finely."""
@@ -213,7 +214,7 @@ Picture = Annotated[
 ]
 
 
-class NotedCommand(TyperCommand):
+class NotedCommand(InterruptibleCommand):
     """A command with the option `--notes` where it has `--json`, and so prints an answer."""
 
     def __init__(self, *given: Any, **named: Any) -> None:

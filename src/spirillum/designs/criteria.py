@@ -21,7 +21,7 @@ from spirillum.robot.geometry import coil_curvature
 from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import STEADY
-from spirillum.units import Kind, display_unit, in_unit, parse_option, show
+from spirillum.units import Kind, as_given, display_unit, in_unit, parse_option, show
 
 
 class Judged(Options):
@@ -125,6 +125,11 @@ def range_of(name: str, given: str | Sequence[object], unit: str) -> tuple[float
         raise InputError(f"{name} = {str(given)[:60]!r}; allowed: LOW:HIGH, each with its unit")
     low, high = (_value(name, end, unit) for end in ends)
     return low, high
+
+
+def _as_typed(given: str | Sequence[object], unit: str) -> str:
+    """A range as a caller gave it, numbers with their SI unit."""
+    return given[:60] if isinstance(given, str) else ":".join(as_given(end, unit) for end in given)
 
 
 def _value(name: str, given: object, unit: str) -> float:
@@ -308,11 +313,11 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
     unit = units[path] or "1"
     low, high = range_of(f"{option} {path}", given, unit)
     if not low < high:
-        raise InputError(f"{option} {path} = {low:g}:{high:g} {unit}; allowed: LOW:HIGH with LOW below HIGH")
+        raise InputError(f"{option} {path} = {_as_typed(given, unit)}; allowed: LOW:HIGH with LOW below HIGH")
     try:
         RobotBatch.of(robot).with_values({path: [low, high]})
     except InputError as error:
         raise InputError(
-            f"{option} {path} = {low:g}:{high:g} {unit}; allowed: numbers that the field of a robot file may have"
+            f"{option} {path} = {_as_typed(given, unit)}; allowed: numbers that the field of a robot file may have"
         ) from error
     return Variable(path, unit, low, high)

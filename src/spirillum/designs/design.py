@@ -95,14 +95,14 @@ def design(
     unknowns = unknowns_of(given, unknown, posterior, model)
     options.check_read(known=unknowns.known, conditions=len(subject_to) > 0)
     space = space_of(unknowns.robot, vary)
-    choice = chosen_model(model, given, space, unknowns)
-    chosen = find_swimmer_model(choice.model)
     twice = {item.path for item in unknowns.ranges} & {item.path for item in space.variables}
     if twice:
         raise InputError(f"{twice.pop()} is varied and unknown; allowed: one of them")
+    choice = chosen_model(model, given, space, unknowns)
+    chosen = find_swimmer_model(choice.model)
     rate = None if tail_rate is None else parse_option("tail_rate", tail_rate, KINDS["rate"])
     if rate == 0:
-        raise InputError("tail_rate = 0: a tail at rest drives nothing; allowed: a rate above or below 0")
+        raise InputError("tail_rate = 0 Hz: a tail at rest drives nothing; allowed: a rate above or below 0")
     if rate is None and given.drive is None:
         raise InputError(f"{given.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     objectives = _objectives(maximise, minimise, options)

@@ -325,6 +325,7 @@ def compare_models(
                 fit=fit,
                 placement=placed,
                 band=False,
+                progress=progress,
             )
             predictions[name] = trial.beside(held, wanted=True) if find_swimmer_model(name).placed else held
         except InputError as error:

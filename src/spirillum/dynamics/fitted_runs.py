@@ -57,7 +57,7 @@ def chosen_run(
     Args:
         model: name of the model, or `auto`.
         motion: `free` or `held`; None: `held` with a fitted model of the axial entries, or of one place without dry
-            friction, else `free`.
+            friction, else `free`, as with a fit of trials.
         robot: the robot.
         placement: where it starts.
         fit: fitted values that are used.
@@ -81,12 +81,12 @@ def chosen_run(
         words = "dry friction is fitted and acts on a free robot: the run is a free motion"
         said.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
-    if motion is None and (chosen.axial_only or chosen.placed):
+    if motion is None and (chosen.axial_only or chosen.placed) and not fit.of_trials:
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
         words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
         said.append(Note("model-chosen", words, ("motion",)))
         return choice, "held", said
-    if motion != "held" and chosen.placed and fit.posterior is None:
+    if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
         said.append(CALIBRATED_HELD)
     return choice, motion or "free", said
 

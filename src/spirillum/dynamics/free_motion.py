@@ -37,6 +37,7 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.notes import Note
+from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -196,11 +197,9 @@ def prepare_release(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot,
 
 def _check(asked: InTube) -> None:
     """Refuse what changes in time."""
-    for name in ("wait", "flow"):
-        if getattr(asked, name) is not None:
-            raise InputError(
-                f"in_tube.{name} = {str(getattr(asked, name))[:80]} has no steady motion; allowed: with `simulate`"
-            )
+    for item in field_values(asked):
+        if item.path in ("wait", "flow") and item.value is not None:
+            raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
 
 
 def _check_until(until: float | None, gap: float) -> None:

@@ -61,7 +61,7 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.released_motion import check_full
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, motion_limits
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 _LONGEST = 1e6
 """The longest step, s."""
@@ -353,7 +353,7 @@ class Plant:
             InputError: for a velocity that is not finite, or a model that knows none.
         """
         if velocity is not None and not math.isfinite(as_number(velocity)):
-            raise InputError(f"velocity = {velocity}; allowed: a finite number of m/s, or None")
+            raise InputError(f"velocity = {as_given(velocity, 'm/s')}; allowed: a finite number of m/s, or None")
         if velocity == self._now.flow:
             return
         self._impose(velocity)

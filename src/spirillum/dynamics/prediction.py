@@ -11,6 +11,7 @@ from spirillum.dynamics.trial import TrialRequest
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
 from spirillum.fitted.fit import FITTED_HELD, FITTED_TRIAL, read_fit
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
@@ -20,7 +21,7 @@ from spirillum.swimming.drawn_resistance import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 from spirillum.swimming.reynolds import without_reynolds_bound
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 
 def predict(  # noqa: PLR0913 - the options of the command
@@ -93,24 +94,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         own = without_reynolds_bound(own)
     choice = choose_model(model, own, placement=Placement.of(placement), fit=fit)
     whose = posterior_for_of(posterior_for, fit.posterior, own)
+    fit, idle = fit.acting_on(fit.central(own), find_swimmer_model(choice.model))
     if motion != "free" or choice.model != WALLED:
-        of_trials = fit.posterior is not None and fit.posterior.answer != "held"
-        held = prediction.predict(
-            fit.central(own) if of_trials else own,
-            model=choice,
-            tail_rate=tail_rate,
-            friction=friction,
-            calibrated=calibrated,
-            fit=replace(fit, posterior=None) if of_trials else fit,
-            posterior_for="new" if of_trials else posterior_for,
-            resolution=resolution,
-            placement=placement,
-            band=band,
-            motion=motion or "held",
-            progress=progress,
-        )
-        if of_trials:
-            held = replace(held, warnings=(*held.warnings, FITTED_TRIAL))
         request = TrialRequest(
             own,
             friction=friction,
@@ -125,10 +110,29 @@ def predict(  # noqa: PLR0913 - the options of the command
             interval=interval,
             progress=progress,
         )
+        request.check(choice.model, tail_rate, wanted=motion is None)
+        of_trials = fit.posterior is not None and fit.of_trials
+        held = prediction.predict(
+            fit.central(own) if of_trials else own,
+            model=choice,
+            tail_rate=tail_rate,
+            friction=friction,
+            calibrated=calibrated,
+            fit=replace(fit, posterior=None) if of_trials else fit,
+            posterior_for="new" if of_trials else posterior_for,
+            resolution=resolution,
+            placement=placement,
+            band=band,
+            motion=motion or "held",
+            progress=progress,
+        )
+        held = replace(held, warnings=(*held.warnings, *([FITTED_TRIAL] if of_trials else idle)))
         return request.beside(held, wanted=motion is None)
     for name, value in (("interval", interval or None), ("duration", duration)):
         if value is not None:
-            raise InputError(f"{name} = {str(value)[:40]} with motion 'free'; allowed: without a motion, of the trial")
+            raise InputError(
+                f"{name} = {as_given(value, 's')} with motion 'free'; allowed: without a motion, of the trial"
+            )
     check_not_resolved(own, resolution)
     if band:
         raise InputError(
@@ -148,7 +152,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     )
     answer = replace(found.prediction, choice=choice)
     if fit.posterior is None:
-        return answer
+        return replace(answer, warnings=(*answer.warnings, *idle))
     from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 
     said = [FITTED_HELD] if fit.posterior.answer == "held" else []

@@ -210,13 +210,14 @@ def magnetic_sweep(
         )
     choice = ModelChoice(UNBOUNDED, NO_CHANNEL) if model == AUTO else ModelChoice(model)
     check_full(find_swimmer_model(choice.model))
+    check_range("turns", turns, 4, 10_000)
+    given = None if rates is None else _given_rates(rates)
     own = with_resolution(loaded, resolution, choice.model)
     # The rates of the sweep decide whether there is an answer, not the robot's own.
     held = replace(predict(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
-    check_range("turns", turns, 4, 10_000)
-    asked = _rates(rates, held)
+    asked = _usual_rates(held) if given is None else given
     _check_work(asked, turns, held.step_out_rate)
     batch = replace(held.batch, options=own.model)
     closed = swim(held.batch.with_values({"magnetic.rotation_rate": asked}), held.model, calibrated=False)
@@ -258,15 +259,19 @@ def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Sa
     return found
 
 
-def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
-    if rates is None:
-        angle = float(held.batch.moment_angle[0])
-        if np.sin(angle) < 1e-6:
-            raise InputError(
-                f"magnetic.moment_angle = {show(angle, 'deg')}: a moment along the motor axis has no step-out rate; "
-                "allowed: a moment across it, or rates (--rate)"
-            )
-        return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
+def _usual_rates(held: Prediction) -> Samples:
+    """Forty rates up to one and a half times the step-out rate."""
+    angle = float(held.batch.moment_angle[0])
+    if np.sin(angle) < 1e-6:
+        raise InputError(
+            f"magnetic.moment_angle = {show(angle, 'deg')}: a moment along the motor axis has no step-out rate; "
+            "allowed: a moment across it, or rates (--rate)"
+        )
+    return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
+
+
+def _given_rates(rates: Sequence[str | float] | Samples) -> Samples:
+    """Rates as a caller has given them, rad/s."""
     given: Any = [rates] if isinstance(rates, str) else rates
     if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:
         raise InputError(f"rates = {str(rates)[:40]}; allowed: a list of rates")
@@ -275,10 +280,14 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
     )
     if not 1 <= asked.size <= _MOST_RATES:
         raise InputError(f"rates has {asked.size} values; allowed: 1 to {_MOST_RATES}")
-    growing = bool(np.all(np.diff(np.abs(asked)) > 0)) and bool(np.all(asked * asked[0] > 0))
-    if not growing:
+    before = np.concatenate([[0.0], asked[:-1]])
+    wrong = np.flatnonzero((np.abs(asked) <= np.abs(before)) | (asked * asked[0] <= 0))
+    if wrong.size:
+        first = int(wrong[0])
+        after = f" after {show(float(before[first]), 'Hz')}" if first else ""
         raise InputError(
-            "rates do not increase in size from above 0 in one sense; allowed: increasing rates, all > 0 or < 0"
+            f"rates: {show(float(asked[first]), 'Hz')}{after} does not increase in size from above 0 in one sense; "
+            "allowed: increasing rates, all > 0 or < 0"
         )
     return asked
 

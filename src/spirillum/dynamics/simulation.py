@@ -40,7 +40,7 @@ from spirillum.swimming.preparation import table_for
 from spirillum.swimming.released_motion import check_full, motion_of
 from spirillum.swimming.reynolds import check_stokes_flow, in_stokes_flow, motion_limits, without_reynolds_bound
 from spirillum.swimming.steady import friction_reading, requirements
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -121,6 +121,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
     contact = fit.contact()
     choice, motion, said = chosen_run(model, motion, central, placed, fit)
     model = choice.model
+    fit, idle = fit.acting_on(central, find_swimmer_model(model))
+    known, said = fit.posterior, [*said, *idle]
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
@@ -254,7 +256,7 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> N
 
 def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *, weight: bool) -> None:
     """Refuse what only a free run knows."""
-    if fit.posterior is not None and fit.posterior.answer != "held":
+    if fit.posterior is not None and fit.of_trials:
         raise InputError(f"motion = 'held' with {fit.name}, which was fitted to trials; allowed: motion 'free'")
     if fit.contact().friction_coefficient:
         raise InputError(
@@ -263,7 +265,7 @@ def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *
         )
     given = [
         *(["a placement is given"] if placement.is_given else []),
-        *([f"roughness = {roughness}"] if roughness is not None else []),
+        *([f"roughness = {as_given(roughness, 'm')}"] if roughness is not None else []),
         *([] if weight else ["weight = False"]),
     ]
     if given:

@@ -129,7 +129,8 @@ def sample_times(end: float, turn: float, samples_per_turn: int, switches: Seque
     count = math.ceil(end / turn * samples_per_turn)
     if count > _LARGEST_SAMPLES:
         raise InputError(
-            f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: at most {_LARGEST_SAMPLES} in all"
+            f"samples-per-turn = {samples_per_turn} makes {count} samples in {end:g} s; allowed: at most "
+            f"{_LARGEST_SAMPLES} in all, as of a shorter time"
         )
     time = np.linspace(0.0, end, max(count, 1) + 1)
     for switch in switches:

@@ -21,7 +21,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.rotating_field import Field
 from spirillum.dynamics.run_summary import is_held, state_of
-from spirillum.dynamics.timing import TRIAL_DURATION, Timing
+from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
@@ -31,12 +31,14 @@ from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
 from spirillum.quantities import QUANTITIES
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.fields import field_values
 from spirillum.robot.geometry import CenterOfMass
 from spirillum.robot.links import links_of
 from spirillum.robot.load import with_resolution
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot, with_numbers
+from spirillum.robot.tube_pose import gap_of
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
@@ -44,7 +46,7 @@ from spirillum.swimming.preparation import preparation_time, table_for, why_no_t
 from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
-from spirillum.units import KINDS, parse_option, show, speed_unit
+from spirillum.units import KINDS, as_given, parse_option, show, speed_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,21 +65,27 @@ _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
 
+def why_never_released(robot: Robot, model: str, tail_rate: str | float | None) -> str:
+    """Return why a request has no released motion, in a sentence; empty where it depends on the table of its tube."""
+    if robot.channel is None:
+        return "the robot has no channel in which it could be released"
+    if model != WALLED:
+        return f"model '{model}' has no walls on which a robot could rest; use model '{WALLED}'"
+    if tail_rate is not None:
+        return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
+    return ""
+
+
 def why_not_released(held: Prediction) -> str:
     """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
-    if held.robot.channel is None:
-        return "the robot has no channel in which it could be released"
-    if held.model.name != WALLED:
-        return f"model '{held.model.name}' has no walls on which a robot could rest; use model '{WALLED}'"
-    if held.tail_rate is not None:
-        return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
     batch = RobotBatch.of(held.robot, held.batch.placement)
-    if not has_table(batch, "yaw"):
-        return why_no_table(batch) or (
-            "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
-            f"{preparation_time(batch, 'yaw')}, `simulate` and `settle` too"
-        )
-    return ""
+    never = why_never_released(held.robot, held.model.name, held.tail_rate)
+    if never or has_table(batch, "yaw"):
+        return never
+    return why_no_table(batch) or (
+        "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
+        f"{preparation_time(batch, 'yaw')}, `simulate` and `settle` too"
+    )
 
 
 def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -> ReleasedMotion:
@@ -435,17 +443,48 @@ class TrialRequest:
     posterior_for: PosteriorFor = "new"
     """Whose discrepancy the interval holds, with a posterior."""
 
-    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
-        """Return the held answer with what gives its released motions, or with the reason why there are none."""
+    def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:
+        """Refuse what no trial can have, before the held answer is computed."""
+        reason = why_never_released(self.robot, model, tail_rate)
+        if not wanted or reason:
+            self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
             raise InputError(f"duration = {self.duration:g} s; allowed: more than 0 s")
+        height, channel = self._height, self.robot.channel
+        if height is not None and channel is not None:
+            from spirillum.dynamics.start import check_roughness  # loads compiled loops
+
+            diameter = self.robot.body.diameter
+            check_roughness(height, gap_of(Placement.of(self.placement), diameter, 0.5 * channel.diameter), diameter)
+
+    def _check_length(self, held: Prediction) -> None:
+        """Refuse a requested duration of less than a millionth of a turn of the tail, or of more than a trial's."""
+        rate = abs(held.tail_rotation_rate)
+        if self.duration is None or not rate:
+            return
+        turn = 2.0 * np.pi / rate
+        duration_of(1.0, turn, self.duration)
+        if self.duration > _MOST_TURNS * turn:
+            raise InputError(
+                f"duration = {self.duration:g} s is {self.duration / turn:.4g} turns of the tail; allowed: at most "
+                f"{np.floor(_MOST_TURNS * turn):.6g} s, {_MOST_TURNS} turns of the tail, or `simulate`"
+            )
+
+    @property
+    def _height(self) -> float | None:
+        """Requested height of the asperities, m."""
+        return None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+
+    def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
+        """Return the held answer with what gives its released motions, or with the reason why there are none."""
         reason = why_not_released(held)
-        if not wanted or reason:
+        if reason:
             self._check_unused(reason)
         if not wanted:
             return held
         if reason:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
+        self._check_length(held)
         self._announce("held", held.forward_velocity, held.tail_rotation_rate)
         return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
 
@@ -493,7 +532,7 @@ class TrialRequest:
         known = self.fit.posterior
         robot = self.fit.central(self.robot)
         placed = self.fit.placed(robot, Placement.of(self.placement))
-        given = None if self.roughness is None else parse_option("roughness", self.roughness, KINDS["length"])
+        given = self._height
         rough, touching = with_contact(self.fit.contact(), given, self.in_tube)
         derived = robot.derived().get("submerged_weight")
         weight = 0.0 if derived is None else derived.value
@@ -542,12 +581,17 @@ class TrialRequest:
 
     def _check_unused(self, reason: str) -> None:
         """Refuse settings of a released motion for an answer without one, with the reason."""
-        given = {"roughness": self.roughness, "duration": self.duration, "interval": self.interval or None}
-        given |= {f"in_tube.{name}": self.in_tube.model_dump()[name] for name in self.in_tube.model_fields_set}
+        stated = (one for one in field_values(self.in_tube) if one.path in self.in_tube.model_fields_set)
+        given = {
+            "roughness": None if self.roughness is None else as_given(self.roughness, "m"),
+            "duration": None if self.duration is None else as_given(self.duration, "s"),
+            "interval": self.interval or None,
+            **{f"in_tube.{one.path}": one.text for one in stated if one.value is not None},
+        }
         for name, value in given.items():
             if value is not None:
                 why = f" ({reason})" if reason else ""
                 raise InputError(
-                    f"{name} = {str(value)[:40]} is of released motion in the tube, which this request does not "
+                    f"{name} = {value} is of released motion in the tube, which this request does not "
                     f"compute{why}; allowed: with model 'tube', without tail rate and motion 'held'"
                 )

@@ -348,12 +348,16 @@ def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
 
 
 def _events(dataset: xr.Dataset) -> Iterator[Message]:
+    """Events; those of the wait before the run, which a recording cannot hold, at its start."""
     try:
+        wait = float(dataset.attrs.get("wait", 0.0))
         events = json.loads(dataset.attrs.get("events", "[]"))
         entries = [(float(event["time"]), str(event["what"])) for event in events]
     except (ValueError, TypeError, KeyError) as error:
         raise InputError("the run's attribute 'events' is no list of events; allowed: a run of simulate") from error
     for time, what in sorted(entries):
+        if -wait <= time < 0.0:
+            time, what = 0.0, f"{what} ({-time:.4g} s before)"  # noqa: PLW2901
         yield (
             "/events",
             _LOG,

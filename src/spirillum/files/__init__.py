@@ -27,6 +27,7 @@ from spirillum.files.writing import (
     new_file,
     output_folder,
     output_target,
+    writable_target,
     write_text,
     written_by_us,
 )
@@ -79,6 +80,7 @@ __all__ = [
     "store_files",
     "store_target",
     "text_cell",
+    "writable_target",
     "write_dataset",
     "write_pieces",
     "write_text",

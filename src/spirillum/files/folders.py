@@ -19,7 +19,8 @@ from spirillum.files.writing import output_folder, write_text
 def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) -> Iterator[Path]:
     """A folder for results, made if it is not there and locked while the block runs.
 
-    A folder that was made here and stays empty is removed again. Leftovers of killed runs are removed.
+    It and its `figures` have to be open to writing. A folder that was made here and stays empty is removed again.
+    Leftovers of killed runs are removed.
     """
     folder = checked_path(path, "a folder for the results (-o DIR)")
     if folder.exists() and not folder.is_dir():
@@ -27,6 +28,8 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
     missing = _missing(folder)
     try:
         with locked(output_folder(folder)):
+            if (folder / "figures").exists():
+                output_folder(folder / "figures", folder)
             if claim is not None:
                 claim_folder(folder, **claim)
             yield folder

@@ -266,7 +266,12 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, r
         if len(kinds) > _FEW:
             names = ", ".join(f"{ending} ({what})" for ending, what in kinds.items())
         raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
-    real = check_replaceable(path, "any" if replace == "none" else replace)
+    return writable_target(path, replace)
+
+
+def writable_target(path: Path, replace: Replace = "own") -> Path:
+    """The path of a file to write, checked before any work is done: replaceable, in a folder open to writing."""
+    real = check_replaceable(path, replace)
     if real.exists() and not os.access(real, os.W_OK):
         raise InputError(f"{path} is there and closed to writing (permission denied); allowed: a file you may replace")
     folder = real.parent
@@ -298,4 +303,6 @@ def output_folder(path: Path, within: Path | None = None) -> Path:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path} cannot be a folder for results ({why}); allowed: a new folder") from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise InputError(f"{path} cannot be written to (permission denied); allowed: a folder you may write to")
     return path

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -78,6 +78,12 @@ class Fit:
             return (self.model,) if self.model else ()
         return tuple(self.file.calibration)
 
+    @property
+    def of_trials(self) -> bool:
+        """Whether it was fitted to trials of released robots."""
+        source = self.posterior or (None if self.file is None else self.file.provenance)
+        return source is not None and source.answer == "trial"
+
     def central(self, robot: Robot) -> Robot:
         """Return the robot with the fitted values, of a posterior its median, in place of its own."""
         if self.posterior is not None:
@@ -114,8 +120,7 @@ class Fit:
 
     def source_of(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> str:
         """Name of the file whose values act on a robot's answer with a model; empty where none does."""
-        name = self.name if self.file is None else Path(self.name).name
-        return name if self.serves(robot, model, friction=friction) else ""
+        return self._file_name if self.serves(robot, model, friction=friction) else ""
 
     def idle_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
@@ -132,23 +137,73 @@ class Fit:
             for model in idle
         ]
 
-    def _not_for(self, robots: Sequence[Robot], model: SwimmerModel) -> str:
-        """Whom nothing of it is for: robots in another channel than the fitted ones, or the model."""
+    def _is_fitted_in(self, robots: Sequence[Robot]) -> bool:
+        """Whether one of the channels in which it was fitted is that of some robot; so where it states none."""
         own = [robot.channel.diameter for robot in robots if robot.channel is not None]
         inside = any(np.isclose(diameter, self.channels, rtol=1e-6, atol=0.0).any() for diameter in own)
-        if model.name != self.model or not self.channels or inside or (self.file is not None and self.file.calibration):
+        return inside or not self.channels
+
+    def _not_for(self, robots: Sequence[Robot], model: SwimmerModel) -> str:
+        """Whom nothing of it is for: robots in another channel than the fitted ones, or the model."""
+        factors = self.file is not None and self.file.calibration
+        if model.name != self.model or self._is_fitted_in(robots) or factors:
             return f"model '{model.name}'"
-        fitted = " and ".join(show(diameter, "mm") for diameter in self.channels)
         which = "this robot" if len(robots) == 1 else "these robots"
-        return f"the channel of {which} (it was fitted in {fitted})"
+        return f"the channel of {which} (it was fitted in {self._fitted_channels})"
+
+    @property
+    def _fitted_channels(self) -> str:
+        return " and ".join(show(diameter, "mm") for diameter in self.channels)
 
     def outside_warnings(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> list[Note]:
         """Whether draws of a posterior leave a robot's answer as it is without them."""
         if self.posterior is None or self.posterior.acts_on(robot, walls=model.placed, friction=friction):
             return []
         whom = self._not_for([robot], model)
-        words = f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over poses are used"
+        words = f"nothing in {self.name} is for {whom}: the robot's own numbers are used, and it gives no interval"
         return [Note("fit-not-used", words)]
+
+    def acting_on(self, robot: Robot, model: SwimmerModel) -> tuple[Fit, list[Note]]:
+        """Return the fit, or none and a note where draws of a posterior leave the robot's answer as it is."""
+        idle = self.outside_warnings(robot, model)
+        return (NO_FIT if idle else self), idle
+
+    def geometry_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[Note]:
+        """Whether fitted values act in another channel, or of a posterior on another body, than they were fitted to.
+
+        That of a model's own drag factors is `spirillum.swimming.cautions.calibration_warnings`.
+        """
+        acting = (
+            robot
+            for robot in robots
+            for model in models
+            if (model.placed or model.name not in robot.calibration) and self.serves(robot, model)
+        )
+        apart = next(filter(None, map(self._difference, acting)), "")
+        if not apart:
+            return []
+        what = "its values" if self.posterior is None else "its values and intervals"
+        name = self._file_name.partition(" (")[0]
+        words = f"{name} is used outside its geometry, {apart}: {what} may not hold; recalibrate"
+        return [Note("calibration-outside", words, (apart.partition(" = ")[0],))]
+
+    def _difference(self, robot: Robot) -> str:
+        """The first size of a robot's channel and body that is none of the fitted ones; empty where all are."""
+        if not self._is_fitted_in([robot]):
+            own = "none" if robot.channel is None else show(robot.channel.diameter, "mm")
+            return f"channel.diameter = {own} (fitted to {self._fitted_channels})"
+        fitted = () if self.posterior is None else zip(("diameter", "length"), self.posterior.body, strict=True)
+        pairs = ((name, float(getattr(robot.body, name)), size) for name, size in fitted)
+        differing = (
+            f"body.{name} = {show(own, 'mm')} (fitted to {show(size, 'mm')})"
+            for name, own, size in pairs
+            if not np.isclose(own, size, rtol=1e-6, atol=0.0)
+        )
+        return next(differing, "")
+
+    @property
+    def _file_name(self) -> str:
+        return self.name if self.file is None else Path(self.name).name
 
     def origin_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
@@ -189,7 +244,8 @@ class Fit:
         idle = self.idle_warnings([robot], [model], friction=acts)
         if rate is None:
             return [*idle, *self.run_warnings(robot, model, reading)]
-        return [*idle, *self.origin_warnings([robot], [model], friction=acts)]
+        there = self.geometry_warnings([robot], [model])
+        return [*idle, *there, *self.origin_warnings([robot], [model], friction=acts)]
 
     def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[Note]:
         """All notes of a robot that is driven by its own motor."""
@@ -197,6 +253,7 @@ class Fit:
             *self.tail_warnings(robot),
             *self.reading_warnings([reading]),
             *self.model_warnings([model.name], [reading]),
+            *self.geometry_warnings([robot], [model]),
             *self.origin_warnings([robot], [model]),
         ]
 
@@ -292,19 +349,6 @@ def fit_of_posterior(posterior: PosteriorFile) -> Fit:
         channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
         friction_coefficient=None if coefficient is None else float(coefficient[0]),
     )
-
-
-def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
-    """Dotted names of the fields that overrides set, those of their tables one by one."""
-    return tuple(_leaves(overrides, ""))
-
-
-def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{above}{name}.")
-        else:
-            yield f"{above}{name}"
 
 
 def check_not_replaced(

@@ -59,10 +59,9 @@ def check_placement(placement: Placement, *models: ResistanceModel) -> None:
         return
     unset = type(placement)()
     given = next(item for item in field_values(placement) if item.value != getattr(unset, item.path))
-    shown = f"{given.value:g} {given.unit}" if given.unit else str(given.value)
     names = " or ".join(f"'{model.name}'" for model in models)
     walled = ", ".join(name for name, model in MODELS.items() if model.placed)
     raise InputError(
-        f"placement.{given.path} = {shown} with model {names}, which does not compute the channel's walls; allowed: "
-        f"{f'only with model {walled}' if walled else 'no placement'}"
+        f"placement.{given.path} = {given.text} with model {names}, which does not compute the channel's walls; "
+        f"allowed: {f'only with model {walled}' if walled else 'no placement'}"
     )

@@ -22,7 +22,7 @@ from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 if TYPE_CHECKING:
     import control
@@ -152,7 +152,9 @@ def linear_system(
     if not 0.0 <= at_duty <= 1.0:
         raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
     if flow is not None and axial.flow is None:
-        raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
+        raise InputError(
+            f"flow = {as_given(flow, 'm/s')} without one in the placement; allowed: placement with flow, or no flow"
+        )
     at_flow = (axial.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
     inertia = axial.check_steady(at_duty, at_flow)
     numbers = axial.numbers

@@ -24,7 +24,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, as_given, parse_option
 
 LONGEST_LINE = 80
 """Bytes of a line, its end included; what is longer is thrown away."""
@@ -253,7 +253,7 @@ def _check_duty(duty: Any) -> None:
 
 def _check_length(duration: Any) -> None:
     if not 0.0 < as_number(duration) <= _LONGEST_HOLD:
-        raise InputError(f"duration = {clipped(duration)}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
+        raise InputError(f"duration = {as_given(duration, 's')}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
 
 
 def _number_in(word: str, high: float) -> float:

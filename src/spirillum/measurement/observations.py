@@ -314,7 +314,9 @@ _TEMPLATE = """\
 
 def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
     """Write an empty observations file: comments and the header."""
-    target = output_target(path, {".csv": "an observations file"}, "observations.csv", replace="none")
+    target = output_target(
+        path, {".csv": "an observations file"}, "observations.csv", replace="any" if overwrite else "none"
+    )
     new_file(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n", overwrite=overwrite)
 
 

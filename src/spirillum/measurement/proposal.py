@@ -135,7 +135,9 @@ def propose_setup(
     """
     target = None
     if output is not None:
-        target = output_target(Path(output), {".toml": "a setup file"}, "setup.toml", replace="none")
+        target = output_target(
+            Path(output), {".toml": "a setup file"}, "setup.toml", replace="any" if overwrite else "none"
+        )
     apart = None if spacing is None else parse_option("spacing", spacing, KINDS["length"])
     if fps is not None and not 0.01 <= fps <= 1e5:
         raise InputError(f"fps = {fps:g}; allowed: 0.01 to 100000 frames a second")

@@ -190,7 +190,9 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
         overwrite: overwrite a file that is there.
     """
     new_file(
-        output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), setup_text(), overwrite=overwrite
+        output_target(path, {".toml": "a setup file"}, "setup.toml", replace="any" if overwrite else "none"),
+        setup_text(),
+        overwrite=overwrite,
     )
 
 

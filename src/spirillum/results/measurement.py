@@ -225,11 +225,14 @@ def _measured(asked: MeasurementRequest, folder: _Folder | None, on_progress: Pr
         words = path.name if count == 1 else f"{path.name} ({number + 1} of {count})"
         try:
             trials.append(_trial(asked, number, folder, _frames_told(on_progress, words)))
-        except (KeyboardInterrupt, OSError):
+        except (KeyboardInterrupt, OSError) as error:
             with suppress(OSError):  # as far as there is room for it
                 if trials:
                     _finished(asked, trials, failures, folder, on_progress, interrupted=True)
-            raise
+            if isinstance(error, OSError):
+                raise
+            kept = f" and kept in {folder.path}" if trials and folder is not None else ""
+            raise KeyboardInterrupt(f"{len(trials)} of {count} trials are finished{kept}") from error
         except InputError as error:
             failures.append((str(path), str(error)))
     if not trials:

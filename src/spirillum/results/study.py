@@ -210,16 +210,17 @@ def study(  # noqa: PLR0913 - the options of the command
     crew.check()
     fingerprint = study_fingerprint(loaded, observed)
     on_progress = progress or (lambda _what, _done, _total: None)
-    make_tables(loaded, crew, on_progress)
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
         with guard_inputs(*inputs):
             return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, on_progress))
     if output is None:
+        make_tables(loaded, crew, on_progress)
         return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, on_progress, crew))
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     with guard_inputs(*inputs), results_folder(output, claim=claim) as folder:
+        make_tables(loaded, crew, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)

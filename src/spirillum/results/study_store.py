@@ -31,7 +31,7 @@ from spirillum.studies.regions import (
     plan_of,
     region_jobs,
 )
-from spirillum.studies.run import warnings_of, warnings_of_calibrations
+from spirillum.studies.run import make_tables, warnings_of, warnings_of_calibrations
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.worker_pool import WorkerPool, map_tasks
 
@@ -62,6 +62,7 @@ def stored_study(
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
     claim = {"mark": _MARK, "content": mark, "what": "study"}
     with results_folder(store_target(store), claim=claim) as folder:
+        make_tables(loaded, crew, on_progress)
         plan = plan_of(loaded, observed, layout_of(loaded))
         attributes = {**described(loaded, observed, fingerprint, []), "coordinates": " ".join(plan.others)}
         outcome = _outcome_of(folder)

@@ -1,8 +1,8 @@
-"""Options that belong together as one argument: a frozen table, a mapping of its fields, or None for the defaults."""
+"""Arguments of several fields: options (a frozen table, a mapping of its fields, or None) and overrides of a robot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Self
 
 from pydantic import AfterValidator
@@ -129,3 +129,30 @@ def one_of(*allowed: str) -> Callable[[Any], Any]:
         return value
 
     return check
+
+
+_DEEPEST = 24
+"""Nested tables up to which fields are told apart: no robot file has more."""
+
+
+def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
+    """Dotted names of the fields that overrides set, those of their tables one by one."""
+    return tuple(_leaves(overrides, ""))
+
+
+def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
+    for name, value in table.items():
+        if isinstance(value, Mapping) and above.count(".") < _DEEPEST:
+            yield from _leaves(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}"
+
+
+def check_set_once(overrides: Mapping[str, Any]) -> None:
+    """Refuse a field that overrides set twice, by itself and within a table, or a table that they also replace."""
+    pairs = [(leaf, path) for path, value in overrides.items() for leaf in _leaves({path: value}, "")]
+    for leaf, path in pairs:
+        for other, beside in pairs:
+            if path != beside and f"{leaf}.".startswith(f"{other}."):
+                first, again = sorted((path, beside), key=len)
+                raise InputError(f"{other} is set by {first} and again by {again}; allowed: each field once")

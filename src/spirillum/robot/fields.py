@@ -159,6 +159,12 @@ class FieldValue(NamedTuple):
     unit: str | None
     """SI unit of a quantity, None for anything else."""
 
+    @property
+    def text(self) -> str:
+        """The value for a sentence, with its unit."""
+        number = isinstance(self.value, float)
+        return f"{self.value:g} {self.unit or ''}".rstrip() if number else str(self.value)[:60]
+
 
 def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
     """All fields of a section and the sections within it."""

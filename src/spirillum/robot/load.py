@@ -16,6 +16,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.notes import Note
+from spirillum.robot.arguments import check_set_once
 from spirillum.robot.fields import field_values, problems_in, refused_table
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.robot import Derived, Robot
@@ -93,6 +94,7 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
         if overrides:
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
+    check_set_once(overrides)
     table, source = raw_table(robot)
     folder = _folder_of(robot)
     table, changes = _extended(with_points_of_files(table, folder), source, folder)
@@ -101,7 +103,9 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
         _put(table, path.split("."), value, path)
     table = with_points_of_files(table, Path())
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
-    return _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
+    robot = _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
+    robot._warnings = (*robot.warnings, *_old_coupling(robot, changes))  # noqa: SLF001 - it is the loader's to set
+    return robot
 
 
 def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -328,6 +332,20 @@ def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[Note,
             )
             found.append(Note("robot-file-doubtful", words, (field, *scaled)))
     return tuple(found)
+
+
+def _old_coupling(robot: Robot, changes: Sequence[set[str]]) -> tuple[Note, ...]:
+    """Warn of a coupling of an earlier body that is wider than the robot's own, or longer."""
+    for name, beyond in (("diameter", "wider"), ("length", "longer")):
+        own, body = getattr(robot.coupling, name), getattr(robot.body, name)
+        last = next((layer for layer in reversed(changes) if {f"coupling.{name}", f"body.{name}"} & layer), set())
+        if robot.has_body and own > body and f"body.{name}" in last and f"coupling.{name}" not in last:
+            words = (
+                f"coupling.{name} = {show(own, 'mm')} is that of another body and {beyond} than body.{name} = "
+                f"{show(body, 'mm')}; set it anew"
+            )
+            return (Note("robot-file-doubtful", words, (f"coupling.{name}", f"body.{name}")),)
+    return ()
 
 
 def _floating(derived: Mapping[str, Derived]) -> tuple[Note, ...]:

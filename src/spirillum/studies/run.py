@@ -184,6 +184,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
     warnings += loaded.fit.idle_warnings(loaded.robots, asked)
+    warnings += loaded.fit.geometry_warnings(loaded.robots, asked)
     warnings += loaded.fit.origin_warnings(loaded.robots, asked)
     warnings += loaded.fit.reading_warnings(loaded.study.friction)
     warnings += loaded.fit.model_warnings(loaded.study.models, loaded.study.friction)

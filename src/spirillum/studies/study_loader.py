@@ -16,7 +16,7 @@ from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import FittedFriction
-from spirillum.fitted.fit import NO_FIT, Fit, check_kept, read_fit, set_fields
+from spirillum.fitted.fit import NO_FIT, Fit, check_kept, read_fit
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.measurement.observations import (
     ObservationRow,
@@ -25,6 +25,7 @@ from spirillum.measurement.observations import (
     read_observations,
     summarised,
 )
+from spirillum.robot.arguments import set_fields
 from spirillum.robot.fields import problems_in, refused_table
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -33,6 +34,7 @@ from spirillum.robot.tube_pose import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED, ModelChoice, choose_model
+from spirillum.units import show_apart
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
@@ -165,6 +167,7 @@ def load_study(
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    _check_room(study, robots, name)
     _check_contact(study, robots, name)
     placements = _fitted_places(study, robots, fit)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
@@ -212,6 +215,17 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
                 for source, varied in (entries[first], entries[number])
             )
             raise InputError(f"{name}: robots {one} and {other} are the same; allowed: each once")
+
+
+def _check_room(study: Study, robots: Sequence[Robot], name: str) -> None:
+    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, and says so."""
+    rooms = [0.5 * (robot.channel.diameter - robot.body.diameter) for robot in robots if robot.channel is not None]
+    gap = study.placement.gap
+    if gap is not None and rooms and gap > max(rooms) * (1.0 + 1e-9):
+        given, most = show_apart(gap, max(rooms), "mm")
+        raise InputError(
+            f"{name}: placement.gap = {given}; allowed: at most {most}, because there is no more room in any channel"
+        )
 
 
 def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:

@@ -59,11 +59,16 @@ def choose_model(asked: str, robot: Robot, *, placement: Placement | None = None
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):  # a pose is refused by the model that takes poses
-        raise InputError(
-            f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}; or model "
-            f"'{UNBOUNDED}', which leaves out the walls"
-        )
+        others = (UNBOUNDED, *(name for name, model in SWIMMER_MODELS.items() if not model.placed))
+        instead = (f"; or model '{name}', which leaves out the walls" for name in others if _answers_for(batch, name))
+        said = f"{robot.name} with model '{WALLED}', which answers in a channel: {outside[0].sentence()}"
+        raise InputError(said + next(instead, ""))
     return ModelChoice(WALLED, IN_CHANNEL)
+
+
+def _answers_for(batch: RobotBatch, model: str) -> bool:
+    """Whether the first robot of a batch lies in the domain of a model."""
+    return not broken(requirements(batch, find_swimmer_model(model)))
 
 
 def models_without_answer(robot: Robot) -> list[str]:

@@ -18,7 +18,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import what_is_fitted
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.fluid.tube.progress_messages import TILTED
+from spirillum.fluid.tube.progress_messages import LEVEL, TILTED
 from spirillum.kernels.native import run_together
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
@@ -38,6 +38,7 @@ from spirillum.swimming.cautions import (
 from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import AUTO, ModelChoice
 from spirillum.swimming.other_models import OtherModels, other_models
+from spirillum.swimming.preparation import why_no_table
 from spirillum.swimming.released_motion import Motion, ReleasedMotion, SteadyState, motion_of
 from spirillum.swimming.scenario import Scenario, resolve_scenario
 from spirillum.swimming.steady import STEADY, Intervals, Swimming, headline
@@ -301,8 +302,11 @@ def predict(
             intervals, torque = without_torque(intervals), [_NO_TORQUE]
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
-        slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
-        tell(TILTED if slow else chosen.name, 0, 1)
+        direct, tilted = chosen.form == "direct", bool(batch.placement.pitch or batch.placement.yaw)
+        if direct and not tilted:
+            instead = "" if why_no_table(batch) else "; `spirillum prepare` makes further answers immediate"
+            tell(f"{LEVEL}{instead}", 0, 1)
+        tell(TILTED if direct and tilted else chosen.name, 0, 1)
     checks = scenario.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = scenario.swim(batch)
     if not result.valid[0]:
@@ -315,7 +319,7 @@ def predict(
     if intervals is not None and scenario.posterior_for == "measured":
         result = with_middles(result, intervals)
     acts = friction_acts(scenario.friction, scenario.tail_rate)
-    idle = [] if over is None else fit.outside_warnings(ready, chosen, friction=acts)
+    idle = fit.outside_warnings(ready, chosen, friction=acts)
     if idle:
         intervals = None
     warnings += idle or [*fit.answer_warnings(ready, chosen, scenario.friction, scenario.tail_rate), *torque]

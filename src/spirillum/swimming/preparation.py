@@ -21,7 +21,7 @@ from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import TabledTube, find_table, prepared_tables, tables_are_kept
 from spirillum.fluid.tube.nodes import Places
 from spirillum.fluid.tube.stages import RESPONSES, STAGES, StageName, stage_of
-from spirillum.fluid.tube.table import TubeTable, key_of
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.notes import Note
@@ -113,12 +113,6 @@ def least_gap(batch: RobotBatch, model: SwimmerModel) -> float:
     return high
 
 
-_NOT_KEPT = Note(
-    "table-not-kept",
-    "the table is not kept, and the next command makes it again: SPIRILLUM_CACHE is off or cannot be written to",
-)
-
-
 @dataclass(frozen=True, repr=False)
 class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
@@ -127,8 +121,6 @@ class Prepared(DisplayMixin):
     """The robot."""
     table: TubeTable = field(repr=False)
     """Its table."""
-    kept: bool = True
-    """Whether the table is there the next time."""
 
     @property
     def warnings(self) -> tuple[Note, ...]:
@@ -139,8 +131,7 @@ class Prepared(DisplayMixin):
             for name, allowed in RESPONSES.items()
             if self.table.error[name] > stage.accuracy * allowed
         ]
-        lost = () if self.kept else (_NOT_KEPT,)
-        return (*self.robot.warnings, *worse, *lost)
+        return (*self.robot.warnings, *worse)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum prepare --json`."""
@@ -180,8 +171,23 @@ def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
     """The answer of `spirillum prepare --json` for several robots: that of each, and what to be careful about."""
-    notes = dict.fromkeys(note.prefixed(f"{one.robot.name}: ") for one in found for note in one.warnings)
-    return envelope("preparations", {"robots": [one.content for one in found]}, notes)
+    return envelope("preparations", {"robots": [one.content for one in found]}, _notes_of_several(found))
+
+
+def _notes_of_several(found: Sequence[Prepared]) -> list[Note]:
+    """Notes with their robots; the first of each code counts the others, which a terminal does not show."""
+    several = len({one.robot.name for one in found}) < len(found)
+    named: dict[str, dict[str, list[Note]]] = {}
+    for one in found:
+        for note in one.warnings:
+            name = one.robot.with_tail if several else one.robot.name
+            named.setdefault(note.code, {}).setdefault(name, []).append(note)
+    notes = []
+    for robots in named.values():
+        first, *others = [note.prefixed(f"{name}: ") for name, own in robots.items() for note in own]
+        more = f" (and {len(robots) - 1} more of {len(found)} robots: --notes)" if len(robots) > 1 else ""
+        notes += [Note(first.code, f"{first}{more}", first.fields), *others]
+    return notes
 
 
 def prepare(
@@ -229,22 +235,34 @@ def prepare_all(
         progress: called with stage, number done, and total.
 
     Raises:
-        InputError: for wrong input, a robot that the model `tube` does not know or that has no table, or a folder
-            that SPIRILLUM_CACHE names in which a new table cannot be kept.
+        InputError: for wrong input, a robot that the model `tube` does not know or that has no table, or no folder in
+            which a new table can be kept.
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
     chosen = stage_of(stage)
     loaded = [load(robot) for robot in robots]
-    asked = [_checked(robot, several=len(loaded) > 1) for robot in loaded]
-    new = {key_of(*robot) for robot in asked if find_table(*robot, chosen) is None}
-    if new:
+    asked = _all_checked(loaded)
+    if any(find_table(*robot, chosen) is None for robot in asked):
         check_cache_folder()
+        if not tables_are_kept():
+            raise InputError(
+                "a table would be lost when the command ends, for SPIRILLUM_CACHE is off or no home folder is known; "
+                "allowed: SPIRILLUM_CACHE = a folder you may write to"
+            )
     tables = prepared_tables(asked, stage=chosen, workers=workers, progress=progress)
-    return tuple(
-        Prepared(robot, table, kept=tables_are_kept() or table.key not in new)
-        for robot, table in zip(loaded, tables, strict=True)
-    )
+    return tuple(Prepared(robot, table) for robot, table in zip(loaded, tables, strict=True))
+
+
+def passing_tables(
+    robots: Sequence[Robot], *, progress: Callable[[str, int, int], None] | None = None
+) -> list[TubeTable]:
+    """Return tables without yaw for this request, also where they cannot be kept; see `prepare_all`."""
+    return prepared_tables(_all_checked(robots), stage="straight", workers=1, progress=progress)
+
+
+def _all_checked(robots: Sequence[Robot]) -> list[tuple[RobotGeometry, float]]:
+    return [_checked(robot, several=len(robots) > 1) for robot in robots]
 
 
 def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:

@@ -160,5 +160,5 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
         return None
     rate = parse_option("tail-rate", value, KINDS["rate"])
     if rate == 0 and not placement.flow:
-        raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
+        raise InputError("tail-rate = 0 Hz: a tail at rest drives nothing; allowed: any other rate")
     return rate

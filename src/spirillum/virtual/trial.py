@@ -21,14 +21,15 @@ from spirillum.files import (
     atomic_folder,
     atomic_write,
     atomic_write_all,
-    check_replaceable,
     guard_inputs,
     holds_own_only,
     output_target,
+    writable_target,
     write_dataset,
 )
 from spirillum.formats.h264 import h264_writer
 from spirillum.notes import Note
+from spirillum.robot.fields import field_values
 from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot, robot_text
 from spirillum.swimming.model_choice import AUTO
@@ -71,10 +72,8 @@ def video_target(path: str | Path) -> Path:
     path = Path(path)
     if path.suffix:
         return output_target(path, {".mp4": "a video, or a folder without an ending"}, "trial.mp4")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
     if not path.is_dir():
-        check_replaceable(path)
+        writable_target(path)
     if path.exists() and not (path.is_dir() and holds_own_only(path)):
         raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
     return path
@@ -191,10 +190,10 @@ def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
     """Refuse options that a run determines: all of a motion, and of a trial all but its length and start position."""
     for options in given:
         usual = type(options)()
-        for name in type(options).model_fields:
-            if name not in ("duration", "start") and getattr(options, name) not in (getattr(usual, name), AUTO):
-                value = str(getattr(options, name))[:60]
-                raise InputError(f"{name} = {value} with a run, which has its own; allowed: duration and start alone")
+        for item in field_values(options):
+            if item.path not in ("duration", "start") and item.value not in (getattr(usual, item.path), AUTO):
+                named = f"{item.path} = {item.text}"
+                raise InputError(f"{named} with a run, which has its own; allowed: duration and start alone")
 
 
 def _shown(
@@ -266,6 +265,9 @@ def render(
     inputs = [item for item in (robot, run) if isinstance(item, (str, Path)) and item != RELEASED]
     with guard_inputs(*inputs):
         target = video_target(path)
+        names = names_beside(target) if setup is None else names_beside(target, Path(setup))
+        for name in ("setup", "json", "nc"):
+            writable_target(names[name])
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
     degradation = degradation if target.suffix == ".mp4" else degradation.uncompressed()
@@ -281,7 +283,6 @@ def render(
         raise InputError(f"{length}; allowed: 2 to {_MOST_FRAMES} frames")
     disturbances = Disturbances.of_robot(degradation, seed, lens, trajectory.duration, robot, tank)
     kept, counted = counted_frames(troubles, np.flatnonzero(disturbances.kept(count)), camera.fps, seed)
-    names = names_beside(target) if setup is None else names_beside(target, Path(setup))
     robot_file = robot.name if is_preset(robot) else names["robot"].name
     height = _stated_height(float(trajectory.position[:, 2].mean()), setup_errors.depth_error, lens.surface)
     axis = height, setup_errors.depth_uncertainty

@@ -7,6 +7,8 @@ ANNOUNCED = "no table of this tube yet"
 TABLE_TAKES = "half a minute to two minutes on two cores"
 """What the table of one robot takes without yaw, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
+LEVEL = "no table of this tube: the flow is solved for in some half a minute"
+"""How a message begins that is to be read where the answer is not there at once."""
 OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
 """Progress messages that are to be read, too."""
 
