@@ -40,7 +40,7 @@ class Judged(Options):
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Seed of draws and search."""
     confirm: Annotated[bool, Field(strict=True)] = False
-    """Make the tables that trials of the best three designs lack: 4 to 12 minutes of one core each."""
+    """Make the tables that trials of the best three designs lack: 2 to 5 minutes of two cores each."""
 
     def check_read(self, *, known: bool, conditions: bool) -> None:
         """Refuse what was given and nothing reads; a seed serves the search in any case."""

@@ -207,7 +207,7 @@ CONFIRMED = 3
 NEAR = 0.1
 """Designs that are compared differ from each other by at least this share of a range."""
 _NO_TABLE = (
-    "its tube has no table with yawed poses yet, which takes 4 to 12 minutes of one core; use --confirm, or `spirillum "
+    "its tube has no table with yawed poses yet, which takes 2 to 5 minutes of two cores; use --confirm, or `spirillum "
     "prepare` with its robot file"
 )
 

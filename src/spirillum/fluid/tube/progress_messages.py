@@ -4,7 +4,7 @@ from __future__ import annotations
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "half a minute to two minutes on two cores"
+TABLE_TAKES = "30 to 70 s on two cores"
 """What the table of one robot takes without yaw, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 LEVEL = "no table of this tube: the flow is solved for in some half a minute"

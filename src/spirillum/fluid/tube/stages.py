@@ -95,7 +95,7 @@ YAW = Stage(
     upper=(0.55, 1.0),
     phases=((0.0, 7), (0.7, 5), (3.0, 3)),
     resolutions=_COARSE,
-    seconds=(6.0, 14.0),
+    seconds=(3.3, 8.0),
     held_out=3,
     checks=_CHECKS,
     hardest=((0.05, -0.93), (0.96, 0.0), (0.24, 0.97), (0.0, 0.0)),
@@ -103,7 +103,7 @@ YAW = Stage(
     growth=3.0,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", upper=(0.65, 1.0), seconds=(3.0, 9.0), held_out=4, yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", upper=(0.65, 1.0), seconds=(2.0, 4.5), held_out=4, yawed=False, film_yaws=1)
 _FINEST: dict[Tilt, Fineness] = {
     "level": Fineness("standard", 0.002),
     "pitched": Fineness("standard", 0.01),
