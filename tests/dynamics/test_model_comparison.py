@@ -64,7 +64,7 @@ def test_no_answer_at_all_is_an_error_with_every_reason(monkeypatch: pytest.Monk
         ({"models": []}, "models = \\[\\]; allowed: one or more of sbt, rft"),
         ({"friction": "ice"}, "friction = 'ice'"),
         ({"tail_rate": "1"}, '^tail-rate = "1" has no unit'),
-        ({"tail_rate": 0.0}, "^tail-rate = 0: a tail at rest"),
+        ({"tail_rate": 0.0}, "^tail-rate = 0 Hz: a tail at rest"),
         ({"calibration": "missing.toml"}, "missing.toml does not exist"),
     ],
 )

@@ -65,23 +65,17 @@ _MOST_TURNS = 2000
 """Turns of the tail that a trial may take beside an answer."""
 
 
-def why_never_released(robot: Robot, model: str, tail_rate: str | float | None) -> str:
-    """Return why a request has no released motion, in a sentence; empty where it depends on the table of its tube."""
+def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, placement: Placement) -> str:
+    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
     if robot.channel is None:
         return "the robot has no channel in which it could be released"
     if model != WALLED:
         return f"model '{model}' has no walls on which a robot could rest; use model '{WALLED}'"
     if tail_rate is not None:
         return "a tail rate is prescribed, and trials follow from the drive; use drive.kind = 'rate', or motion 'free'"
-    return ""
-
-
-def why_not_released(held: Prediction) -> str:
-    """Return why there is no released motion beside a held answer, in a sentence; empty where there is one."""
-    batch = RobotBatch.of(held.robot, held.batch.placement)
-    never = why_never_released(held.robot, held.model.name, held.tail_rate)
-    if never or has_table(batch, "yaw"):
-        return never
+    batch = RobotBatch.of(robot, placement)
+    if has_table(batch, "yaw"):
+        return ""
     return why_no_table(batch) or (
         "its tube has no table with yawed poses yet; `spirillum prepare` makes it in "
         f"{preparation_time(batch, 'yaw')}, `simulate` and `settle` too"
@@ -445,7 +439,8 @@ class TrialRequest:
 
     def check(self, model: str, tail_rate: str | float | None, *, wanted: bool) -> None:
         """Refuse what no trial can have, before the held answer is computed."""
-        reason = why_never_released(self.robot, model, tail_rate)
+        robot = self.fit.central(self.robot)
+        reason = why_not_released(robot, model, tail_rate, self.fit.placed(robot, Placement.of(self.placement)))
         if not wanted or reason:
             self._check_unused(reason)
         if self.duration is not None and self.duration <= 0.0:
@@ -477,7 +472,7 @@ class TrialRequest:
 
     def beside(self, held: Prediction, *, wanted: bool) -> Prediction:
         """Return the held answer with what gives its released motions, or with the reason why there are none."""
-        reason = why_not_released(held)
+        reason = why_not_released(held.robot, held.model.name, held.tail_rate, held.batch.placement)
         if reason:
             self._check_unused(reason)
         if not wanted:
