@@ -116,6 +116,7 @@ typedef struct {
     double slow;     /* v_r, below which dry friction is smooth, m/s */
     int along;       /* the rate along which a torque keeps a prescribed spin */
     bool prescribed; /* whether the spin q_3 + q_6 is */
+    bool once;       /* whether one step of Newton's method is enough: the first guess is close */
 } Balance;
 
 /* a and b of the slices' pressure in lanes from `first`; see cavitation.c. */

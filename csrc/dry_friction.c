@@ -198,6 +198,21 @@ static void find_step(const Balance *b, double h[RATES][RATES], const double lef
     for (int i = 0; i < RATES; i++) step[i] = b->prescribed ? x[i][0] + torque * x[i][1] : x[i][0];
 }
 
+/* Take the lifts on along a step. */
+static void follow_lifts(Slices *slices, const double step[RATES]) {
+    for (int n = 0; n < MOST_SLICES; n++) {
+        const SliceLanes *lanes = slices->lanes + n / LANES;
+        Lift *lift = slices->lift + n;
+        double v = 0.0, u = 0.0;
+        for (int i = 0; i < RATES && lift->normal != 0.0; i++) {
+            v += lanes->opening[i][n % LANES] * step[i];
+            u += lanes->entrainment[i][n % LANES] * step[i];
+        }
+        lift->normal += lift->of_opening[0] * v + lift->of_entrainment[0] * u;
+        lift->along += lift->of_opening[1] * v + lift->of_entrainment[1] * u;
+    }
+}
+
 /* Find the rates; what is left of the forces, over them.
  *
  * Newton's method for rates and duals, the directions of sliding (T. F. Chan, G. H. Golub, P. Mulet, SIAM J. Sci.
@@ -213,6 +228,16 @@ double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
         const double speed = sqrt(s.u * s.u + s.v * s.v + b->slow * b->slow);
         duals[n][0] = s.u / speed;
         duals[n][1] = s.v / speed;
+    }
+    if (b->once) {
+        set_tangent(b, duals, q, h);
+        find_step(b, h, left, step);
+        for (int i = 0; i < RATES; i++) q[i] += step[i];
+        if (b->prescribed)
+            size = residual(b, q, left); /* for the torque */
+        else if (b->slices)
+            follow_lifts(b->slices, step);
+        return size / scale;
     }
     for (int round = 0; round < ROUNDS && !(size <= BALANCED * scale); round++) {
         set_tangent(b, duals, q, h);

@@ -126,7 +126,6 @@ static void set_slices(const FilmPlace *p, Slices *s) {
             const double width = sqrt(2.0 * bend * lanes->gap[l]);
             s->share[first + l] = share_at(x[l] - film->rear, film->rear_round, width, bend)
                                 * share_at(film->front - x[l], film->front_round, width, bend);
-            s->edges[first + l][0] = s->edges[first + l][1] = NAN;
         }
     }
 }
@@ -199,17 +198,29 @@ static bool may_cavitate(const FilmPlace *p, const SliceLanes *ends, double boun
 /* Whether any slice cavitates at the rates; scaled, its pressure is less. */
 static bool cavitates_at(const FilmPlace *p, SlicedFilm *sliced, double bound, const double q[RATES]) {
     Slices *slices = &sliced->slices;
-    if (!sliced->has_slices) set_slices(p, slices);
-    if (!sliced->has_slices || sliced->has_scale) set_scales(p, p->viscosity, bound, slices);
-    sliced->has_slices = true;
-    sliced->has_scale = false;
+    if (!sliced->has_slices) {
+        set_slices(p, slices);
+        set_scales(p, p->viscosity, bound, slices);
+        sliced->has_slices = true;
+    }
+    const double over = sliced->is_scaled ? p->viscosity / sliced->viscosity : 1.0;
     for (int first = 0; first < MOST_SLICES; first += LANES) {
         double a[LANES], b[LANES];
         set_pressures(slices, first, q, a, b);
         for (int l = 0; l < LANES; l++)
-            if (cavitates(a[l], b[l])) return true;
+            if (cavitates(over * a[l], over * b[l])) return true;
     }
     return false;
+}
+
+void forget_cavities(SlicedFilm *sliced) {
+    for (int n = 0; n < MOST_SLICES; n++) sliced->slices.edges[n][0] = sliced->slices.edges[n][1] = NAN;
+}
+
+void begin_slices(SlicedFilm *sliced, const SlicedFilm *last) {
+    for (int n = 0; n < MOST_SLICES; n++)
+        for (int k = 0; k < 2; k++) sliced->slices.edges[n][k] = last->slices.edges[n][k];
+    sliced->has_ends = sliced->has_slices = sliced->is_scaled = false;
 }
 
 double balance_film(const FilmPlace *p, SlicedFilm *sliced, Balance *b, double q[RATES], double left[RATES]) {
@@ -221,10 +232,10 @@ double balance_film(const FilmPlace *p, SlicedFilm *sliced, Balance *b, double q
         if (!may_cavitate(p, &sliced->ends, b->bound, q) || !cavitates_at(p, sliced, b->bound, q)) return size;
     }
     b->slices = &sliced->slices;
-    if (sliced->viscosity == 0.0) sliced->viscosity = scaled_viscosity(p, b->slices);
-    if (sliced->viscosity != p->viscosity) {
+    if (!sliced->is_scaled) {
+        sliced->viscosity = scaled_viscosity(p, b->slices);
         set_scales(p, sliced->viscosity, b->bound, b->slices);
-        sliced->has_scale = true;
+        sliced->is_scaled = true;
     }
     return balance_rates(b, q, left);
 }

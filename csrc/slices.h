@@ -10,7 +10,7 @@ typedef struct {
     SliceLanes ends; /* of the straight side, in the first two lanes */
     Slices slices;
     double viscosity; /* of the slices, Pa s */
-    bool has_ends, has_slices, has_scale;
+    bool has_ends, has_slices, is_scaled;
 } SlicedFilm;
 
 /* Body and tube of a film, and the place: `thinnest` is the smallest gap of the body, m. */
@@ -22,6 +22,9 @@ typedef struct {
     double thinnest, viscosity;
 } FilmPlace;
 
+void forget_cavities(SlicedFilm *sliced);
+/* Begin at another place, with the edges of cavities as guesses. */
+void begin_slices(SlicedFilm *sliced, const SlicedFilm *last);
 /* Rates in balance; what is left of it. Where no slice cavitates at those without slices, they are the rates. */
 double balance_film(const FilmPlace *place, SlicedFilm *sliced, Balance *b, double q[RATES], double left[RATES]);
 

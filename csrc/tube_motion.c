@@ -14,14 +14,15 @@
  * phase of the tail in the roll-free axes F of the body.
  */
 #include "motion.h"
-#include "slices.h"
 
-TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table) {
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table, PlaceMemory *memory) {
     const Tube *tube = (const Tube *)(packed + sizeof(Links) / sizeof(double));
     const Wire *wire = (const Wire *)(tube + 1);
     const Site *sites = (const Site *)(wire + 1);
     const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
     const double *flow = (const double *)(stations + (int64_t)tube->stations);
+    memory->place[0] = NAN;
+    forget_cavities(&memory->sliced);
     return (TubeRobot){
         .links = (const Links *)packed,
         .tube = tube,
@@ -33,6 +34,7 @@ TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *ta
         .station_count = (int64_t)tube->stations,
         .flow_count = (packed + size - flow) / 2,
         .table = table_opened(table),
+        .memory = memory,
     };
 }
 
@@ -81,14 +83,44 @@ typedef struct {
 
 static const double FOLLOWED = 20.0 * PI / 180.0; /* tilt up to which a run goes on outside the table's range */
 
-static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
+/* Table and slices at the pose, as far as they are known. */
+typedef struct {
+    TablePlace *table;
+    SlicedFilm *sliced;
+} Place;
+
+/* What is known of the place of a state, or of one near the last. */
+static Place find_place(const TubeRobot *robot, const State *y, const Seen *seen, bool nearby) {
+    PlaceMemory *memory = robot->memory;
+    const double *q = y->attitude, place[6] = {y->position[1], y->position[2], q[0], q[1], q[2], q[3]};
+    const Pose pose = {seen->offset, seen->pitch, seen->yaw};
+    bool same = true;
+    for (int i = 0; i < 6; i++) same = same && place[i] == memory->place[i];
+    if (!same && nearby) {
+        if (!memory->has_slopes) table_slopes_at(&robot->table, &memory->table, &memory->slopes);
+        memory->has_slopes = true;
+        table_place_near(&robot->table, &memory->table, &memory->slopes, pose, &memory->near_table);
+        begin_slices(&memory->near_sliced, &memory->sliced);
+        return (Place){&memory->near_table, &memory->near_sliced};
+    }
+    if (!same) {
+        for (int i = 0; i < 6; i++) memory->place[i] = place[i];
+        table_place_at(&robot->table, pose, &memory->table);
+        begin_slices(&memory->sliced, &memory->sliced);
+        memory->has_slopes = false;
+    }
+    return (Place){&memory->table, &memory->sliced};
+}
+
+static void set_fluid(const TubeRobot *robot, const Place *place, double phase, double time, Seen *seen, Fluid *fluid) {
     const Tube *tube = robot->tube;
     const Pose pose = {seen->offset, seen->pitch, seen->yaw};
-    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
-    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
+    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS];
+    seen->outside = place->table->left;
+    table_resistance(&robot->table, place->table, seen->turn + phase, free_of_roll);
     if (fabs(pose.pitch) < FOLLOWED && fabs(pose.yaw) < FOLLOWED) seen->outside = 0.0;
     turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
-    turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
+    turn_about_axis(&place->table->film[0][0], -seen->turn, &fluid->film[0][0], 6);
     const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
     seen->mean_flow = tube->ends == IMPOSED ? imposed_flow(robot, time) : 0.0;
     for (int i = 0; i < RATES; i++) {
@@ -274,19 +306,17 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
     seen->film_load = towards_wall(film, rotation, seen->azimuth) - seen->lift;
 }
 
-/* Write what is observed in a state, and its time derivative. */
-void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, bool nearby, Seen *seen, State *dy) {
     const Links *links = robot->links;
-    Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation};
-    SlicedFilm sliced;
-    sliced.has_ends = sliced.has_slices = sliced.has_scale = false;
-    sliced.viscosity = 0.0;
-    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen, .sliced = &sliced};
+    Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation, .once = nearby};
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
     Fluid fluid;
     double field[RATES], weight[RATES], asperities[RATES];
     axes_of(y, t.rotation);
     note_place(y, t.rotation, robot->tube->radius, seen);
-    set_fluid(robot, y->phase, time, seen, &fluid);
+    const Place place = find_place(robot, y, seen, nearby);
+    t.sliced = place.sliced;
+    set_fluid(robot, &place, y->phase, time, seen, &fluid);
     weight_loads(&links->weight, y->phase, t.rotation, weight);
     for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);
