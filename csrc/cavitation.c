@@ -20,21 +20,22 @@
 enum { MOMENTS = 5, ROUNDS = 100, GUESSED = 8 };
 static const double FAR = 1e8; /* in s: no cavity is as wide */
 
+/* Of xi^(n - 5 - 2 m) in K_n far out: binomial coefficients of (1 + xi^-2)^-3, integrated. */
+#define TERM(n, m) ((m % 2 ? -0.5 : 0.5) * (m + 1) * (m + 2) / (n - 5 - 2 * m))
+#define ROW(m) {TERM(0, m), TERM(1, m), TERM(2, m), TERM(3, m), TERM(4, m)}
+enum { TERMS = 14 };
+static const double SERIES[TERMS][MOMENTS] = {ROW(0), ROW(1), ROW(2), ROW(3),  ROW(4),  ROW(5),  ROW(6),
+                                              ROW(7), ROW(8), ROW(9), ROW(10), ROW(11), ROW(12), ROW(13)};
+
 /* Integrals K_n of xi^n/(1 + xi^2)^3 from -infinity up to a place, n = 0 to 4. */
 static void set_moments(double xi, double k[MOMENTS]) {
     if (xi < -6.0) { /* a series in 1/xi^2, where the closed forms cancel */
         const double inverse = 1.0 / (xi * xi);
         double power = inverse * inverse * inverse * xi;
-        for (int n = 0; n < MOMENTS; n++) {
-            double term = power, binomial = 1.0;
-            k[n] = 0.0;
-            for (int m = 0; m < 14; m++) {
-                k[n] += binomial * term / (double)(n - 5 - 2 * m);
-                binomial *= -(double)(m + 3) / (double)(m + 1);
-                term *= inverse;
-            }
-            power *= xi;
-        }
+        for (int n = 0; n < MOMENTS; n++) k[n] = 0.0;
+        for (int m = TERMS - 1; m >= 0; m--)
+            for (int n = 0; n < MOMENTS; n++) k[n] = k[n] * inverse + SERIES[m][n];
+        for (int n = 0; n < MOMENTS; n++, power *= xi) k[n] *= power;
         return;
     }
     const double once = 1.0 / (1.0 + xi * xi), twice = once * once, angle = atan(xi) + 0.5 * PI;
@@ -108,6 +109,7 @@ static Side side_of(double a, double b, double *guess) {
 /* 3 (1 + xi^2)^2 < a xi + 3 b/4 somewhere. */
 bool cavitates(double a, double b) {
     if (!is_near_cavitation(a, b)) return false;
+    if (b > 4.0 || fabs(a) + 1.5 * b > 9.375 || fabs(a) + 0.75 * b > 12.0) return true; /* at |xi| = 0, 1/2 and 1 */
     const double root3 = sqrt(3.0);
     const double xi
         = 2.0 / root3 * sinh(asinh(0.125 * root3 * a) / 3.0); /* of the least difference: xi^3 + xi = a/12 */

@@ -13,45 +13,49 @@ static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the 
 static const double STRAIGHT = 1.1;   /* velocities between the ends of the side are less than those there times this */
 static const double END_LOSS = 1.85;  /* the pressure at d from a flat end is 1 - exp(-1.85 d/s) of that far from it, */
 static const double ROUND_END = 0.76; /* and a rounded end of radius r is like 0.76 s sqrt(r/R') more of the side */
+static const double ALL_OF_IT = 38.0; /* from where on 1 - exp(-x) is 1 */
 
 enum { POWERS = 6 }; /* squarings up to the 64th power */
 
 /* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
- * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. Lower roots of lower powers are
- * above it: one that is not above 1 is returned. */
+ * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. */
 static double largest_share(const double f[6][6], const double s[6][6]) {
-    double l[6][6] = {{0.0}}, m[6][6], next[6][6];
+    double l[6][6] = {{0.0}}, m[2][6][6], traces[POWERS + 1], root = 1.0;
     for (int i = 0; i < 6; i++)
         for (int j = 0; j <= i; j++) {
             double left = f[i][j];
             for (int k = 0; k < j; k++) left -= l[i][k] * l[j][k];
             l[i][j] = i == j ? sqrt(left) : left / l[j][j];
         }
-    for (int pass = 0; pass < 2; pass++) { /* L^-1 S, and then of its transpose */
-        for (int j = 0; j < 6; j++)
-            for (int i = 0; i < 6; i++) {
-                double left = pass ? next[j][i] : s[i][j];
-                for (int k = 0; k < i; k++) left -= l[i][k] * m[k][j];
-                m[i][j] = left / l[i][i];
-            }
-        for (int n = 0; n < 36; n++) next[n / 6][n % 6] = m[n / 6][n % 6];
+    for (int i = 0; i < 6; i++) { /* L^-1 S */
+        const double over = 1.0 / l[i][i];
+        for (int j = 0; j < 6; j++) m[1][i][j] = s[i][j];
+        for (int k = 0; k < i; k++)
+            for (int j = 0; j < 6; j++) m[1][i][j] -= l[i][k] * m[1][k][j];
+        for (int j = 0; j < 6; j++) m[1][i][j] *= over;
     }
-    double logarithm = 0.0;
-    for (int k = 0, power = 1; k <= POWERS; k++, power *= 2) {
-        double trace = 0.0;
-        for (int i = 0; i < 6; i++) trace += m[i][i];
-        logarithm += log(trace) / power;
-        if (logarithm <= 0.0 || k == POWERS) break;
-        const double over = 1.0 / (trace * trace);
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++) {
-                next[i][j] = 0.0;
-                for (int n = 0; n < 6; n++) next[i][j] += m[i][n] * m[n][j];
-                next[i][j] *= over;
-            }
-        for (int n = 0; n < 36; n++) m[n / 6][n % 6] = next[n / 6][n % 6];
+    for (int i = 0; i < 6; i++) { /* and of its transpose */
+        const double over = 1.0 / l[i][i];
+        for (int j = 0; j < 6; j++) m[0][i][j] = m[1][j][i];
+        for (int k = 0; k < i; k++)
+            for (int j = 0; j < 6; j++) m[0][i][j] -= l[i][k] * m[0][k][j];
+        for (int j = 0; j < 6; j++) m[0][i][j] *= over;
     }
-    return exp(logarithm);
+    for (int k = 0; k <= POWERS; k++) {
+        const double (*here)[6] = (const double (*)[6])m[k % 2];
+        double (*next)[6] = m[(k + 1) % 2];
+        traces[k] = 0.0;
+        for (int i = 0; i < 6; i++) traces[k] += here[i][i];
+        const double over = 1.0 / (traces[k] * traces[k]);
+        for (int i = 0; i < 6 && k < POWERS; i++) {
+            double row[6] = {0.0};
+            for (int n = 0; n < 6; n++)
+                for (int j = 0; j < 6; j++) row[j] += here[i][n] * here[n][j];
+            for (int j = 0; j < 6; j++) next[i][j] = row[j] * over;
+        }
+    }
+    for (int k = POWERS; k > 0; k--) root = sqrt(root * traces[k]);
+    return root * traces[0];
 }
 
 /* Places x along the straight side where body and wall are nearest.
@@ -104,14 +108,16 @@ static double bend_of(const Film *film) { return film->body * film->tube / (film
  *
  * Finite differences of Reynolds' equation at the end of a long level film: both numbers hold within 3 % for squeezing and
  * rolling, and for radii r from 0 to 2 R' within 6 % of the pressure. */
-static double share_at(double distance, double rounding, double width, double bend) {
-    return 1.0 - exp(-END_LOSS * (distance / width + ROUND_END * sqrt(rounding / bend)));
+static double share_at(double distance, double rounded, double width) {
+    const double depth = END_LOSS * (distance / width + rounded);
+    return depth < ALL_OF_IT ? 1.0 - exp(-depth) : 1.0;
 }
 
 /* Slices of the film, closer towards its ends. */
 static void set_slices(const FilmPlace *p, Slices *s) {
     const Film *film = p->film;
     const double length = film->front - film->rear, bend = bend_of(film);
+    const double rear = ROUND_END * sqrt(film->rear_round / bend), front = ROUND_END * sqrt(film->front_round / bend);
     for (int first = 0; first < MOST_SLICES; first += LANES) {
         double x[LANES];
         SliceLanes *lanes = s->lanes + first / LANES;
@@ -124,8 +130,7 @@ static void set_slices(const FilmPlace *p, Slices *s) {
         set_lanes(p, x, lanes);
         for (int l = 0; l < LANES; l++) {
             const double width = sqrt(2.0 * bend * lanes->gap[l]);
-            s->share[first + l] = share_at(x[l] - film->rear, film->rear_round, width, bend)
-                                * share_at(film->front - x[l], film->front_round, width, bend);
+            s->share[first + l] = share_at(x[l] - film->rear, rear, width) * share_at(film->front - x[l], front, width);
         }
     }
 }

@@ -245,10 +245,14 @@ static void add_outer(const double *coefficients, int64_t phases, double phase, 
                       double out[MOTIONS][MOTIONS]) {
     double factor[FACTOR];
     for (int k = 0; k < FACTOR; k++) factor[k] = coefficients[k];
+    const double c = cos(phase), s = sin(phase);
+    double cosine = c, sine = s; /* of multiples of the phase */
     for (int64_t m = 1; m < phases; m++) {
-        const double angle = (double)((m + 1) / 2) * phase;
-        const double weight = m % 2 == 1 ? cos(angle) : sin(angle);
+        const double weight = m % 2 == 1 ? cosine : sine, last = cosine;
         for (int k = 0; k < FACTOR; k++) factor[k] += weight * coefficients[m * FACTOR + k];
+        if (m % 2 == 1) continue;
+        cosine = c * last - s * sine;
+        sine = s * last + c * sine;
     }
     for (int i = 0; i < MOTIONS; i++) {
         double *row = factor + i * (i + 1) / 2;

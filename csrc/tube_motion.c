@@ -154,9 +154,8 @@ static void add_contact(Touch *t, const Nearest *at, double rotor) {
     sliding_rows(at, t->rotation, rotor, contact->rows);
 }
 
-/* Squared distance of a station of the wire from the tube's axis, m^2. */
-static double station_square(const Touch *t, const Station *station) {
-    const double c = cos(t->y->phase), s = sin(t->y->phase);
+/* Squared distance of a station of the wire from the tube's axis, m^2; cosine and sine of the phase. */
+static double station_square(const Touch *t, const Station *station, double c, double s) {
     const double *p = station->point, at[3] = {p[0], c * p[1] - s * p[2], s * p[1] + c * p[2]};
     double d[2];
     for (int n = 0; n < 2; n++) {
@@ -172,11 +171,12 @@ static void touch_wire(Touch *t) {
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
     if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
-    double before = 0.0, here = station_square(t, robot->stations);
+    const double c = cos(t->y->phase), s = sin(t->y->phase);
+    double before = 0.0, here = station_square(t, robot->stations, c, s);
     bool first = true;
     for (int64_t k = 0; k <= last; k++) {
         const Station *at = robot->stations + k;
-        const double next = k < last ? station_square(t, at + 1) : 0.0;
+        const double next = k < last ? station_square(t, at + 1, c, s) : 0.0;
         const bool tip = k == last || at[1].turn != at->turn;
         if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
             const double bracket[3] = {at[first ? 0 : -1].xi, at->xi, at[tip ? 0 : 1].xi};
