@@ -306,11 +306,7 @@ QUANTITIES: dict[str, Quantity] = {
 
 
 def unit_of(name: str) -> str:
-    """SI unit of a quantity.
-
-    Raises:
-        KeyError: for a name that the registry does not hold.
-    """
+    """SI unit of a quantity."""
     return QUANTITIES[name].unit
 
 
@@ -321,9 +317,6 @@ def attributes(name: str, *, meaning: str | None = None, source: str | None = No
         name: a quantity's name.
         meaning: half a sentence instead of the registry's, where the variable holds a special case of the quantity.
         source: where these values come from, instead of the registry's.
-
-    Raises:
-        KeyError: for a name that the registry does not hold.
     """
     item = QUANTITIES[name]
     return {"units": item.unit, "long_name": meaning or item.meaning, "source": source or item.source}

@@ -264,11 +264,7 @@ class _Hand(Generic[_Task, _Answer]):
         self._waiting[self._client.submit(_at_worker, self._work, task, _about(), pure=False)] = task
 
     def done(self) -> list[Any]:
-        """Tasks that are done, or none after a while.
-
-        Raises:
-            OSError: if the scheduler is gone.
-        """
+        """Tasks that are done, or none after a while."""
         from distributed import wait
 
         try:

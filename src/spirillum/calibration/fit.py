@@ -58,13 +58,7 @@ from spirillum.swimming.steady import requirements
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
-    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters.
-
-    Args:
-        asked: name of a model, or `auto`.
-        free: free parameters, as `fit_model` takes them.
-        method: method of the fit; the paper's inverts drag factors.
-    """
+    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters."""
     if asked != AUTO:
         return asked == WALLED
     return method != "paper" and is_free_in(WALLED, free)
@@ -326,12 +320,7 @@ def _middle(draws: Samples) -> Estimate:
 def _friction(
     problem: Problem, z: Samples, best: Samples, error: Mapping[Quantity, float], reading: str, rng: np.random.Generator
 ) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...], tuple[Estimate, ...]]:
-    """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it.
-
-    Returns:
-        With the constants of fluid and motor as they are; with their stated uncertainties; and with the error of the
-        model's torque too, without intervals where that is not known.
-    """
+    """B_eff of every robot: with constants as they are, with their uncertainties, and with the torque's error too."""
     if "friction" not in problem.free:
         return (), (), ()
     ratio = problem.experiment.motor_rate

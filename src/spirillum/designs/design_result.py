@@ -331,11 +331,7 @@ _SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 
 def lead_warnings(answer: Design) -> tuple[Note, ...]:
-    """Sentences on fields without influence, on a better design, and on differences below the error of the objective.
-
-    Returns:
-        One sentence for each such error; none where every lead is larger.
-    """
+    """Notes on fields without influence, on a better design, and on leads below the error of the objective."""
     said = _without_effect(answer)
     if len(said) == len(answer.profiles):  # every design is the best one
         return said

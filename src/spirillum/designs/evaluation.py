@@ -207,11 +207,7 @@ class Evaluation:
         return found
 
     def scores(self, shares: Samples) -> DesignScores:
-        """What designs are worth; those that cannot be built are not swum.
-
-        Args:
-            shares: of the ranges, (designs, variables).
-        """
+        """What designs are worth, by shares of the ranges, (designs, variables); impossible ones are not swum."""
         count = len(shares)
         excess = self.unbuildable(shares)
         cost = np.tile(REFUSED + excess, (len(self.objectives), 1))

@@ -201,11 +201,7 @@ class AxialRobot:
         return float(found[0, kernel.CURRENT])
 
     def check_steady(self, duty: float, flow: float) -> list[Note]:
-        """Refuse a robot that moves far outside Stokes flow where a duty and a flow have become steady.
-
-        Returns:
-            A warning for each Reynolds number that is too large for an accurate answer.
-        """
+        """Refuse a robot far outside Stokes flow at a steady duty and flow; return a note for each exceeded limit."""
         batch, current = self.prediction.batch, self.steady_current(self.numbers, duty, flow)
         speed, tail, _ = motion(self.numbers, current, flow)
         limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, tail))

@@ -52,19 +52,7 @@ _OVER = ("", "_on", "_steady")
 def chosen_run(
     model: str, motion: str | None, robot: Robot, placement: Placement, fit: Fit
 ) -> tuple[ModelChoice, str, list[Note]]:
-    """Model and motion of a run: the requested ones, else those of the robot and the fit.
-
-    Args:
-        model: name of the model, or `auto`.
-        motion: `free` or `held`; None: `held` with a fitted model of the axial entries, or of one place without dry
-            friction, else `free`, as with a fit of trials.
-        robot: the robot.
-        placement: where it starts.
-        fit: fitted values that are used.
-
-    Returns:
-        Both, and what was chosen instead of the usual, a sentence each.
-    """
+    """Model and motion of a run, the requested ones or those of robot and fit, with a sentence on each exception."""
     choice = choose_model(model, robot, placement=placement, fit=fit)
     said: list[Note] = []
     if not choice.fitted:
@@ -92,12 +80,7 @@ def chosen_run(
 
 
 def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
-    """How many draws of a posterior are run.
-
-    Args:
-        draws: the number that is asked for, 0 for the median alone; None: 100.
-        posterior: the posterior; None without one.
-    """
+    """Number of posterior samples that are run: the requested one, 0 for the median alone; None: 100."""
     given: Any = _DRAWS if draws is None else draws
     if not is_whole(given) or not (int(given) == 0 or _FEWEST <= int(given) <= _MOST):
         raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}, or 0")

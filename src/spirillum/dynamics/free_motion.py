@@ -112,21 +112,7 @@ def free_motion(
     turns_shown: int = 0,
     progress: Progress | None = None,
 ) -> FreeMotion:
-    """Follow a robot after release in its tube to its steady motion.
-
-    Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
-        tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
-        friction: reading of the friction; None: the robot's own.
-        fit: fitted values that replace the robot's: friction, roughness, coefficient of dry friction.
-        placement: where it is laid down, the ends of the channel, and a constant flow.
-        weight: let weight and buoyancy act, if the masses are known.
-        roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
-        in_tube: azimuth of the start and coefficient of dry friction.
-        until: gap that it has to reach, m; None: no such gap.
-        turns_shown: of the tail in the path at least.
-        progress: called with stage, number done, and total.
-    """
+    """Follow a robot after release in its tube to its steady motion, or to the gap `until`; otherwise as `settle`."""
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     _check(asked)
@@ -203,12 +189,7 @@ def _check(asked: InTube) -> None:
 
 
 def _check_until(until: float | None, gap: float) -> None:
-    """Refuse a gap to be reached that is none below the start.
-
-    Args:
-        until: the gap, m; None: no such gap.
-        gap: at the start, m.
-    """
+    """Refuse a final gap that does not lie below the initial one."""
     if until is not None and not until < gap:
         raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
 
@@ -246,15 +227,7 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
 
 
 def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:
-    """Means of a motion over a time.
-
-    Args:
-        held: the robot where it was laid down.
-        links: what its rates follow from.
-        state: at the start, (19,).
-        time: over which means are taken, s.
-        turns: of the tail in that time.
-    """
+    """Means of a motion from a state, (19,), over a time, s, with `turns` of the tail in it."""
     samples = min(turns * _SAMPLES, _MOST_SAMPLES)
     moments = np.linspace(0.0, time, samples + 1)
     duty = float(links.drive[rigid_links.DUTY])

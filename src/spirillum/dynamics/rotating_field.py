@@ -114,12 +114,7 @@ class TurningField:
 
 
 def in_tilted_field(links: _A, asked: Field) -> _A:
-    """A robot in the field of its file, which rotates about the given axis.
-
-    Args:
-        links: what its rates follow from.
-        asked: yaw and pitch of the axis; what is not given is 0.
-    """
+    """A robot in the field of its file, which rotates about an axis of given yaw and pitch, by default 0."""
     given = asked.model_dump(exclude_none=True)
     if not given:
         return links

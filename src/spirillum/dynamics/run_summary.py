@@ -149,11 +149,7 @@ class Told(NamedTuple):
 
 
 def told(events: Sequence[tuple[float, str]]) -> list[Told]:
-    """Events in the order of time; those that come more than a few times, as where a contact bounces, are one.
-
-    Args:
-        events: time, s, and what happened.
-    """
+    """Events in the order of time; those that come more than a few times, as where a contact bounces, are one."""
     moments_of: dict[str, list[float]] = {}
     for when, what in events:
         moments_of.setdefault(what, []).append(when)
@@ -189,13 +185,7 @@ class DutyInterval(NamedTuple):
 
 
 def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[DutyInterval]:
-    """Times at constant duty in which the drive is on.
-
-    Args:
-        switches: every switching, the first at 0.
-        end: end of the run, or of its drive, s.
-        begin: beginning of the run, s.
-    """
+    """Times at constant duty in which the drive is on."""
     found: list[DutyInterval] = []
     before = 0.0
     ends = [*(switch.time for switch in switches[1:]), end]

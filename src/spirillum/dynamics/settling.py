@@ -56,14 +56,7 @@ class LubricationFilm(NamedTuple):
 
 
 def film_at(motion: Prediction, table: TubeTable, gap: float, offset: float) -> LubricationFilm:
-    """The film under a level robot.
-
-    Args:
-        motion: the robot as it swims at that gap, held level.
-        table: its table.
-        gap: of the body, m.
-        offset: e of its mid-length, m.
-    """
+    """The film under a level robot."""
     phases = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
     matrices = [table.at(offset, phase=float(phase))[0][:7, :7] for phase in phases]
     full: Samples = motion.robot.fluid.viscosity * np.mean(matrices, axis=0)

@@ -108,13 +108,7 @@ def turning_rate(steady: Prediction) -> float:
 
 
 def links_without_walls(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
-    """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall.
-
-    Args:
-        steady: the robot with friction and drive, by a model with all entries of the resistance matrix.
-        roughness: height of the wall's asperities, m; None: 1e-4 of the body's radius.
-        weight: let weight and buoyancy act, if the masses are known.
-    """
+    """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall."""
     effective = steady.effective_friction
     return two_links(
         steady.robot,
@@ -189,13 +183,7 @@ def state_at_release(robot: Robot, links: TubeRobot, start: StartPlace) -> Sampl
 
 
 def check_roughness(roughness: float, gap: float, diameter: float) -> None:
-    """Refuse asperities that films thinner than a table holds would cover, or that are pressed by more than the weight.
-
-    Args:
-        roughness: height of the asperities, m.
-        gap: smallest gap of the robot at its start, m.
-        diameter: of its body, m.
-    """
+    """Refuse asperities that films thinner than a table holds would cover, or pressed by more than the weight."""
     if roughness < THINNEST_GAP * diameter:
         raise InputError(
             f"roughness = {show(roughness, 'um')}; allowed: at least {show(THINNEST_GAP * diameter, 'um')}, because "

@@ -118,12 +118,6 @@ def sample_times(end: float, turn: float, samples_per_turn: int, switches: Seque
 
     A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
     which of the two is rounded up.
-
-    Args:
-        end: length of the run, s.
-        turn: time of a turn, s.
-        samples_per_turn: samples in it.
-        switches: times of switchings within the run, s.
     """
     check_samples(samples_per_turn)
     count = math.ceil(end / turn * samples_per_turn)

@@ -84,10 +84,6 @@ def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] 
 
 
 def read_flow(path: str | Path) -> Samples:
-    """Read and check a flow file.
-
-    Returns:
-        Times, s, and velocities, m/s, (n, 2).
-    """
+    """Read and check a flow file: times, s, and velocities, m/s, (n, 2)."""
     found = read_series(path, _WHAT, _LIMITS, _LARGEST)
     return np.array(found) * (1.0, 1e-3)

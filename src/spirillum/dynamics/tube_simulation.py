@@ -334,14 +334,7 @@ def held_against_check(
 
 
 def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
-    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
-
-    Args:
-        robot: what its rates in the tube follow from.
-        forward: mean forward velocity, m/s.
-        turning: mean speed of the body's surface by its rotation, m/s.
-        contact_force: mean force of the asperities, N.
-    """
+    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []

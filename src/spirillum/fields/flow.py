@@ -310,14 +310,7 @@ def seat_in_tube(
     placement: Placement | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> Seat | None:
-    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`.
-
-    Args:
-        robot: the robot.
-        model: `slender`, `tube` or `auto`.
-        placement: where in the channel the robot lies.
-        resolution: of the models; None: the robot's own.
-    """
+    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`."""
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
         return None

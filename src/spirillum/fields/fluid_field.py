@@ -27,11 +27,7 @@ class FluidField(ABC):
 
     @abstractmethod
     def part_at(self, points: Samples) -> np.ndarray:
-        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,)."""
 
     @abstractmethod
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
@@ -46,19 +42,11 @@ class FluidField(ABC):
         return np.asarray(self.part_at(points) != "")
 
     def velocity(self, points: Samples) -> Samples:
-        """Velocity of the fluid, m/s, (n, 3).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Velocity of the fluid at points (n, 3), m/s."""
         return self.fields(points)[0]
 
     def pressure(self, points: Samples) -> Samples:
-        """Pressure of the fluid above that far away, in a tube above the mean of both ends, Pa, (n,).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Pressure of the fluid above that far away, in a tube above the mean of both ends, Pa, (n,)."""
         return self.fields(points)[1]
 
     def in_fluid(self, points: Samples) -> Samples:
@@ -192,14 +180,7 @@ def _rotation(angle: float) -> Samples:
 
 
 def flow_field(batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float) -> FlowField:
-    """Flow around one robot whose parts move with given twists.
-
-    Args:
-        batch: one robot, inside the domain of the model `slender`.
-        body_twist: velocity (m/s) and rotation (rad/s) of the body about the origin, body axes, (6,).
-        rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
-        phase: phase phi of the tail, rad.
-    """
+    """Flow around one robot whose parts move with given twists about the origin, body axes: m/s and rad/s, (6,)."""
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     solids = tuple(RobotGeometry.of(batch).outlines.items())
     return FlowField(robot_solution(batch), solids, twists, float(phase), float(batch.viscosity[0]))

@@ -192,13 +192,7 @@ class _Reflection:
 
     @classmethod
     def of(cls, strengths: Strengths, density: Amplitudes, forces: Samples) -> _Reflection:
-        """Add up the waves of all forces.
-
-        Args:
-            strengths: solids in their seat, and wires.
-            density: of the tractions, (panels, p, modes, 3).
-            forces: at the wires' stations, (stations, 3).
-        """
+        """Add up the waves of all forces at the stations and of the tractions on the panels of the solids."""
         from scipy.special import k0e, k1e
 
         from spirillum.kernels.stokes_flow import wave_amplitudes
@@ -335,15 +329,7 @@ def _ring_forces(modes: Amplitudes, theta: Samples) -> Samples:
 def tube_flow_field(
     batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float, mean_flow: float
 ) -> TubeFlowField:
-    """Flow around one robot in its tube whose parts move with given twists.
-
-    Args:
-        batch: one robot in its place, inside the domain of the model `tube`.
-        body_twist: velocity (m/s) and rotation (rad/s) of the body about the origin, body axes, (6,).
-        rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
-        phase: phase phi of the tail, rad.
-        mean_flow: mean velocity of the fluid through the tube, m/s.
-    """
+    """Flow around one robot in its tube whose parts move with given twists, as in `flow_field`, in a mean flow, m/s."""
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     held = held_robot(batch, 0, phase)
     solids = tuple(RobotGeometry.of(batch).outlines.items())

@@ -108,9 +108,6 @@ def private_folder(parent: Path) -> Iterator[Path]:
 
     Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
     that what was made in it takes its place at once.
-
-    Raises:
-        OSError: if it cannot be made.
     """
     sweep(parent)
     for _ in range(_TRIES):  # another run may take it for a leftover before it is locked

@@ -35,9 +35,6 @@ class H264Writer:
         Args:
             image: (height, width, 3) sRGB bytes, of the film's size.
             number: its time in ticks, later than that of the frame before; None: the next tick.
-
-        Raises:
-            ValueError: for a picture of another size.
         """
         size = 2 * len(self._colours) // 3, self._colours.shape[1], 3
         if image.shape != size:

@@ -29,11 +29,6 @@ class Window:
     """The readings of one series in the last seconds."""
 
     def __init__(self, length: float) -> None:
-        """Begin empty.
-
-        Args:
-            length: of the window, s.
-        """
         self.length = length
         self._readings: deque[tuple[float, float]] = deque()
 
@@ -113,7 +108,6 @@ class CausalAngle:
     """Gives each angle the whole periods that bring it nearest to its prediction by an alpha-beta filter."""
 
     def __init__(self, period: float) -> None:
-        """Begin."""
         self.period = period
         self.restarts = 0
         """How often tracking restarted, so that angles before and after are not comparable."""

@@ -234,12 +234,7 @@ def scale_confirmed(size: float, flags: Iterable[Flag]) -> bool:
 
 
 def setup_remarks(setup: Setup, *, confirmed: bool = False) -> list[Note]:
-    """Notes on the uncertainties of a setup for users of its lengths.
-
-    Args:
-        setup: the setup.
-        confirmed: whether videos show the robot as large as they should: values of the example are then no concern.
-    """
+    """Notes on the uncertainties of a setup; without those of the example where videos confirm the robot's size."""
     found = []
     if not depth_shares(setup):
         words = (

@@ -128,11 +128,7 @@ def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tu
 
 
 def reference_place(settings: Mapping[str, Any]) -> str:
-    """Poses of the robots of a study for the models that compute the walls, in words.
-
-    Args:
-        settings: the study's settings, as the attribute `settings` of its dataset holds them.
-    """
+    """Poses of the robots of a study, by its `settings`, for the models that compute the walls, in words."""
     if settings.get("placements"):
         return "where the calibration places them"
     placement = settings.get("study", {}).get("placement") or {}

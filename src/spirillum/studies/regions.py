@@ -282,11 +282,7 @@ class CostEstimate(NamedTuple):
     workers: int
 
     def words(self, seconds: float) -> str:
-        """Return the estimate in a line.
-
-        Args:
-            seconds: time that the study takes, s.
-        """
+        """Return the estimate in a line."""
         return (
             f"{ESTIMATE}{self.results} results, about {_duration(seconds)} with {self.workers} "
             f"worker{'' if self.workers == 1 else 's'}, {self.memory / 1e6:.0f} MB of memory here, at most "

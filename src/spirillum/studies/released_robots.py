@@ -376,11 +376,7 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
 def settled_variables(
     answers: Sequence[tuple[SettledTask, Part]], robots: Sequence[str], shape: Sequence[int]
 ) -> dict[str, Any]:
-    """The steady motions as variables of a dataset.
-
-    Returns:
-        `<quantity>_settled` over the robots, NaN for those without a steady motion, and `settled`, what became of them.
-    """
+    """`<quantity>_settled` of the steady motions, NaN where there is none, and `settled`, what became of each."""
     found: dict[str, Any] = {}
     for name in (*SETTLED, *PLACE):
         about = attributes(

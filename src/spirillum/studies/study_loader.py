@@ -118,22 +118,7 @@ def load_study(
     posterior: str | Path | None = None,
     largest: int = LARGEST_STUDY,
 ) -> LoadedStudy:
-    """Load a study and its robots.
-
-    Args:
-        source: study file or the same tables as a mapping;
-        overrides: dotted robot fields, applied to every robot.
-        models: hydrodynamic models instead of the study's; None: the study's.
-        band: whether to compute bands, instead of what the study says; None: what it says.
-        predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
-        settled: whether to follow the robots to their steady motions, instead of what the study says; None: what it
-            says.
-        trial: whether to make a trial of each robot, instead of what the study says; None: what it says.
-        interval: whether to compute the intervals of trials, instead of what the study says; None: what it says.
-        calibration: calibration file, applied to every robot.
-        posterior: file of a calibration's posterior: its middle is applied to every robot.
-        largest: most results that it may ask for.
-    """
+    """Load a study and its robots; arguments as of `spirillum.study`, None: what the study states."""
     instead = {
         "models": None if models is None else list(models),
         "band": band,

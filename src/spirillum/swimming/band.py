@@ -65,11 +65,7 @@ class Band:
     """Poses without an answer, a sentence each."""
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Least and largest value of a quantity over all poses; NaN where it does not apply.
-
-        Args:
-            name: an attribute of `Swimming`.
-        """
+        """Least and largest value of a quantity over all poses; NaN where it does not apply."""
         values = np.concatenate([getattr(self.swimming, name), getattr(self.reference, name)])
         known = values[np.isfinite(values)]
         return (float(known.min()), float(known.max())) if known.size else (float("nan"), float("nan"))

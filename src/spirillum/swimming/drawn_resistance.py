@@ -205,13 +205,7 @@ PosteriorFor = Literal["new", "measured"]
 
 
 def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -> PosteriorFor:
-    """The robot whose discrepancy is requested.
-
-    Args:
-        name: `new` or `measured`.
-        posterior: the posterior; None without one.
-        robot: the robot.
-    """
+    """The robot whose discrepancy is requested, `new` or `measured`."""
     check_choice("for", name, get_args(PosteriorFor))
     if name == "measured":
         if posterior is None:

@@ -80,13 +80,7 @@ class Annotator:
         self._first: float | None = None
 
     def draw(self, image: np.ndarray, seen: AnnotatedFrame, *, in_place: bool = False) -> np.ndarray:
-        """Return a frame with the tracking result, reduced to at most 1920 pixels.
-
-        Args:
-            image: RGB bytes, (h, w, 3).
-            seen: the tracking result.
-            in_place: draw on the image itself where it has the size, not on a copy.
-        """
+        """Return a frame with the tracking result, at most 1920 pixels wide; drawn `in_place` if its size allows."""
         picture, times = self._reduced(image, in_place=in_place)
         pose = seen.pose
         if pose is None:

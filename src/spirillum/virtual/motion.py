@@ -48,11 +48,7 @@ class TrialMotion:
 def steady_rates(
     robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
 ) -> tuple[dict[str, float], str, tuple[Note, ...], str]:
-    """Forward velocity and rates, SI; a model's where they are not prescribed.
-
-    Returns:
-        The rates by name, what they are from, warnings, and why the model was taken.
-    """
+    """Rates by name, SI, prescribed or a model's, with their source, notes, and why the model was chosen."""
     given = {
         "forward_velocity": motion.forward_velocity,
         "body_rotation_rate": motion.body_rate,
@@ -121,15 +117,7 @@ def motion_of_trial(
     camera: CameraOptions,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> TrialMotion:
-    """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults.
-
-    Args:
-        robot: a checked robot.
-        motion: the friction model; the rates follow from the run.
-        trial: duration, and the gap at which the robot is released.
-        camera: where the camera stands.
-        progress: called with stage, number done, and total.
-    """
+    """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults."""
     from spirillum.dynamics.simulation import simulate
 
     choice = choose_model(motion.model or AUTO, robot)

@@ -57,11 +57,7 @@ class Wire:
         return _BLOB * self.radius
 
     def distance(self, points: Samples) -> Samples:
-        """Distance of points from the centreline, m, (k,).
-
-        Args:
-            points: (k, 3), m.
-        """
+        """Distance of points (k, 3) from the centreline, m."""
         from scipy.spatial import cKDTree
 
         _, nearest = cKDTree(self.points).query(points)
@@ -211,12 +207,7 @@ class WireSystem:
 
 
 def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
-    """Equations of wires.
-
-    Args:
-        wires: each with the part (0 body, 1 rotor) that it moves with.
-        accuracy: `standard` or `high`.
-    """
+    """Equations of wires, each with the part that it moves with, at `standard` or `high` accuracy."""
     from spirillum.kernels.stokes_flow import force_matrix
 
     none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))

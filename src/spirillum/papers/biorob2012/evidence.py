@@ -213,12 +213,7 @@ class FrictionModelRuns:
         return found
 
     def judged(self, holds: Values, *, of_all: bool = True) -> Judgement:
-        """The verdict on a statement that holds or does not, in each reading.
-
-        Args:
-            holds: 1, 0 or NaN, (readings,).
-            of_all: whether it speaks of all robots, so that those without a table keep it open.
-        """
+        """The verdict on a statement, 1, 0 or NaN in each reading; one `of_all` stays open without a table."""
         known = np.isfinite(holds)
         count, total = int(np.nansum(holds)), int(known.sum())
         lacking = f"; {self.missing}" if of_all and self.missing else ""
@@ -237,14 +232,7 @@ class FrictionModelRuns:
         return Judgement("depends", f"{_joined(names)}: it holds in {count} of {total} readings, {shares}{lacking}")
 
     def against(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
-        """The verdict on a stated number.
-
-        Args:
-            values: in each reading, (readings,), SI.
-            stated: the number, SI.
-            unit: in which both are shown.
-            scale: SI unit over that.
-        """
+        """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
         known = values[np.isfinite(values)]
         if not known.size:
             return Judgement("depends", self._nothing)

@@ -98,13 +98,7 @@ _ALONG = np.linspace(0.0, 1.0, 12)
 
 
 def silhouette(robot: Robot, position: Samples, attitude: Samples) -> Samples:
-    """Outline (n, 2) of the body as seen along the tube: y and z in the lab, m.
-
-    Args:
-        robot: the robot; its body is convex.
-        position: place of the body's mid-length (3,), m.
-        attitude: unit quaternion w, x, y, z from body axes to the lab's.
-    """
+    """Outline (n, 2) of a convex body as seen along the tube: y and z in the lab, m; `attitude` is w, x, y, z."""
     from scipy.spatial import ConvexHull
     from scipy.spatial.transform import Rotation
 

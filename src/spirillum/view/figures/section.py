@@ -30,18 +30,7 @@ _MOST_CELLS = 400_000
 def draw_section(
     axes: Axes, robot: Robot, plane: str, offset: float, *, phase: float, unit: float, points: float, drop: float = 0.0
 ) -> None:
-    """Plot the robot on the plane of the panel's axes.
-
-    Args:
-        axes: the panel, in `unit`.
-        robot: the robot.
-        plane: `xz`, `xy` or `yz`, horizontal axis first.
-        offset: place of the plane on the axis across it, m.
-        phase: phase of the tail, rad.
-        unit: length of one drawing unit, m.
-        points: typographic points in one drawing unit.
-        drop: distance by which the tail's axis is lowered, m.
-    """
+    """Plot the robot on the plane of the panel's axes; lengths in m, `points` typographic points in a drawing unit."""
     lines = [line - np.array([0.0, 0.0, drop]) for line in wire_lines(robot, phase, 1.0)]
     across = next(number for number, axis in enumerate("xyz") if axis not in plane)
     along = [number for number in range(3) if number != across]
@@ -69,15 +58,7 @@ def draw_section(
 
 
 def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
-    """Plot the section of a tube's wall above the elements beyond it.
-
-    Args:
-        axes: the panel, in `unit`, its limits set.
-        seat: the tube, and where in it the robot lies.
-        plane: `xz`, `xy` or `yz`, horizontal axis first.
-        offset: place of the plane on the axis across it, m.
-        unit: length of one drawing unit, m.
-    """
+    """Plot the section of a tube's wall above the elements beyond it, on axes whose limits are set."""
     wall = _bore(seat, plane, offset, np.array(axes.get_xlim()) * unit) / unit
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     frame = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])

@@ -49,12 +49,7 @@ _DASHED = (0, (4.0, 2.0))
 
 
 def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> dict[str, Picture]:
-    """The figures of a study by file name (lower-case letters, digits and hyphens).
-
-    Returns:
-        For channels of a paper its figures' names, for others `channel-<name>`, with `-part1`, `-part2` where
-        wavelengths need several figures; `bound` with the speeds at the upper bound. For a list of robots `robots`.
-    """
+    """The figures of a study by file name: those of a paper's channels, `channel-<name>`, `bound`, or `robots`."""
     shown = StudyView.of(dataset, paper_figures)
     if not shown.grid:
         return {"robots": _robots_picture(shown)}

@@ -207,11 +207,7 @@ def _spelled(formula: str) -> str:
 
 
 def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
-    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all.
-
-    Returns:
-        Paths of PNG and SVG.
-    """
+    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all; return both paths."""
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     engine, dpi = figure.get_layout_engine(), figure.dpi

@@ -26,18 +26,7 @@ _REACH = 0.30
 
 
 def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
-    """Darkness, 0 to 1, of points on the inner side of a tube under a level robot.
-
-    Args:
-        robot: the robot.
-        radius: inner radius of the tube, m.
-        height: z of the motor axis in the tube's axes, m.
-        x: (n,) places along the tube, m.
-        angle: (m,) angles from the lowest line of the tube, rad.
-
-    Returns:
-        (n, m) a decay with the vertical distance to body and coupling; no computation of light.
-    """
+    """Darkness, 0 to 1, (n, m), of a tube below a level robot, by vertical distance; no computation of light."""
     from scipy.ndimage import gaussian_filter
 
     y, floor = radius * np.sin(angle), -radius * np.cos(angle)
@@ -95,13 +84,7 @@ def surroundings(rows: int = 64) -> Samples:
 
 
 def add_light(plotter: Any, pyvista: Any, *, surrounded: bool = True) -> None:
-    """Light a scene.
-
-    Args:
-        plotter: the scene's plotter, without lights.
-        pyvista: the library.
-        surrounded: add bright surroundings, which surfaces with `pbr` reflect.
-    """
+    """Light a scene; `surrounded` by bright surroundings, which surfaces with `pbr` reflect."""
     for place, strength in _LAMPS:
         lamp = pyvista.Light(position=place, focal_point=(0, 0, 0), color="white", intensity=strength)
         lamp.positional = False

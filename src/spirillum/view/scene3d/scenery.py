@@ -64,11 +64,7 @@ class SceneCamera:
         return np.asarray(self.focal - self.distance * self.sight)
 
     def pixels(self, points: Samples, size: tuple[int, int]) -> Samples:
-        """Pixels at which points are seen.
-
-        Returns:
-            (n, 2) pixels to the right of and below the upper left corner.
-        """
+        """Pixels at which points are seen, (n, 2), to the right of and below the upper left corner."""
         away = np.asarray(points, dtype=float) - self.focal
         nearer = 1.0 if self.parallel else self.distance / (self.distance + away @ self.sight)
         scale = 0.5 * size[1] / self.half_height * nearer

@@ -157,11 +157,7 @@ def something_else(time: Samples, place: Samples, marked: np.ndarray, length: fl
 
 
 def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
-    """Note on such frames.
-
-    Args:
-        found: a mask of them, (n,).
-    """
+    """Note on such frames."""
     count = int(found.sum())
     if not count:
         return ()

@@ -205,21 +205,11 @@ class BodyFinder:
         return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
     def place(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
-        """Fit the pose of the body near a guess.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-            guess: initial pose, good to about two pixels.
-        """
+        """Fit the pose of the body near a guess that is good to about two pixels."""
         return self._place(self._part(image, guess), guess)
 
     def place_by_seal(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
-        """Fit the pose to the edges of the seal alone, before anything was learnt.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-            guess: initial pose, good to about five pixels.
-        """
+        """Fit the pose to the edges of the seal alone, near a guess good to five pixels, before anything is learnt."""
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
     def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:

@@ -239,7 +239,6 @@ class PictureChange:
     """Compares each picture with the last two."""
 
     def __init__(self, bounds: tuple[int, int, int, int]) -> None:
-        """Begin."""
         self.bounds = bounds
         self._last: list[np.ndarray] = []
 
