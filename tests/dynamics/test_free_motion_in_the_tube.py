@@ -215,7 +215,7 @@ def test_error_is_stated_up_to_the_yaw_at_which_the_table_was_checked(share: flo
     yaw = share * np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     checked = held_against_check(table, gap=np.maximum(gap, 1e-3), offset=offset, pitch=pitch, yaw=yaw)
     assert checked.known is known
-    assert ("there is no error estimate" in " ".join(checked.said)) is not known
+    assert ("there is no error estimate" in " ".join(checked.notes)) is not known
 
 
 def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() -> None:

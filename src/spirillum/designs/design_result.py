@@ -332,9 +332,9 @@ _SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 def lead_warnings(answer: Design) -> tuple[Note, ...]:
     """Notes on fields without influence, on a better design, and on leads below the error of the objective."""
-    said = _without_effect(answer)
-    if len(said) == len(answer.profiles):  # every design is the best one
-        return said
+    notes = _without_effect(answer)
+    if len(notes) == len(answer.profiles):  # every design is the best one
+        return notes
     leads: dict[tuple[float, str], list[str]] = {}
     best, sign = answer.objective, answer.objectives[0].sign
     for other in answer.alternatives:
@@ -347,10 +347,10 @@ def lead_warnings(answer: Design) -> tuple[Note, ...]:
                 f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best one within them by "
                 f"{percent(-lead)}; widen the ranges"
             )
-            said += (Note("design-at-limit", words),)
+            notes += (Note("design-at-limit", words),)
         elif lead < error[0]:
             leads.setdefault(error, []).append(f"{_SHORT[other.name]} by {percent(lead)}")
-    return said + tuple(
+    return notes + tuple(
         Note(
             "design-tie",
             f"the best design leads {' and '.join(led)}, within the error of {percent(error)} {of}; they may be equal",

@@ -223,7 +223,7 @@ def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callabl
 def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
     """Whether a search learns the flow of a model: always with walls, else where the fields allow it.
 
-    A model in closed form is asked itself.
+    A model in closed form is evaluated itself.
     """
     if model.closed_form:
         return False
@@ -243,10 +243,10 @@ def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
     return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
 
 
-def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
+def chosen_model(requested: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
     """The named model, or with `auto` the most complete one that applies to the robot."""
-    choice = choose_model(asked, robot, fit=unknowns.fit)
-    if asked != AUTO or unknowns.posterior is not None:
+    choice = choose_model(requested, robot, fit=unknowns.fit)
+    if requested != AUTO or unknowns.posterior is not None:
         return choice
     own, strange = _changing_the_flow(space, unknowns)
     if not strange and len(own) <= _MOST_FIELDS:

@@ -82,8 +82,8 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
         changed = motor.model_copy(update={"resistance": motor.resistance.model_copy(update=resistance)})
         problem = motor_current_problem(changed, battery.model_copy(update=of_battery))
         if problem:
-            said = ", ".join(f"{name} = {value:g}" for name, value in zip(names, corner, strict=True))
-            raise InputError(f"ranges with {said}: {problem}")
+            stated = ", ".join(f"{name} = {value:g}" for name, value in zip(names, corner, strict=True))
+            raise InputError(f"ranges with {stated}: {problem}")
 
 
 def drawn_numbers(
@@ -266,12 +266,12 @@ class AxialBatch:
             duty = np.where(self._chosen("remote", remote), self.axial.duty, 0.0)
         if flow is not None and self.axial.flow is None:
             raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
-        asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
+        requested = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
         states = self.states.copy()
-        self.axial.advance(self.numbers, states, number, asked, carried)
+        self.axial.advance(self.numbers, states, number, requested, carried)
         self._check_stokes(self._rates(states, carried), carried)
-        self.states, self._duty, self._flow = states, asked, carried
+        self.states, self._duty, self._flow = states, requested, carried
         self.time += number
 
     def observe(self) -> dict[str, Samples]:
@@ -298,7 +298,7 @@ class AxialBatch:
             tail_reynolds(batch, rates["tail_rotation_rate"] * thinner),
         )
         limits.append(flow_limit(batch, float(np.abs(flow * thinner).max())))
-        new = {flag: said for flag, said in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
+        new = {flag: note for flag, note in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
         self._inertia += tuple(new)
         self.warnings += tuple(new.values())
 

@@ -366,13 +366,13 @@ def axial_run(prediction: Prediction, timing: Timing, integrator: AxialIntegrato
     dataset = _dataset(robot, moments, duty, integrator.states(robot, moments, duty))
     events = [{"time": switch.time, "what": f"duty {switch.duty:g}"} for switch in switches]
     limits = motion_limits(batch, dataset["forward_velocity"].values, dataset["tail_rotation_rate"].values)
-    said = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
+    notes = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
     found = dataset.isel(time=np.isin(moments, time)).assign(_averages(dataset, prediction, switches, end))
     return found.assign_attrs(
         events=json.dumps(events),
         switches=", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
         integrator=integrator.name,
-        **note_attributes(said),
+        **note_attributes(notes),
     )
 
 

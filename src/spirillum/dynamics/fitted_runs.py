@@ -54,29 +54,29 @@ def chosen_run(
 ) -> tuple[ModelChoice, str, list[Note]]:
     """Model and motion of a run, the requested ones or those of robot and fit, with a sentence on each exception."""
     choice = choose_model(model, robot, placement=placement, fit=fit)
-    said: list[Note] = []
+    notes: list[Note] = []
     if not choice.fitted:
         if fit.models and choice.model not in fit.models:
             words = (
                 f"{fit.name} was fitted with model '{fit.models[0]}', and the run uses '{choice.model}', on which its "
                 f"factors do not act; use --model {fit.models[0]}"
             )
-            said.append(Note("fit-not-used", words, ("model",)))
-        return choice, motion or "free", said
-    said.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
+            notes.append(Note("fit-not-used", words, ("model",)))
+        return choice, motion or "free", notes
+    notes.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
     chosen = find_swimmer_model(choice.model)
     if motion is None and chosen.placed and fit.friction_coefficient:
         words = "dry friction is fitted and acts on a free robot: the run is a free motion"
-        said.append(Note("model-chosen", words, ("motion",)))
+        notes.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed) and not fit.of_trials:
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
         words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
-        said.append(Note("model-chosen", words, ("motion",)))
-        return choice, "held", said
+        notes.append(Note("model-chosen", words, ("motion",)))
+        return choice, "held", notes
     if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
-        said.append(CALIBRATED_HELD)
-    return choice, motion or "free", said
+        notes.append(CALIBRATED_HELD)
+    return choice, motion or "free", notes
 
 
 def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
@@ -176,7 +176,7 @@ def intervals_of_free_motion(
     for number, (place, one) in enumerate(zip(places, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
             progress("draws of the posterior", number, len(places))
-        held, links, _ = prepare_release(one, found.laid._replace(contact=posterior.contact(place)))
+        held, links, _ = prepare_release(one, found.release._replace(contact=posterior.contact(place)))
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multiplier) > STABLE:
             continue

@@ -138,8 +138,8 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
         numbers_of(one, name, ("axis",), (3,))
     attitude = attitudes_of(one)[0]
     if float(one["wall_gap"][0]) < 0.0:
-        said = show(float(one["wall_gap"][0]), "um")
-        raise InputError(f"the run's variable 'wall_gap' is {said}; allowed: at least 0 m, a body inside its tube")
+        stated = show(float(one["wall_gap"][0]), "um")
+        raise InputError(f"the run's variable 'wall_gap' is {stated}; allowed: at least 0 m, a body inside its tube")
     texts = {name: one.attrs.get(name, "") for name in ("warnings", "fitted_by")}
     texts |= note_attributes(notes_in(one.attrs)) if isinstance(texts["warnings"], str) else {}
     for name, text in texts.items():
@@ -163,13 +163,13 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     rotor = body + float(now["motor_rotation_rate"]) * np.eye(6)[3]
     mean_flow = float(now["mean_flow"])
     drawn = max(gap, _THINNEST * robot.body.diameter)
-    asked = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
+    requested = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
     with _said_of_the_run():
         friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
-        batch = RobotBatch.of(robot, Placement.of(asked))
+        batch = RobotBatch.of(robot, Placement.of(requested))
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
-        batch = RobotBatch.of(robot, Placement.of({**asked, "gap": drawn}))
+        batch = RobotBatch.of(robot, Placement.of({**requested, "gap": drawn}))
         check_domain(robot, Tube(), batch)
     notes = list(notes_in(now.attrs))
     if gap < drawn:

@@ -92,7 +92,7 @@ class FreeMotion(NamedTuple):
     """What its rates follow from."""
     start_gap: float
     """Smallest distance between body and wall at release, m."""
-    laid: Release
+    release: Release
     """Initial pose."""
     checked: Checked
     """Whether its table was checked at this pose."""
@@ -113,9 +113,9 @@ def free_motion(
     progress: Progress | None = None,
 ) -> FreeMotion:
     """Follow a robot after release in its tube to its steady motion, or to the gap `until`; otherwise as `settle`."""
-    placed, asked = Placement.of(placement), InTube.of(in_tube)
+    placed, requested = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
-    _check(asked)
+    _check(requested)
     own = load(robot)
     contact = fit.contact()
     if fit.posterior is not None:
@@ -127,13 +127,13 @@ def free_motion(
             "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: drive.kind = "
             "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
-    rough, touching = with_contact(contact, height, asked)
+    rough, touching = with_contact(contact, height, requested)
     check_in_tube(ready, placed, touching, rough)
     if ready.channel is not None:
         _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
-    laid = Release(table, placed, asked, height, contact, tail_rate, friction, weight)
-    held, links, start = prepare_release(ready, laid)
+    release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
+    held, links, start = prepare_release(ready, release)
     state = state_at_release(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
     check_in_table(links, state, observed_at(links, state)[rigid_links.OUTSIDE])
@@ -156,8 +156,8 @@ def free_motion(
     )
     warnings = (
         *held.warnings,
-        *(said for said in inertia.values() if said not in held.warnings),
-        *(checked.said if lies and not stuck else ()),
+        *(note for note in inertia.values() if note not in held.warnings),
+        *(checked.notes if lies and not stuck else ()),
         *_said(run, links, weight=weight),
         *stuck,
     )
@@ -168,22 +168,27 @@ def free_motion(
     source = fit.source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
     found = replace(found, lying=run.lying)
-    return FreeMotion(found, run, links, gap, laid, checked)
+    return FreeMotion(found, run, links, gap, release, checked)
 
 
-def prepare_release(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
+def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
     """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
-    rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
+    rough, touching = with_contact(release.contact, release.roughness, release.in_tube)
     held = predict(
-        robot, model="tube", tail_rate=laid.tail_rate, friction=laid.friction, placement=laid.placement, band=False
+        robot,
+        model="tube",
+        tail_rate=release.tail_rate,
+        friction=release.friction,
+        placement=release.placement,
+        band=False,
     )
-    links, start = links_in_tube(held, laid.table, laid.placement, touching, rough, weight=laid.weight)
+    links, start = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
     return held, _driven(links, held), start
 
 
-def _check(asked: InTube) -> None:
+def _check(requested: InTube) -> None:
     """Refuse what changes in time."""
-    for item in field_values(asked):
+    for item in field_values(requested):
         if item.path in ("wait", "flow") and item.value is not None:
             raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
 

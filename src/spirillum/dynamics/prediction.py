@@ -155,12 +155,12 @@ def predict(  # noqa: PLR0913 - the options of the command
         return replace(answer, warnings=(*answer.warnings, *idle))
     from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 
-    said = [FITTED_HELD] if fit.posterior.answer == "held" else []
+    notes = [FITTED_HELD] if fit.posterior.answer == "held" else []
     intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(
         answer,
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(fit.posterior, answer.robot, whose),
-        warnings=(*answer.warnings, *said, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
+        warnings=(*answer.warnings, *notes, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
     )

@@ -25,7 +25,7 @@ from spirillum.kernels.contacts import SITE_ROTOR
 
 SEARCHING = 10.0 * TubeRobot.tolerance
 """Error of a time step on the way to a fixed point, which is refined at that of a run, as is its multiplier."""
-_ON = False  # a step may go beyond where it is asked to stop
+_ON = False  # a step may exceed the requested end
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
 _MOST_STEPS = 75_000

@@ -40,9 +40,9 @@ def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape
     variable = dataset[name]
     dims = ("time", *more)
     if set(variable.dims) != set(dims) or variable.transpose(*dims).shape[1:] != shape:
-        said = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
+        stated = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
         wanted = ", ".join(["time", *(f"{dim}: {size}" for dim, size in zip(more, shape, strict=True))])
-        raise InputError(f"the run's variable {name!r} has the dimensions ({said}); allowed: ({wanted})")
+        raise InputError(f"the run's variable {name!r} has the dimensions ({stated}); allowed: ({wanted})")
     if variable.dtype.kind not in "fiu":
         raise InputError(f"the run's variable {name!r} holds no numbers ({variable.dtype}); allowed: numbers")
     values = np.asarray(variable.transpose(*dims).values, dtype=float)
@@ -58,8 +58,8 @@ def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape
 def check_increasing(time: Samples) -> None:
     """Refuse times of a run between which nothing moves."""
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
-        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2, increasing")
+        stated = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
+        raise InputError(f"the run {stated}; allowed: at least 2, increasing")
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:

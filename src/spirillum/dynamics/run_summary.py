@@ -135,7 +135,7 @@ _MOST_ALIKE = 4
 """Events of one kind that are listed one by one."""
 
 
-class Told(NamedTuple):
+class MergedEvent(NamedTuple):
     """An event, or the first of many that are alike."""
 
     time: float
@@ -148,7 +148,7 @@ class Told(NamedTuple):
     """When for the last time, s."""
 
 
-def told(events: Sequence[tuple[float, str]]) -> list[Told]:
+def merged_events(events: Sequence[tuple[float, str]]) -> list[MergedEvent]:
     """Events in the order of time; those that come more than a few times, as where a contact bounces, are one."""
     moments_of: dict[str, list[float]] = {}
     for when, what in events:
@@ -156,9 +156,9 @@ def told(events: Sequence[tuple[float, str]]) -> list[Told]:
     found = []
     for what, moments in moments_of.items():
         if len(moments) > _MOST_ALIKE:
-            found.append(Told(min(moments), what, len(moments), max(moments)))
+            found.append(MergedEvent(min(moments), what, len(moments), max(moments)))
         else:
-            found += [Told(when, what, 1, when) for when in moments]
+            found += [MergedEvent(when, what, 1, when) for when in moments]
     return sorted(found)
 
 

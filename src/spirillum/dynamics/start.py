@@ -51,9 +51,9 @@ def _check(robot: Robot, placement: Placement) -> None:
     for name, unit in kinds.items():
         value = getattr(placement, name)
         if value != getattr(unset, name):
-            said = show(value, unit) if unit else f"'{value}'"
+            stated = show(value, unit) if unit else f"'{value}'"
             raise InputError(
-                f"placement.{name} = {said} is nothing that a free run knows by a model without walls; allowed: gap or "
+                f"placement.{name} = {stated} has no effect in a free run without walls; allowed: gap or "
                 "eccentricity, and pitch, or model 'tube'"
             )
     if robot.channel is None and (placement.gap is not None or placement.eccentricity is not None):

@@ -175,7 +175,7 @@ class Timetable(NamedTuple):
     """Evenly spaced samples from 0 to the end, s."""
     switches: list[Switch]
     """Every switching of the remote, the first at 0."""
-    said: list[Note]
+    notes: list[Note]
     """Where the schedule of the remote and the run do not meet, a sentence each."""
 
 
@@ -218,14 +218,14 @@ class Timing(Options):
 
     def _unused(self, switches: Sequence[Switch], end: float) -> list[Note]:
         """Parts of the schedule beyond the end of the run, a sentence each."""
-        said = []
+        notes = []
         if all(switch.duty == 0 for switch in switches):
             words = f"the remote switches nothing on before the run ends at {end:.4g} s"
-            said.append(Note("schedule-outside-run", words, ("on",)))
+            notes.append(Note("schedule-outside-run", words, ("on",)))
         late = [(start, stop) for start, stop in self.on or () if start >= end]
         if late:
             first, last = late[0]
             also = f" and {len(late) - 1} more" if len(late) > 1 else ""
             words = f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s"
-            said.append(Note("schedule-outside-run", words, ("on",)))
-        return said
+            notes.append(Note("schedule-outside-run", words, ("on",)))
+        return notes

@@ -65,11 +65,11 @@ class InTube(Options):
         return self if given else self.model_copy(update={"wait": 0.0 if moved else TRIAL_WAIT})
 
 
-def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:
+def with_contact(contact: FittedContact, roughness: float | None, requested: InTube) -> tuple[float | None, InTube]:
     """Roughness and settings of a run, with fitted values in place of those that are not given."""
-    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
-        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
-    return contact.roughness if roughness is None else roughness, asked
+    if requested.friction_coefficient is None and contact.friction_coefficient is not None:
+        requested = requested.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    return contact.roughness if roughness is None else roughness, requested
 
 
 def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:

@@ -73,10 +73,10 @@ def tube_run(
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
     if isinstance(start, StartPlace):
-        laid = state_at_release(steady.robot, robot, start)
-        check_roughness(robot.roughness, float(robot.gaps(laid).min()), steady.robot.body.diameter)
-        check_in_table(robot, laid, observed_at(robot, laid)[rigid_links.OUTSIDE])
-        first, before = _waited(robot, laid, wait, reach, progress)
+        released = state_at_release(steady.robot, robot, start)
+        check_roughness(robot.roughness, float(robot.gaps(released).min()), steady.robot.body.diameter)
+        check_in_table(robot, released, observed_at(robot, released)[rigid_links.OUTSIDE])
+        first, before = _waited(robot, released, wait, reach, progress)
     else:
         first = _checkpoint(start)
         moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])
@@ -94,13 +94,13 @@ def tube_run(
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(times.switches, driven, float(run.time[0]))
     ended = float(run.time[-1])
-    said = [*steady.warnings]
+    notes = [*steady.warnings]
     if ended < times.end:
         words = f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}"
-        said.append(Note("run-cut-short", words, ("duration",)))
-    said += times.said
+        notes.append(Note("run-cut-short", words, ("duration",)))
+    notes += times.notes
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
-    attrs = free_attributes(steady, robot, run, reach, title, said)
+    attrs = free_attributes(steady, robot, run, reach, title, notes)
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)

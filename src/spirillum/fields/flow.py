@@ -259,8 +259,8 @@ def flow(
     wanted = Resolution.of(resolution)
     if wanted.accuracy is None and choice.model == "slender":
         wanted = wanted.model_copy(update={"accuracy": "high"})
-        said = "solved at accuracy 'high', where `predict` takes 'standard'"
-        choice = replace(choice, reason=f"{choice.reason}, {said}" if choice.reason else said)
+        difference = "solved at accuracy 'high', where `predict` takes 'standard'"
+        choice = replace(choice, reason=f"{choice.reason}, {difference}" if choice.reason else difference)
     prediction = predict(
         robot,
         model=choice.model,

@@ -134,8 +134,8 @@ def release_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
     batch, found = RobotBatch.of(robot), []
     for signs in levels():
         low_or_high = [getattr(ranges, name)[int(sign > 0)] for name, sign in zip(FACTORS, signs, strict=True)]
-        laid = ReleasedRobot(*low_or_high)
-        found.append(laid._replace(pitch=laid.pitch * steepest_pitch(batch, laid.gap)))
+        released = ReleasedRobot(*low_or_high)
+        found.append(released._replace(pitch=released.pitch * steepest_pitch(batch, released.gap)))
     return found
 
 
@@ -161,23 +161,23 @@ class ReleaseTask(OneRobot):
         NaN for a run that its robot cannot make, and over a window that it does not reach.
         """
         runs = release_runs(self.robot, self.ranges)
-        read = [self._read(laid) for laid in runs]
+        read = [self._read(released) for released in runs]
         part: Part = {
             name: np.array([[[window[name] for window in run] for run in read]], dtype=float) for name in AT_RUNS
         }
         part |= {name: values[None] for name, values in inferred(self.robot, part).items()}
-        return part | {"laid_pitch": np.array([[laid.pitch for laid in runs]])}
+        return part | {"laid_pitch": np.array([[released.pitch for released in runs]])}
 
-    def _read(self, laid: ReleasedRobot) -> list[dict[str, float]]:
+    def _read(self, released: ReleasedRobot) -> list[dict[str, float]]:
         nothing = [dict.fromkeys(AT_RUNS, float("nan")) for _ in WINDOWS]
         try:
             run = simulate(
                 self.robot,
                 model="tube",
                 timing={"duration": self.ranges.duration, "samples_per_turn": _SAMPLES_PER_TURN},
-                placement={"gap": laid.gap, "pitch": laid.pitch},
-                roughness=laid.roughness,
-                in_tube={"wait": laid.wait, "friction_coefficient": laid.friction_coefficient},
+                placement={"gap": released.gap, "pitch": released.pitch},
+                roughness=released.roughness,
+                in_tube={"wait": released.wait, "friction_coefficient": released.friction_coefficient},
             )
         except InputError:
             return nothing

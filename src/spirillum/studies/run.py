@@ -108,27 +108,27 @@ def computed_study(
     settled = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
     holding = list(held_tasks(loaded, len(todo) + len(runs) + len(settled)))
     trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(settled) + len(holding)))
-    asked: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
-    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in asked}
-    missing = [task for task in asked if found[task.number] is None]
-    done = len(asked) - len(missing)
+    requested: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
+    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in requested}
+    missing = [task for task in requested if found[task.number] is None]
+    done = len(requested) - len(missing)
     if missing:
         _announce_solved(missing, tell)
-        tell(missing[0].words, done, len(asked))
+        tell(missing[0].words, done, len(requested))
     jobs = (task.job(loaded, observed) for task in missing)
     at_work = _worth(missing, crew or WorkerPool())
     for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
-        task = asked[job.task.number]
+        task = requested[job.task.number]
         found[task.number] = part
         keep(task, part, parts)
         done += 1
-        tell(task.words, done, len(asked))
-    tell("dataset", len(asked), len(asked))
+        tell(task.words, done, len(requested))
+    tell("dataset", len(requested), len(requested))
     parts_of = {number: part for number, part in found.items() if part is not None}
     answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
     beside = BesideModels(
-        laid_down=[(task, parts_of[task.number]) for task in runs],
+        released=[(task, parts_of[task.number]) for task in runs],
         settled=[(task, parts_of[task.number]) for task in settled],
         held=[(task, parts_of[task.number]) for task in holding],
         trials=[(task, parts_of[task.number]) for task in trials],
@@ -139,7 +139,7 @@ def computed_study(
     warnings += left_out(band)
     if followed:
         warnings += _without_table(loaded, with_table)
-    warnings += without_answer(part for _, part in beside.laid_down)
+    warnings += without_answer(part for _, part in beside.released)
     warnings += not_settled(beside.settled)
     warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
@@ -181,11 +181,11 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
         warnings.append(Note("friction-unset", words, ("friction.effective",)))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)
-    asked = [find_swimmer_model(name) for name in loaded.study.models]
-    warnings += _of_places(loaded, asked)
-    warnings += loaded.fit.idle_warnings(loaded.robots, asked)
-    warnings += loaded.fit.geometry_warnings(loaded.robots, asked)
-    warnings += loaded.fit.origin_warnings(loaded.robots, asked)
+    requested = [find_swimmer_model(name) for name in loaded.study.models]
+    warnings += _of_places(loaded, requested)
+    warnings += loaded.fit.idle_warnings(loaded.robots, requested)
+    warnings += loaded.fit.geometry_warnings(loaded.robots, requested)
+    warnings += loaded.fit.origin_warnings(loaded.robots, requested)
     warnings += loaded.fit.reading_warnings(loaded.study.friction)
     warnings += loaded.fit.model_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
@@ -276,10 +276,10 @@ _NAMED = 3
 """Robots that a sentence names; more are counted."""
 
 
-def _of_robots(said: Iterable[tuple[str, Note]]) -> list[Note]:
+def _of_robots(named_notes: Iterable[tuple[str, Note]]) -> list[Note]:
     """Notes with the names of their robots; one that holds for more than three robots is given once."""
     found: dict[Note, list[str]] = {}
-    for name, note in said:
+    for name, note in named_notes:
         found.setdefault(note, []).append(name)
     return [
         note.prefixed(f"{whom}: ")

@@ -234,14 +234,14 @@ def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]])
     every = [dict(_flat(fields)) for fields in varied]
     named = []
     for robot, fields, given in zip(robots, every, varied, strict=True):
-        told = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
-        tail = _tail_words([fields.get(path) for path in _VARIED]) if set(_VARIED) <= set(told) else ""
-        told = [path for path in told if not tail or path not in _VARIED]
-        short = [path.rpartition(".")[2] for path in told]
+        unique = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
+        tail = _tail_words([fields.get(path) for path in _VARIED]) if set(_VARIED) <= set(unique) else ""
+        unique = [path for path in unique if not tail or path not in _VARIED]
+        short = [path.rpartition(".")[2] for path in unique]
         words = [tail] if tail else []
         words += [
             f"{name if short.count(name) == 1 else path.replace('.', ' ')} {fields[path]}"
-            for name, path in zip(short, told, strict=True)
+            for name, path in zip(short, unique, strict=True)
         ]
         name = ", ".join([robot.name, *words] if several or not words else words)
         named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.run_summary import told
+from spirillum.dynamics.run_summary import merged_events
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.style import COLOURS, UnitPrefix, plain
@@ -39,7 +39,8 @@ def events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
         return []  # they are notes on a picture; a run without them can still be drawn
     inside = [event for event in found if time[0] < event[0] <= time[-1]]
     return [
-        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what) for event in told(inside)
+        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what)
+        for event in merged_events(inside)
     ]
 
 
