@@ -176,7 +176,7 @@ def test_runs_take_model_and_motion_of_what_was_fitted(fitted: Any) -> None:
     said = run.attrs["warnings"].split("\n")
     assert said[0].startswith("the run uses model 'sbt': ")
     assert said[1].startswith(
-        "model 'sbt' knows the entries along and about the motor axis only: the run is axial motion"
+        "model 'sbt' has the entries along and about the motor axis only: the run is axial motion"
     )
     other = sp.simulate(WIDE, model="rft", calibration=folder / "calibration.toml", timing=timing)
     assert (other.attrs["model"], other.attrs["motion"]) == ("rft", "free")

@@ -148,7 +148,7 @@ def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, 
     claims = evaluated(sp.study({**question, "models": ["slender"], "grid": grid}))
     (slower,) = [claim for claim in claims if claim.claim == "Robots travel slower in the narrow channel"]
     assert slower.verdict == "undecidable"
-    assert "no model of this study knows the channel's walls" in slower.reason
+    assert "no model of this study has the channel's walls" in slower.reason
 
 
 @pytest.mark.usefixtures("unplaced")

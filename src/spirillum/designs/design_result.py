@@ -114,7 +114,7 @@ class Design(DisplayMixin):
     front: Mapping[str, Samples] | None = field(repr=False)
     """With two objectives, designs of which none is better in both: fields and both objectives, (points,)."""
     searched: Evaluation = field(repr=False, compare=False)
-    """Designs under the draws of the search, for those who want to know more of them."""
+    """Designs under the draws of the search, for further analysis."""
     bound_by: tuple[str, ...]
     """What the best design touches: ends of ranges and conditions."""
     swum: int

@@ -217,7 +217,7 @@ class ConfirmedDesign:
     """One of the best designs with what it does in a trial."""
 
     shares: Samples
-    """Its place in the ranges that are searched, (variables,)."""
+    """Its position in the ranges that are searched, (variables,)."""
     robot: Robot
     held: float
     """Forward velocity held at its pose, m/s; NaN where that would have to be solved for."""

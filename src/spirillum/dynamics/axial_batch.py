@@ -43,7 +43,7 @@ def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[
     for name, given in (ranges or {}).items():
         if name not in allowed:
             raise InputError(
-                f"ranges.{str(name)[:60]} is not a number that can be drawn{did_you_mean(str(name)[:60], allowed)}; "
+                f"ranges.{str(name)[:60]} is not a number that can be sampled{did_you_mean(str(name)[:60], allowed)}; "
                 f"allowed: {', '.join(allowed)}"
             )
         pair = list(given) if isinstance(given, (tuple, list)) else []
@@ -110,7 +110,7 @@ def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> S
     known = read_posterior(posterior, steady.model.name)
     if known.places_robots:
         raise InputError(
-            f"{posterior} was fitted to places in the tube, each of which is a flow of its own; allowed: one of drag "
+            f"{posterior} was fitted to poses in the tube, each of which is a flow of its own; allowed: one of drag "
             "factors and friction, or ranges"
         )
     drawn = known.drawn(axial.robot, count, np.random.default_rng(1))
@@ -132,7 +132,7 @@ _POOL = 500
 class AxialBatch:
     """Robots in axial motion, all of them one step at a time; for one thread.
 
-    All are the same robot, or are drawn around it. Arrays have one value for each robot, SI, signed about +x.
+    All are the same robot, or are sampled around it. Arrays have one value for each robot, SI, signed about +x.
     """
 
     @validate_arguments
@@ -159,7 +159,7 @@ class AxialBatch:
             friction: reading of the friction; None: the robot's own.
             calibration: calibration file whose factors replace the robot's.
             placement: where they are held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
-            ranges: what they are drawn from: `friction` and `viscosity`, low and high factor of the robot's own,
+            ranges: what they are sampled from: `friction` and `viscosity`, low and high factor of the robot's own,
                 evenly in the logarithm; other numbers of `axial_robot.PARAMETERS`, such as `battery.voltage`, in SI.
             posterior: file of a calibration's posterior, from whose draws they are taken, before the ranges.
             seed: of the draws.

@@ -7,7 +7,7 @@ duty d, imposed mean flow U_m, polarity p and joint torque tau = K_m I, (17) and
     L dI/dt = p d V(|I|) - R(|I|) I - K_b (omega - Omega),
     (U, Omega, omega) = (a, b, c)_tau tau + (a, b, c)_m U_m.
 
-A motor with a curve of torque against rate has no current: its torque stands in its place, with a torque constant of 1,
+A motor with a curve of torque against rate has no current: its torque replaces it, with a torque constant of 1,
 and follows duty and flow at once.
 
 Runs of `simulate`, batches, systems of python-control and FMUs all rest on these numbers and equations.
@@ -91,7 +91,7 @@ PARAMETERS = (
         )
     ),
 )
-"""The numbers in the order of the compiled equations, which know them by their columns."""
+"""The numbers in the order of the compiled equations, which index them by column."""
 STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
 """The state; quantities of the registry. The compiled equations have two integrals of the current behind it."""
 INPUTS = ("duty", "mean_flow")
@@ -121,7 +121,7 @@ class AxialRobot:
     prediction: Prediction
     """The steady motion, with robot, model and friction."""
     values: tuple[float, ...]
-    """Of `PARAMETERS`; those of motor and battery say nothing of a motor with a curve."""
+    """Of `PARAMETERS`; those of motor and battery do not apply to a motor with a curve."""
 
     @classmethod
     def of(cls, steady: Prediction) -> AxialRobot:
@@ -177,7 +177,7 @@ class AxialRobot:
 
     @property
     def outputs(self) -> dict[str, int]:
-        """Its outputs, quantities of the registry, and their places among `OUTPUTS`."""
+        """Its outputs, quantities of the registry, and their indices in `OUTPUTS`."""
         if self.curve is None:
             return {name: place for place, name in enumerate(OUTPUTS)}
         other = {"motor_torque": "drive_torque"}

@@ -279,7 +279,7 @@ def compare_models(
             the robot's drive decides, and the models differ in their rates too.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
-            factors that stand for walls in some models and not in others hide how the models differ.
+            factors that represent walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.

@@ -70,7 +70,7 @@ def chosen_run(
         notes.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed) and not fit.of_trials:
-        why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
+        why = "has the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one pose"
         words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
         notes.append(Note("model-chosen", words, ("motion",)))
         return choice, "held", notes
@@ -156,7 +156,7 @@ def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset
 DRAWS = 40
 """Draws of a posterior that are followed: some second each."""
 _LEAST_SHARE = 0.95
-"""Share of the draws that have to come to a steady motion."""
+"""Share of the draws that have to reach a steady motion."""
 
 
 def intervals_of_free_motion(
@@ -166,7 +166,7 @@ def intervals_of_free_motion(
     lying, robot = found.run.lying, found.prediction.robot
     if lying.state != "steady":
         raise InputError(
-            f"posterior with motion 'free': its middle comes to no steady motion ({lying.statement}); allowed: motion "
+            f"posterior with motion 'free': its median reaches no steady motion ({lying.statement}); allowed: motion "
             "'held', or `simulate` with the posterior"
         )
     unbound = without_reynolds_bound(robot)  # the middle was refused, or allowed, for all
@@ -185,7 +185,7 @@ def intervals_of_free_motion(
     lost = len(places) - len(steady)
     if lost > (1.0 - _LEAST_SHARE) * len(places):
         raise InputError(
-            f"posterior with motion 'free': {lost} of {len(places)} draws come to no steady motion near that "
+            f"posterior with motion 'free': {lost} of {len(places)} draws reach no steady motion near that "
             "of the middle; allowed: motion 'held', or `simulate` with the posterior"
         )
     names = [item.name for item in fields(Swimming)]

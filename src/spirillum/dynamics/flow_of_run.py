@@ -80,8 +80,8 @@ def flow_of_run(
 
     Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
     wall. No force and torque but weight, contact and a field act on the robot. A film thinner than a fiftieth of the
-    body's diameter is drawn as thick as that, with the same velocities: to resolve it would take many minutes. The
-    sideways force is then not given, and a warning says so. A yawed robot takes one to three minutes, as it has no
+    body's diameter is computed as thick as that, with the same velocities: to resolve it would take many minutes. The
+    sideways force is then not given, with a warning. A yawed robot takes one to three minutes, as it has no
     mirror image.
 
     Args:
@@ -89,10 +89,10 @@ def flow_of_run(
         time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
         frame: `lab` (that of the channel), or `body` (moving with the robot's velocity along the channel).
         resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03.
-        progress: told that the flow is being solved for, once the run is known to be right.
+        progress: called when the flow is solved for, after the run is checked.
 
     Raises:
-        InputError: for another run, a moment outside it, or a place that cannot be resolved.
+        InputError: for another run, a moment outside it, or a pose that cannot be resolved.
     """
     check_choice("frame", frame, get_args(Frame))
     at = moment_of_run(run, time, resolution)
@@ -174,7 +174,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     notes = list(notes_in(now.attrs))
     if gap < drawn:
         words = (
-            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is drawn "
+            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is shown "
             f"{show(drawn - gap, 'um')} further off the wall; ignore film pressure and force"
         )
         notes.append(Note("drawn-otherwise", words, ("wall_gap", "held_force")))

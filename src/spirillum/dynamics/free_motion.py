@@ -124,7 +124,7 @@ def free_motion(
     ready, _, batch = prepared(own, "tube", fit=fit, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(
-            "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: drive.kind = "
+            "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
             "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
     rough, touching = with_contact(contact, height, requested)

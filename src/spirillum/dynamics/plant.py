@@ -114,7 +114,7 @@ def uninterrupted(moment: Snapshot) -> Snapshot:
     """The moment at the end of a step of a look ahead, of which nothing is kept.
 
     Raises:
-        KeyboardInterrupt: if the step was interrupted, which a plant itself says as the end of its run.
+        KeyboardInterrupt: if the step was interrupted, which a plant reports as the end of its run.
     """
     if moment.ended == INTERRUPTED:
         raise KeyboardInterrupt
@@ -151,10 +151,10 @@ class Plant:
             weight: let weight and buoyancy act, if the masses are known.
             roughness: of the wall, with its unit or a float in m; None: 1e-4 of the body's radius.
             in_tube: with `tube`: `azimuth`, `friction_coefficient`, and `flow` over time, see `InTube`.
-            progress: told how far a table is that has to be made.
+            progress: called while a table is made.
 
         Raises:
-            InputError: for wrong input, or a robot or a place that the model does not know.
+            InputError: for wrong input, or a robot or a pose outside the model's domain.
         """
         placed, requested = Placement.of(placement), InTube.of(in_tube)
         height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
@@ -289,7 +289,7 @@ class Plant:
                 its axis, `strength`, see `Field`.
 
         Returns:
-            The moment at the end of the step; `ended` says why if it came early.
+            The moment at the end of the step; `ended` gives the reason if it came early.
 
         Raises:
             InputError: for wrong input, a run that has ended, or a motion far outside Stokes flow; nothing has then
@@ -350,7 +350,7 @@ class Plant:
             velocity: m/s; None: none is, and the ends of the tube decide.
 
         Raises:
-            InputError: for a velocity that is not finite, or a model that knows none.
+            InputError: for a velocity that is not finite, or a model without one.
         """
         if velocity is not None and not math.isfinite(as_number(velocity)):
             raise InputError(f"velocity = {as_given(velocity, 'm/s')}; allowed: a finite number of m/s, or None")

@@ -67,7 +67,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         posterior: file of a calibration's posterior, for intervals.
         posterior_for: with a posterior, intervals of a `new` tail, or of this `measured` one.
         resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
-        placement: where in the channel the robot lies, or is laid down.
+        placement: where in the channel the robot lies, or is released.
         band: of `tube`, with the band over unknown gap and pitch, or the reference pose alone; None: with it
             where the robot has a table, without which it takes minutes; not of free motion in the tube.
         motion: `held` (lateral motion and tilt constrained) or `free`; None: `held`, in the tube

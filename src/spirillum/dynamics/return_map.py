@@ -2,7 +2,7 @@
 
 The state is seen whenever the tail stands at the same angle against the wall: a turn then maps place and attitude to
 place and attitude. A steady motion is a fixed point of that map, whatever happens within a turn, and the eigenvalues
-of the map's derivative say how a small distance from it grows or shrinks in a turn. Steps and equations are those of a
+of the map's derivative give how a small distance from it grows or shrinks in a turn. Steps and equations are those of a
 run.
 """
 
@@ -24,7 +24,7 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
 SEARCHING = 10.0 * TubeRobot.tolerance
-"""Error of a time step on the way to a fixed point, which is refined at that of a run, as is its multiplier."""
+"""Error of a time step during the search for a fixed point, which is refined at that of a run, as is its multiplier."""
 _ON = False  # a step may exceed the requested end
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
@@ -266,7 +266,7 @@ def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Ch
         slope = np.eye(free.size) - here.derivative[np.ix_(free, free)]
         newton, step = np.zeros(4), np.zeros(4)
         newton[free] = np.linalg.lstsq(slope, here.change[free], rcond=None)[0]
-        if size < _STILL:  # where many places are brought back, a step would go to another of them
+        if size < _STILL:  # where many fixed points are close, a step would go to another
             return here
         if _size(newton[free]) < _SMALLEST:
             return place.change(here.x + newton) or here

@@ -200,7 +200,7 @@ def magnetic_sweep(
     loaded = load(robot)
     if model == AUTO and loaded.channel is not None and loaded.magnetic is not None:
         raise InputError(
-            f"{loaded.name} has a channel, whose walls a sweep does not know; allowed: model 'slender' or 'rft', which "
+            f"{loaded.name} has a channel, whose walls a sweep omits; allowed: model 'slender' or 'rft', which "
             "leave them out, or `simulate` at each rate"
         )
     choice = ModelChoice(UNBOUNDED, NO_CHANNEL) if model == AUTO else ModelChoice(model)

@@ -70,7 +70,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
     model. With `tube` the walls, film, contact and dry friction are those of the robot's table (`spirillum.prepare`),
     which is made first where there is none; by its defaults such a run is the trial of `spirillum.predict`, whose
-    values are the averages while the drive is on. The other models know no walls: films of fluid keep the robot off
+    values are the averages while the drive is on. The other models have no walls: films of fluid keep the robot off
     that of its channel.
 
     Args:
@@ -79,7 +79,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` or
             `torque-speed` drive. None: `free`, but `held` where the model is that of a posterior or
-            calibration and knows the axial entries only, or was fitted to one place in the tube without dry friction.
+            calibration and has the axial entries only, or was fitted to one pose in the tube without dry friction.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
@@ -255,12 +255,12 @@ def _check_in_tube(requested: InTube, model: str, *, walled: bool, drawn: bool) 
 
 
 def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *, weight: bool) -> None:
-    """Refuse what only a free run knows."""
+    """Refuse options of free runs."""
     if fit.posterior is not None and fit.of_trials:
         raise InputError(f"motion = 'held' with {fit.name}, which was fitted to trials; allowed: motion 'free'")
     if fit.contact().friction_coefficient:
         raise InputError(
-            f"{fit.name} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
+            f"{fit.name} has a friction_coefficient, and motion = 'held' has no dry friction; allowed: model "
             "'tube' with motion 'free'"
         )
     given = [

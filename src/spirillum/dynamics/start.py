@@ -25,7 +25,7 @@ from spirillum.units import show
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its seat, (19,)."""
+    """The state of a robot at rest in its initial pose, (19,)."""
     _check(robot, placement)
     state = np.zeros(STATES)
     state[PHASE] = start_phase(robot)

@@ -226,7 +226,7 @@ def check_in_tube(robot: Robot, placed: Placement, options: InTube, roughness: f
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
-            f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"
+            f"placement.tail_drop = {show(placed.tail_drop, 'mm')} has no effect in a free run; allowed: 0 mm"
         )
     _around(robot, placed, options, roughness)
     if options.continued is not None:
@@ -299,7 +299,7 @@ def held_against_check(
         offset: of the body's mid-length from the tube's axis, (n,), m.
         pitch: nose up, (n,), rad.
         yaw: nose to the side, (n,), rad.
-        time: of the places, (n,), s, where one differs from another; None: a motion that repeats itself.
+        time: of the poses, (n,), s, where one differs from another; None: a motion that repeats itself.
     """
     notes = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])

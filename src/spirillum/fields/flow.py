@@ -65,7 +65,7 @@ class Flow(DisplayMixin):
     """Sideways force on the robot from outside, N.
 
     Of a robot whose lateral motion is held: what holds it at this phase; far away in unbounded fluid the flow is its.
-    At a moment of a free run: weight, contact and a field; NaN where it is drawn `lifted`.
+    At a moment of a free run: weight, contact and a field; NaN where the robot is shown `lifted`.
     """
     lifted: float = 0.0
     """Increase of the wall distance for the flow around a robot on a thin lubrication film in a run, m."""
@@ -179,7 +179,7 @@ class Flow(DisplayMixin):
 
         Args:
             plane: `xz` (side view), `xy` (from above) or `yz` (across the axis).
-            offset: place of the plane on the axis across it, with its unit (``"-50 mm"``) or a float in m.
+            offset: position of the plane on the axis across it, with its unit (``"-50 mm"``) or a float in m.
             extent: how far the plane reaches beyond the robot on every side, with its unit or a float in m;
                 None: a little more than the robot's largest diameter. In a tube it ends at the glass.
             resolution: points along the plane's longer side.
@@ -239,7 +239,7 @@ def flow(
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        calibrated: apply calibration factors to the motion. They stand for walls that are not in the flow, which
+        calibrated: apply calibration factors to the motion. They represent walls that are not in the flow, which
             then pulls at the robot; without them it swims free of force.
         resolution: of the model: `accuracy`, and with `tube` also `tolerance` and `phases`; None: the robot's own, but
             accuracy `high` with `slender`. The flow of `standard` leaves out the torque of the wire's spin.

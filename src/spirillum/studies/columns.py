@@ -1,6 +1,6 @@
 """Columns of a study beside its models: bands over open poses, axial motion by `tube`, trials after release.
 
-Robots of one channel that share a place come one after the other: what is solved for body and wall there serves them
+Robots of one channel that share a pose come one after the other: what is solved for body and wall there serves them
 all.
 """
 
@@ -175,8 +175,8 @@ def with_band(
     """Quantities at all poses, and the least and largest of all poses and the reference pose.
 
     Args:
-        flat: the answers at the reference place, (models, robots, friction readings).
-        answers: those at the places of the band.
+        flat: the answers at the reference pose, (models, robots, friction readings).
+        answers: those at the poses of the band.
         models: names of the models, in their order.
 
     Returns:
@@ -317,7 +317,7 @@ def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:
     if lost:
         words = (
             f"{len(lost)} of {len(answers)} robots have no trial, the first: {lost[0].robot.with_tail}; "
-            "`spirillum predict` says why"
+            "`spirillum predict` gives the reason"
         )
         found.append(Note("without-answer", words, ("forward_velocity_trial",)))
     return found

@@ -111,11 +111,11 @@ def _effects(values: Values, robots: int) -> Values:
 
 _PAPER = "BioRob 2012"
 _PLACED = {
-    "gap_at_place": attributes("gap", source="places of the band"),
-    "pitch_at_place": attributes("pitch", source="places of the band: level, half and all that gap and tail allow"),
+    "gap_at_place": attributes("gap", source="poses of the band"),
+    "pitch_at_place": attributes("pitch", source="poses of the band: level, half and all that gap and tail allow"),
 }
 _BAND = {
-    "_at_place": ("at a pose of the band", "places of the band"),
+    "_at_place": ("at a pose of the band", "poses of the band"),
     "_interval_low": ("lower limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_interval_high": ("upper limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_low": ("least of the band over gap and pitch", "least of all poses, the reference pose among them"),

@@ -238,7 +238,7 @@ def encoded_region(job: RegionJob) -> dict[str, bytes]:
 
 
 _FEW, _MORE = 200, 2000
-"""Robots that are computed to know the memory of the rest of them."""
+"""Robots that are computed to estimate the memory of the rest."""
 _SOLVING_MEMORY = 5e8
 """Of a solve of body and walls, bytes; measured for the paper's robot."""
 

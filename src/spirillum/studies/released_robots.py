@@ -9,7 +9,7 @@ the asperities, and coefficient of dry friction. Every run is one of `spirillum.
 a camera above the channel reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag
 by (15).
 
-For the steady state, each robot is released where the study's placement says, with its drive on, and followed as
+For the steady state, each robot is released at the study's placement, with its drive on, and followed as
 `spirillum.settle` does.
 """
 
@@ -367,7 +367,7 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
     if lost:
         words = (
             f"{len(lost)} of {len(answers)} robots have no steady motion that could be found, the first: "
-            f"{lost[0].robot.with_tail}; `spirillum settle` says why"
+            f"{lost[0].robot.with_tail}; `spirillum settle` gives the reason"
         )
         found.append(Note("without-answer", words, ("settled_forward_velocity",)))
     return found

@@ -70,7 +70,7 @@ class LoadedStudy:
 
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
-        """B_eff of tails that a calibration knows."""
+        """B_eff of tails in a calibration."""
         return self.fit.friction
 
     @property
@@ -203,7 +203,7 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
 
 
 def _check_room(study: Study, robots: Sequence[Robot], name: str) -> None:
-    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, and says so."""
+    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, with a note."""
     rooms = [0.5 * (robot.channel.diameter - robot.body.diameter) for robot in robots if robot.channel is not None]
     gap = study.placement.gap
     if gap is not None and rooms and gap > max(rooms) * (1.0 + 1e-9):

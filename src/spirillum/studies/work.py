@@ -79,7 +79,7 @@ REASONS = (
 BLOCK = 25_000
 """Robots of a task in closed form: a fifth of a second of work."""
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
-_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
+_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one pose
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 

@@ -190,7 +190,7 @@ def motion_of(name: str) -> Motion:
 def check_full(model: SwimmerModel) -> None:
     """Refuse a model that does not know all that a free motion needs."""
     if model.axial_only:
-        why = "knows the entries along and about the motor axis only"
+        why = "has the entries along and about the motor axis only"
     elif model.placed:
         why = "answers at one pose in the channel, which a free robot leaves"
     else:

@@ -314,7 +314,7 @@ class _Writer:
             self._encode()
         except Exception as error:
             self._error = error
-        while not self._ended:  # after an error, so that nobody waits for a place in the queue
+        while not self._ended:  # after an error, so that nobody waits for the queue
             self._next()
 
     def _next(self) -> _Frame | None:

@@ -26,7 +26,7 @@ from spirillum.virtual.trial_options import CameraOptions
 class VirtualLens:
     """The lens of the camera, in its frame: x along the channel towards the nose, z towards the camera, y = z x x.
 
-    Lengths are in m, places in the picture in pixels.
+    Lengths are in m, positions in the picture in pixels.
     Heights z count from the reference plane (the tank's floor; for a view from the side its far wall). The lens stands
     at x = y = 0. Pixel centres are at whole numbers, u to the right, v downwards.
     """

@@ -5,7 +5,7 @@ for any rates, from the geometry, or from an observations file; else it is undec
 the computed values. Robot, motor and fluid (Tables I and II) and the calibration factors (Table III) are in the
 presets `biorob2012-wide` and `biorob2012-narrow`.
 
-Nothing is fitted and nothing is observed: a robot's readings differ by how it was laid down, how long it waited, how
+Nothing is fitted and nothing is observed: a robot's readings differ by how it was released, how long it waited, how
 rough and how slippery its wall is, and over what its run is read. A statement that holds in all readings is predicted
 to agree, one that holds in none to disagree. Otherwise it depends on the factor that moves it most.
 """

@@ -146,7 +146,7 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
     """Four panels with a line for each model: advance, counter-rotation, torque and efficiency.
 
     A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
-    the error that a model estimates of its own speed. A model without an answer keeps its line and says so.
+    the error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
     """
     with styled():
         sheet = Sheet(

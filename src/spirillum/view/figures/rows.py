@@ -197,7 +197,7 @@ def _assumed_friction_row(shown: StudyView) -> PanelRow:
     )
     left = shown.whole.sizes["amplitude"] - len(places)
     if left:
-        tells = f"{tells} Drawn are {len(places)} of {len(places) + left} amplitudes."
+        tells = f"{tells} Shown: {len(places)} of {len(places) + left} amplitudes."
     return PanelRow("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 

@@ -1,6 +1,6 @@
 """Section of a robot by a plane: cut solids filled, solids beyond the plane outlined.
 
-Panels have their limits before anything is drawn on them. Solids are added as artists and not as patches, for which
+Panels have their limits before anything is plotted on them. Solids are added as artists and not as patches, for which
 matplotlib looks for the extent of every segment: half a second for a tube.
 """
 

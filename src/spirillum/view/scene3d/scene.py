@@ -1,6 +1,6 @@
 """VTK scene of a robot in its pose: rigid solids, the tube around them, light, a camera.
 
-VTK clips scenes of micrometres, so that everything is drawn in units of the robot's length.
+VTK clips scenes of micrometres, so that everything is rendered in units of the robot's length.
 """
 
 from __future__ import annotations
@@ -250,7 +250,7 @@ class Scene:
         self._pixels: Any = None
         self._shade: Any = None
         self.plotter.set_background("white")
-        # What is translucent is added from back to front; VTK's own sorting of it knows no samples, and takes long.
+        # What is translucent is added from back to front; VTK's own sorting ignores multisampling and is slow.
         self.plotter.renderer.UseOITOff()
         self._quick = quick
         add_light(self.plotter, self._pyvista, surrounded=not quick)
