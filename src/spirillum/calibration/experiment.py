@@ -68,7 +68,7 @@ class Ratio:
         """Standard error of each mean, SI, from the relative error of one trial; NaN where it is unknown."""
         return error_of_mean(error, self.stated, self.scale, self.trials)
 
-    def drawn_error(self, count: int, rng: np.random.Generator) -> Samples:
+    def sampled_error(self, count: int, rng: np.random.Generator) -> Samples:
         """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials.
 
         Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.

@@ -38,7 +38,7 @@ from spirillum.calibration.identifiability import (
     identified,
     torque_error,
 )
-from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit, paper_fit
+from spirillum.calibration.least_squares import LeastSquares, least_squares_fit, paper_fit, sampled_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.parameters import LEVEL, UNWALLED, Estimate, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Sampling, sampled
@@ -207,7 +207,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
 def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
     """Intervals from draws around the best fit, in coordinates."""
     rng = np.random.default_rng(1)
-    z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
+    z, tau = sampled_fit(problem, fit, _FRICTION_DRAWS, rng)
     draws = problem.values(z)
     values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
     given, within, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
@@ -324,7 +324,7 @@ def _friction(
     if "friction" not in problem.free:
         return (), (), ()
     ratio = problem.experiment.motor_rate
-    own_error = error.get("motor_rate", ratio.drawn_error(z.shape[0], rng))
+    own_error = error.get("motor_rate", ratio.sampled_error(z.shape[0], rng))
     rates = ratio.mean + ratio.error_of_mean(own_error) * rng.normal(size=(z.shape[0], problem.experiment.size))
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
     own = np.random.default_rng(2)  # one fluid, one motor and one model for all tails

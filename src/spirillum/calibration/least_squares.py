@@ -309,7 +309,7 @@ def _discrepancy(
     return found
 
 
-def drawn_fit(
+def sampled_fit(
     problem: Problem, fit: LeastSquares, count: int, rng: np.random.Generator
 ) -> tuple[Samples, dict[Quantity, Samples]]:
     """Samples around a fit: coordinates (draws, free numbers), and discrepancies by quantity, (draws,)."""

@@ -86,7 +86,7 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
             raise InputError(f"ranges with {stated}: {problem}")
 
 
-def drawn_numbers(
+def sampled_numbers(
     axial: AxialRobot, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[Samples, Samples]:
     """Numbers of robots sampled from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,)."""
@@ -217,7 +217,7 @@ class AxialBatch:
         chosen = np.arange(self.count) if which is None else np.flatnonzero(self._chosen("which", which))
         if not len(chosen) or not (self._ranges or self._pool is not None):
             return
-        numbers, viscosity = drawn_numbers(self.axial, len(chosen), rng, self._ranges)
+        numbers, viscosity = sampled_numbers(self.axial, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
             own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]

@@ -25,8 +25,8 @@ from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
-from spirillum.swimming.drawn_resistance import PosteriorFor, drawn_discrepancy
-from spirillum.swimming.intervals import drawn_batch, intervals_over
+from spirillum.swimming.drawn_resistance import PosteriorFor, sampled_discrepancy
+from spirillum.swimming.intervals import intervals_over, sampled_batch
 from spirillum.swimming.model_choice import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import LEVEL, Intervals, Swimming
@@ -79,7 +79,7 @@ def chosen_run(
     return choice, motion or "free", notes
 
 
-def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
+def sample_count(draws: int | None, posterior: PosteriorFile | None) -> int:
     """Number of posterior samples that are run: the requested one, 0 for the median alone; None: 100."""
     given: Any = _DRAWS if draws is None else draws
     if not is_whole(given) or not (int(given) == 0 or _FEWEST <= int(given) <= _MOST):
@@ -129,7 +129,7 @@ def discrepancy_factors(
     whose: PosteriorFor = "new",
 ) -> dict[str, Samples]:
     """Factors of a model's discrepancy on the mean speed and rates of a run of each draw, (draws,) each."""
-    off = drawn_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
+    off = sampled_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
     one = np.ones_like(off["advance"])
     if robot.drive is not None and robot.drive.joint == "fixed":
         off["turning"] = one
@@ -191,7 +191,7 @@ def intervals_of_free_motion(
     names = [item.name for item in fields(Swimming)]
     whole = Swimming(**{name: np.concatenate([getattr(one, name) for one in swum]) for name in names})
     kept = posterior.at(steady)
-    batch = drawn_batch(robot, kept.model, kept.of(robot, rng), kept.count)
+    batch = sampled_batch(robot, kept.model, kept.of(robot, rng), kept.count)
     own_drive = found.prediction.tail_rate is None
     reading = found.prediction.friction
     return intervals_over(

@@ -164,7 +164,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     mean_flow = float(now["mean_flow"])
     drawn = max(gap, _THINNEST * robot.body.diameter)
     requested = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
-    with _said_of_the_run():
+    with _run_notes():
         friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
         batch = RobotBatch.of(robot, Placement.of(requested))
         if broken(requirements(batch, Tube())):
@@ -204,7 +204,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
 
 
 @contextmanager
-def _said_of_the_run() -> Iterator[None]:
+def _run_notes() -> Iterator[None]:
     """Restate errors of a placement in terms of the run."""
     try:
         yield

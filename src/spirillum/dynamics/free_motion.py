@@ -18,7 +18,7 @@ from spirillum.dynamics.integration import Progress, Reach, integrate, observed_
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.run_summary import DutyInterval
-from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, state_at_release
+from spirillum.dynamics.start import InitialPose, check_in_table, check_roughness, state_at_release
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -26,9 +26,9 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import (
     Checked,
     check_in_tube,
-    held_against_check,
-    held_by_friction,
+    compare_with_check,
     links_in_tube,
+    sticking_notes,
 )
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
@@ -148,7 +148,7 @@ def free_motion(
     limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
     inertia = check_stokes_flow(batch, limits)
     checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
-    stuck = held_by_friction(
+    stuck = sticking_notes(
         links,
         forward=float(swimming.forward_velocity[0]),
         turning=0.5 * ready.body.diameter * float(swimming.body_rotation_rate[0]),
@@ -171,7 +171,7 @@ def free_motion(
     return FreeMotion(found, run, links, gap, release, checked)
 
 
-def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
+def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot, InitialPose]:
     """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
     rough, touching = with_contact(release.contact, release.roughness, release.in_tube)
     held = predict(
@@ -213,7 +213,7 @@ def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
 def _checked(run: LongRun, links: TubeRobot) -> Checked:
     """Compare the poses of the last turn with those at which the table was checked."""
     names = ("gap", "offset", "pitch", "yaw")
-    return held_against_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
+    return compare_with_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
 
 
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:

@@ -32,7 +32,7 @@ from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.start import (
-    StartPlace,
+    InitialPose,
     check_in_table,
     check_roughness,
     links_without_walls,
@@ -400,7 +400,7 @@ class Plant:
         links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
         self._links = links if self._now.field is None else self._now.field.on(links)
 
-    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, StartPlace]:
+    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, InitialPose]:
         return links_in_tube(self.steady, table, placed, self._requested, self._height, weight=self._weight)
 
     def _commanded(self, *, remote: bool | None, duty: float | None) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach, observed_at, watched_limits
-from spirillum.dynamics.start import StartPlace, state_at
+from spirillum.dynamics.start import InitialPose, state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links, stiff_steps
@@ -316,7 +316,7 @@ class _Place:
         """The state at coordinates, (19,)."""
         from scipy.optimize import brentq
 
-        start = StartPlace(pitch=float(x[2]), yaw=float(x[3]), azimuth=float(x[0]), phase=self._phase)
+        start = InitialPose(pitch=float(x[2]), yaw=float(x[3]), azimuth=float(x[0]), phase=self._phase)
         radius = float(self._robot.tube[kernel.RADIUS])
         offset = brentq(
             lambda e: self._closeness(state_at(start, e)) - x[1], 1e-6 * radius, radius, xtol=1e-15 * radius, rtol=1e-15

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
-from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
+from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
 from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
@@ -112,7 +112,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     known = fit.posterior
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
-    number = drawn_number(draws, known)
+    number = sample_count(draws, known)
     if friction is not None:
         friction_reading(friction)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])

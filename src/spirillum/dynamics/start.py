@@ -148,7 +148,7 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
 
 
 @dataclass(frozen=True)
-class StartPlace:
+class InitialPose:
     """A pose in the tube; SI, angles in rad."""
 
     gap: float | None = None
@@ -165,7 +165,7 @@ class StartPlace:
     """Phase of the tail relative to the body, which has not rolled since release."""
 
 
-def state_at_release(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
+def state_at_release(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:
     """The state of a robot at rest at a pose, (19,)."""
     radius, a = float(links.tube[tube_motion.RADIUS]), 0.5 * robot.body.diameter
     if start.eccentricity is not None:
@@ -206,7 +206,7 @@ def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
         )
 
 
-def state_at(start: StartPlace, offset: float) -> Samples:
+def state_at(start: InitialPose, offset: float) -> Samples:
     """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, in place of the start's gap."""
     from scipy.spatial.transform import Rotation
 
@@ -219,7 +219,7 @@ def state_at(start: StartPlace, offset: float) -> Samples:
     return state
 
 
-def _offset(robot: Robot, start: StartPlace, gap: float, radius: float) -> float:
+def _offset(robot: Robot, start: InitialPose, gap: float, radius: float) -> float:
     """Offset at which the body's smallest gap is `gap`, m."""
     body = outlines_of(robot)["body"]
     offset = Seat.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset

@@ -14,7 +14,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
-from spirillum.dynamics.start import StartPlace, check_roughness, start_phase, turning_rate
+from spirillum.dynamics.start import InitialPose, check_roughness, start_phase, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -161,7 +161,7 @@ def run_in_tube(
     )
     dataset = tube_run(steady, links, begun, timetable, wait=options.wait or 0.0, progress=progress)
     places = {name: dataset[of].values for name, of in _PLACES.items()}
-    checked = held_against_check(links.table, **places, time=dataset["time"].values)
+    checked = compare_with_check(links.table, **places, time=dataset["time"].values)
     notes = list(notes_in(dataset.attrs))
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     if options.flow is not None:
@@ -170,7 +170,7 @@ def run_in_tube(
     if weight and not links.weight.any():
         notes.append(NO_WEIGHT)
     notes += check_stokes_flow(steady.batch, limits).values()
-    stuck = held_by_friction(
+    stuck = sticking_notes(
         links,
         forward=float(dataset["mean_forward_velocity_steady"]),
         turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
@@ -191,12 +191,12 @@ def run_in_tube(
 
 def links_in_tube(
     steady: Prediction, table: TubeTable, placed: Placement, options: InTube, roughness: float | None, *, weight: bool
-) -> tuple[TubeRobot, StartPlace]:
+) -> tuple[TubeRobot, InitialPose]:
     """Coefficients of a robot's rates in its tube, and its initial pose."""
     turn = 2.0 * np.pi / turning_rate(steady)
     around = _around(steady.robot, placed, options, roughness)
     links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
-    start = StartPlace(
+    start = InitialPose(
         gap=placed.gap,
         eccentricity=placed.eccentricity,
         pitch=placed.pitch or 0.0,
@@ -288,7 +288,7 @@ class Checked(NamedTuple):
     """Cautions about both, a sentence each."""
 
 
-def held_against_check(
+def compare_with_check(
     table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
 ) -> Checked:
     """Compare the poses of a motion with those at which its table was checked.
@@ -335,7 +335,7 @@ def held_against_check(
     return Checked(not beyond.size, bool(near.size), notes)
 
 
-def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
+def sticking_notes(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
     """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:

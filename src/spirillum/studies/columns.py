@@ -29,12 +29,12 @@ from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
 from spirillum.studies.work import OneRobot, Part, StudyTask, gathered, groups
-from spirillum.swimming.band import at_place, band_places, joined
+from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
 
-AT_PLACES = (
+AT_POSES = (
     "forward_velocity",
     "advance_per_radian",
     "tail_rotation_rate",
@@ -76,7 +76,7 @@ class BandTask(StudyTask):
     @property
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
-        return set(AT_PLACES)
+        return set(AT_POSES)
 
     def leading(self, readings: int) -> tuple[int, ...]:
         """Return the sizes of the first axes of all arrays: robots, friction readings."""
@@ -87,7 +87,7 @@ class BandTask(StudyTask):
         model = find_swimmer_model(self.model)
         there = [_quickly(robot, model) for robot in self.robots]
         found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
-        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
+        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_POSES}
 
 
 def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
@@ -99,7 +99,7 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
         robots = [block for _, block in batch.blocks(1)]
         for name in loaded.study.models:
             model = find_swimmer_model(name)
-            for place, sharing in _shared_places(robots, model):
+            for place, sharing in _shared_poses(robots, model):
                 there = tuple(sharing.values())
                 yield BandTask(number, indices[list(sharing)], name, place, there)
                 number += 1
@@ -108,15 +108,15 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
 def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, SwimmerModel]:
     """A robot with the form of a model that answers first: from its table, or solved with the resolution of a band."""
     quick = quickest(model, robot)
-    return (at_place(robot, robot.placement), model) if quick is model else (robot, quick)
+    return (at_pose(robot, robot.placement), model) if quick is model else (robot, quick)
 
 
-def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
+def _shared_poses(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
     """Index of a pose of the band, and the robots that share it, by their index, at that pose."""
     bands = {}
     for index, single in enumerate(robots):
         if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
-            bands[index] = band_places(single, model)
+            bands[index] = band_poses(single, model)
     places = max((len(band) for band in bands.values()), default=0)
     for place in range(places):
         sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
@@ -127,7 +127,7 @@ def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tu
             yield place, there
 
 
-def reference_place(settings: Mapping[str, Any]) -> str:
+def reference_pose(settings: Mapping[str, Any]) -> str:
     """Poses of the robots of a study, by its `settings`, for the models that compute the walls, in words."""
     if settings.get("placements"):
         return "where the calibration places them"
@@ -187,7 +187,7 @@ def with_band(
     places = max(task.place for task, _ in pairs) + 1
     banded = {models.index(task.model) for task, _ in pairs}
     found: dict[str, Values] = {}
-    for name in AT_PLACES:
+    for name in AT_POSES:
         there = np.full((*flat[name].shape, places), np.nan)
         for task, part in pairs:
             there[models.index(task.model), task.indices, :, task.place] = part[name]

@@ -277,7 +277,7 @@ SETTLED = (
     "hydrodynamic_efficiency",
 )
 """Quantities of a steady motion."""
-PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
+POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
 """Pose of a robot in it, and its time constant."""
 SETTLED_STATES = ("not followed", *get_args(State))
 """Outcome for a robot; the index in this list is the value in the dataset."""
@@ -300,11 +300,11 @@ class SettledTask(OneRobot):
     @property
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
-        return {*SETTLED, *PLACE, "error_estimate", "near", "state"}
+        return {*SETTLED, *POSE, "error_estimate", "near", "state"}
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
-        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate", "near")}
+        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *POSE, "error_estimate", "near")}
         try:
             motion = free_motion(
                 self.robot,
@@ -321,7 +321,7 @@ class SettledTask(OneRobot):
         if lying.state == "changing":  # its means depend on when they are taken
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
-        values |= {name: float(getattr(lying, name)) for name in PLACE}
+        values |= {name: float(getattr(lying, name)) for name in POSE}
         values |= {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
         return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
 
@@ -378,7 +378,7 @@ def settled_variables(
 ) -> dict[str, Any]:
     """`<quantity>_settled` of the steady motions, NaN where there is none, and `settled`, what became of each."""
     found: dict[str, Any] = {}
-    for name in (*SETTLED, *PLACE):
+    for name in (*SETTLED, *POSE):
         about = attributes(
             name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
         )

@@ -182,7 +182,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)
     requested = [find_swimmer_model(name) for name in loaded.study.models]
-    warnings += _of_places(loaded, requested)
+    warnings += _pose_notes(loaded, requested)
     warnings += loaded.fit.idle_warnings(loaded.robots, requested)
     warnings += loaded.fit.geometry_warnings(loaded.robots, requested)
     warnings += loaded.fit.origin_warnings(loaded.robots, requested)
@@ -195,7 +195,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     return warnings + uneven_models(loaded.robots, models, factors)
 
 
-def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
+def _pose_notes(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
     """Limits of answers for robots held at a pose in their tube."""
     walled = [model.name for model in models if model.placed]
     if not walled:

@@ -154,7 +154,7 @@ def load_study(
         raise InputError(f"{name}: {error}") from error
     _check_room(study, robots, name)
     _check_contact(study, robots, name)
-    placements = _fitted_places(study, robots, fit)
+    placements = _fitted_poses(study, robots, fit)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     if fit.friction:
         question["friction"] = [item.model_dump() for item in fit.friction]
@@ -292,7 +292,7 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
         )
 
 
-def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
+def _fitted_poses(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
     """Pose of each robot by a calibration, as `predict` takes it; none where the study states it, or none is needed."""
     if fit.file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
         return ()

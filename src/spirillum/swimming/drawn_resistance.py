@@ -223,7 +223,7 @@ def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -
     return cast("PosteriorFor", name)
 
 
-def drawn_discrepancy(
+def sampled_discrepancy(
     posterior: PosteriorFile, predicted: Mapping[str, Samples], rng: np.random.Generator, robot: Robot | None = None
 ) -> dict[str, Samples]:
     """Factors on advance, turning and motor rate, (draws,) each; 1 for a quantity that was not compared."""

@@ -22,7 +22,7 @@ from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.studies.columns import reference_place
+from spirillum.studies.columns import reference_pose
 from spirillum.studies.released_robots import READ, WINDOWS, levels_of_readings, main_effects
 from spirillum.units import Hz, show
 
@@ -149,7 +149,7 @@ class Evidence:
     @property
     def place(self) -> str:
         """Poses of the models that compute the walls, in words."""
-        return reference_place(self._settings)
+        return reference_pose(self._settings)
 
 
 def fraction_between(values: Values) -> str:

@@ -22,7 +22,16 @@ from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, 
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, look_of_model, new_figure, plain, styled, told_apart
+from spirillum.view.figures.style import (
+    COLOURS,
+    PAGE,
+    UnitPrefix,
+    distinct_labels,
+    look_of_model,
+    new_figure,
+    plain,
+    styled,
+)
 
 MOST = 12
 """Robots in the figure."""
@@ -65,7 +74,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
             ticks,
         )
     first = panels[0][0]
-    first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
+    first.set_yticks(range(len(robots)), distinct_labels([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
     figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
     by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}. " if ranking.walls else "")

@@ -105,7 +105,7 @@ def _advance_row(shown: StudyView) -> PanelRow:
             draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
             draw_curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
 
-    return PanelRow(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
+    return PanelRow(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.pose_words)
 
 
 def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
@@ -154,7 +154,7 @@ def bound_row(shown: StudyView) -> PanelRow:
     return PanelRow(f"forward velocity\n{shown.bound_words} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
-def drawn_amplitudes(shown: StudyView) -> list[int]:
+def plotted_amplitudes(shown: StudyView) -> list[int]:
     """Indices of the amplitudes that have a curve of their own."""
     return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
 
@@ -166,7 +166,7 @@ def _amplitude_look(number: int, count: int) -> tuple[str, str]:
 
 
 def _assumed_friction_row(shown: StudyView) -> PanelRow:
-    places = drawn_amplitudes(shown)
+    places = plotted_amplitudes(shown)
     name = "effective_friction_at_assumed_rate"
 
     def draw(axes: Axes, part: StudyView, _x: Values) -> None:
@@ -317,7 +317,7 @@ def _observed_entries(shown: StudyView) -> Iterator[Line2D]:
 
 def amplitude_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
-    places = drawn_amplitudes(shown)
+    places = plotted_amplitudes(shown)
     amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = UnitPrefix.of(amplitudes, "m")
     entries = []

@@ -24,7 +24,7 @@ from spirillum.view.figures.rows import (
 )
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
-from spirillum.view.figures.style import UnitPrefix, plain, told_apart
+from spirillum.view.figures.style import UnitPrefix, distinct_labels, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -218,7 +218,7 @@ def _bound_picture(shown: StudyView) -> Picture:
         note
         for note in (
             bound_row(shown).tells if shown.settled else "",
-            shown.place_words,
+            shown.pose_words,
             part.unanswered(),
             _left_out(shown, len(wavelengths), len(channels)),
         )
@@ -317,7 +317,7 @@ def _robots_picture(shown: StudyView) -> Picture:
 def _draw_robots(
     shown: StudyView, places: list[int], title: str, rows: Sequence[PanelRow], notes: Sequence[str]
 ) -> Figure:
-    names = told_apart([str(name) for name in shown.whole["robot"].values[places]], 28)
+    names = distinct_labels([str(name) for name in shown.whole["robot"].values[places]], 28)
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)
     upright = _TICK_LETTER * longest * len(names) < width

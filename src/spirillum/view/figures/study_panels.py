@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.studies.columns import reference_place
+from spirillum.studies.columns import reference_pose
 from spirillum.units import Hz
 from spirillum.view.figures.style import UnitPrefix, plain
 
@@ -218,12 +218,12 @@ class StudyView:
         return low, high
 
     @property
-    def place_words(self) -> str:
+    def pose_words(self) -> str:
         """Poses of the models that compute the walls, and the meaning of shades; empty without either."""
         computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
         if not computed:
             return self._interval_words()
-        where = f"{', '.join(computed)}: {reference_place(json.loads(self.whole.attrs.get('settings', '{}')))}."
+        where = f"{', '.join(computed)}: {reference_pose(json.loads(self.whole.attrs.get('settings', '{}')))}."
         return f"{where} {self._band_words()} {self._interval_words()}".strip()
 
     def _interval_words(self) -> str:

@@ -188,7 +188,7 @@ def plain(text: str, longest: int = 60) -> str:
     return line.replace("$", r"\$")
 
 
-def told_apart(names: Sequence[str], longest: int) -> list[str]:
+def distinct_labels(names: Sequence[str], longest: int) -> list[str]:
     """Shorten names to lines of at most ``longest`` letters, or of at most 80 where they would be equal."""
     short = [plain(name, longest) for name in names]
     return short if len(set(short)) == len(set(names)) else [plain(name, 80) for name in names]

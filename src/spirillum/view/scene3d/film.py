@@ -184,7 +184,7 @@ def film(
     inset = None
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
-    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset), inset=inset)
+    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
@@ -268,7 +268,7 @@ class _Shots:
         scene.add_grid(self._view, places.min(axis=0) + corners.min(axis=0), places.max(axis=0) + corners.max(axis=0))
 
 
-def _channel_middle(dataset: xr.Dataset) -> float | None:
+def _channel_centre(dataset: xr.Dataset) -> float | None:
     """Position of the channel's middle in the run, m."""
     try:
         middle = float(dataset.attrs.get("channel_middle", np.nan))
