@@ -311,12 +311,6 @@ def unit_of(name: str) -> str:
 
 
 def attributes(name: str, *, meaning: str | None = None, source: str | None = None) -> dict[str, Any]:
-    """Attributes of a dataset's variable: `units`, `long_name` and `source`.
-
-    Args:
-        name: a quantity's name.
-        meaning: half a sentence instead of the registry's, where the variable holds a special case of the quantity.
-        source: where these values come from, instead of the registry's.
-    """
+    """Attributes of a dataset's variable: `units`, `long_name` and `source`, from the registry or as given."""
     item = QUANTITIES[name]
     return {"units": item.unit, "long_name": meaning or item.meaning, "source": source or item.source}

@@ -75,10 +75,6 @@ def repeated_median_line(time: Samples, values: Samples) -> LineFit:
     """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
 
     It goes through the medians of at most 60 stretches of the series.
-
-    Args:
-        time: (n,), increasing.
-        values: (n,).
     """
     t, y = _medians_of_stretches(time), _medians_of_stretches(values)
     apart = ~np.eye(t.size, dtype=bool)

@@ -188,11 +188,7 @@ def run_job(
 
 
 def outcome_of(job: ControlJob) -> Outcome:
-    """Do a run for its score alone.
-
-    Raises:
-        KeyboardInterrupt: if the run was interrupted.
-    """
+    """Do a run for its score alone; an interrupt is raised again."""
     plant, drawn = draw_plant(job)
     run = run_job(job, plant, drawn)
     if run.interrupted:

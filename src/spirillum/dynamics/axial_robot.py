@@ -268,14 +268,7 @@ def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
 
 
 def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
-    """d/dt of the state and its two integrals, (7,), which depends on the current alone.
-
-    Args:
-        p: the robot's numbers, (18,).
-        current: I, A.
-        duty: 0 to 1.
-        flow: imposed mean flow, m/s.
-    """
+    """d/dt of the state and its two integrals, (7,), by the robot's numbers, current, duty and imposed mean flow."""
     found = np.empty(kernel.STATES)
     kernel.rates(p, current, duty, flow, found)
     return found

@@ -111,11 +111,7 @@ class PlantState:
 
 
 def uninterrupted(moment: Snapshot) -> Snapshot:
-    """The moment at the end of a step of a look ahead, of which nothing is kept.
-
-    Raises:
-        KeyboardInterrupt: if the step was interrupted, which a plant reports as the end of its run.
-    """
+    """The moment at the end of a step of a look ahead; an interrupt of the step is raised as `KeyboardInterrupt`."""
     if moment.ended == INTERRUPTED:
         raise KeyboardInterrupt
     return moment

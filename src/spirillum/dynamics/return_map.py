@@ -92,11 +92,7 @@ class ReturnMap:
     """Number of steps that were taken, shared with maps of other tolerances."""
 
     def after(self, state: Samples) -> Turn:
-        """The next turn of the tail from a state, (19,).
-
-        Raises:
-            EndedTurnError: if the turn cannot be followed to its end.
-        """
+        """The next turn of the tail from a state, (19,); `EndedTurnError` if it cannot be followed to its end."""
         robot, data = self.robot, self.robot.data
         limits, sizes = watched_limits(robot, _NOWHERE), robot.step_sizes()
         y = state.copy()

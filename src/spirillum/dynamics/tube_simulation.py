@@ -291,16 +291,7 @@ class Checked(NamedTuple):
 def compare_with_check(
     table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
 ) -> Checked:
-    """Compare the poses of a motion with those at which its table was checked.
-
-    Args:
-        table: the packed table.
-        gap: smallest distance of body and wall, (n,), m.
-        offset: of the body's mid-length from the tube's axis, (n,), m.
-        pitch: nose up, (n,), rad.
-        yaw: nose to the side, (n,), rad.
-        time: of the poses, (n,), s, where one differs from another; None: a motion that repeats itself.
-    """
+    """Compare the poses of a motion, (n,), with those at which its table was checked; None: it repeats itself."""
     notes = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)

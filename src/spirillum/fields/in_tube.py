@@ -240,12 +240,7 @@ class _Reflection:
         return field
 
     def _range(self, placed: Samples, distance: Samples) -> Samples:
-        """Distance by which waves are damped between forces, wall and points, (n,); those of far forces cancel.
-
-        Args:
-            placed: points, (n, 3).
-            distance: of the points from the wall, (n,).
-        """
+        """Damping distance of waves between forces, wall and points, (n,); those of far forces cancel."""
         found = np.full(len(placed), np.inf)
         for least, tree in self.classes:
             apart, _ = tree.query(placed)

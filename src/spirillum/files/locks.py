@@ -78,12 +78,7 @@ def _is_at(handle: int | None, folder: Path) -> bool:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep a folder for this process while the block runs; leftovers of dead runs in it are removed.
-
-    Raises:
-        Busy: if another run is writing there.
-        OSError: if it is no folder, or cannot be made or read.
-    """
+    """Keep a folder for this process in the block, without leftovers; raise `Busy` if another run writes there."""
     for _ in range(_TRIES):  # another run may remove it between the two, when it has failed and left it empty
         folder.mkdir(parents=True, exist_ok=True)
         try:

@@ -118,13 +118,7 @@ class CausalAngle:
         self._count = self._outliers = 0
 
     def update(self, time: float, angle: float, error: float) -> float:
-        """The continuous angle of a frame, rad; NaN where it is unreadable or an outlier.
-
-        Args:
-            time: of the frame, s; later than before.
-            angle: modulo the period, rad; NaN where it is unreadable.
-            error: its standard error, rad.
-        """
+        """The continuous angle of a frame, rad; NaN where it is unreadable or an outlier."""
         if not math.isfinite(angle):
             return math.nan
         self._times = [*self._times[-UNWRAPPING.start :], time]

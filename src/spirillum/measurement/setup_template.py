@@ -39,13 +39,7 @@ def apparent_distance(height: float, camera: float, surface: float | None, index
 
 
 def spacing_at_axis(setup: Setup, changed: str = "", by: float = 0.0) -> float:
-    """Length at the height of the robot's axis that looks as long as the ruler's spacing at the height of the ruler, m.
-
-    Args:
-        setup: the setup; without a ruler the spacing is 1.
-        changed: a number of the setup that is changed, by its dotted name.
-        by: how much it is changed by.
-    """
+    """Length at the robot's axis that looks as long as the ruler's spacing (without one: 1), with one field changed."""
 
     def number(name: str, value: float) -> float:
         return value + by if name == changed else value

@@ -63,15 +63,7 @@ def half_fraction(factors: int) -> Levels:
 
 
 def main_effects(values: Values, levels: Levels) -> Values:
-    """Mean at the high level less mean at the low one, for each factor; runs without an answer are left out.
-
-    Args:
-        values: answers of the runs, (..., runs); NaN where there is none.
-        levels: of the factors, (runs, factors).
-
-    Returns:
-        (..., factors); NaN where a level has no answer.
-    """
+    """Mean at the high level less mean at the low one, (..., factors); runs without an answer are left out."""
     known = np.isfinite(values)
     filled = np.where(known, values, 0.0)
     means = []

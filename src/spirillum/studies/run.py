@@ -90,16 +90,7 @@ def computed_study(
     tell: Progress,
     crew: WorkerPool | None = None,
 ) -> xr.Dataset:
-    """The dataset of a study.
-
-    Args:
-        loaded: the study with its robots.
-        observed: observed rates and speeds of its robots, if any.
-        fingerprint: see `study_fingerprint`.
-        parts: folder where finished parts are kept and found again; None: nowhere.
-        tell: called with what is being done, steps done and steps in all.
-        crew: who computes; None: this process.
-    """
+    """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
     todo: list[ModelTask | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial

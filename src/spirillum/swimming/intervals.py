@@ -61,17 +61,7 @@ def intervals_of(
     posterior_for: PosteriorFor = "new",
     placement: Placement | None = None,
 ) -> Intervals:
-    """Swim every draw of a posterior and take the limits of 95 % intervals.
-
-    Args:
-        robot: the robot, as `PosteriorFile.central` gives it.
-        model: the hydrodynamic model of the posterior.
-        posterior: its draws.
-        tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
-        friction: reading of the friction.
-        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
-        placement: pose in the tube, for a model that computes the walls; a gap or pitch that it states is not sampled.
-    """
+    """Swim every draw of a posterior and take the limits of 95 % intervals; a stated gap or pitch is not sampled."""
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
     size = posterior.count

@@ -225,13 +225,7 @@ def backdrop(tank: Tank, lens: VirtualLens) -> Backdrop:
 
 
 def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
-    """Print the lines of grid paper on the floor, each fifth a strong one.
-
-    Args:
-        still: its light is changed.
-        spacing: from one line to the next, m.
-        paper: linear colour of the floor, (3,).
-    """
+    """Print the lines of grid paper on the floor, each fifth a strong one; the light of `still` is changed."""
     ratio = np.ones_like(still.light)
     for apart, width, colour in ((1.0, *_FINE_LINES), (5.0, *_STRONG_LINES)):
         bare = np.ones(still.light.shape[:2])

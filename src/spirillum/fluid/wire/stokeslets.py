@@ -122,14 +122,7 @@ def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> 
 
 
 def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
-    """Cut a curve of valid wire geometry into stations; it may touch itself.
-
-    Args:
-        curve: (n, 3) centreline, m.
-        radius: of the wire, m.
-        spacing: of the stations, relative to the standard one.
-        closed: whether the curve ends where it starts.
-    """
+    """Cut a centreline (n, 3) into stations at a spacing relative to the standard one; it may touch itself."""
     from scipy.interpolate import CubicSpline
 
     gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)

@@ -230,17 +230,7 @@ class Scene:
         rows: int | None = None,
         quick: bool = False,
     ) -> None:
-        """Build the scene.
-
-        Args:
-            solids: the robot's pieces.
-            size: width and height, pixels.
-            glass: x of both ends of the channel's piece that is drawn, m; None: none of it.
-            live: a window on the screen.
-            samples: samples of each pixel.
-            rows: rows about the middle that are drawn, an even number; what lies above and below stays white.
-            quick: lamps alone, without surroundings that the solids reflect.
-        """
+        """Build the scene, with a piece of glass (x of both ends, m); `rows` about the middle are rendered."""
         self.solids = solids
         self.unit = solids.length
         self._rows = size[1] if rows is None else min(rows, size[1])

@@ -282,13 +282,7 @@ def is_single(stripes: Sequence[str]) -> bool:
 
 
 def seen_line(profiles: Samples, facing: np.ndarray, order: Whole) -> SeenLine | None:
-    """Colours of seal and line, and what the lamp adds, to begin with; None where no line is seen to move.
-
-    Args:
-        profiles: colours along the angle about the axis, for some frames, (f, n, 3); NaN where nothing is seen.
-        facing: mask of the samples that face the camera, (f, n).
-        order: class of each stripe, (s,).
-    """
+    """Colours of seal and line, and what the lamp adds, to begin with; None where no line is seen to move."""
     seen = np.where(facing[..., None], profiles, np.nan)
     known = np.asarray(np.isfinite(seen).all(axis=2))
     often = known.sum(axis=0) >= SINGLE_LINE.frames

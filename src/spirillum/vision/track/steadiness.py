@@ -271,14 +271,7 @@ class PictureSteps(NamedTuple):
 
 
 def picture_steps(change: Samples) -> PictureSteps | None:
-    """Evidence of the changes of the picture about missing and repeated frames.
-
-    Args:
-        change: of each picture against the last one and the one before, (n, 2).
-
-    Returns:
-        None where the motion changes the picture too little, or too unevenly, to tell.
-    """
+    """Evidence of changes, (n, 2), about lost and repeated frames; None where they are too small or uneven."""
     if len(change) < PICTURE_CHANGE.fewest:
         return None
     one, two = change[1:, 0], change[1:, 1]

@@ -109,15 +109,7 @@ def stated_aspect(name: str, stated: float | None, given: float | None) -> float
 def display_flags(
     display: Display, stored: tuple[int, int], stated: float | None, given: float | None, slant: float = 0.0
 ) -> list[Flag]:
-    """What was done to the pictures, and on whose word.
-
-    Args:
-        display: how they are shown.
-        stored: width and height of a stored picture, pixels.
-        stated: pixel aspect ratio that the file states; None where it says nothing.
-        given: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-        slant: angle by which the file's orientation is off a quarter turn, rad.
-    """
+    """What was done to the pictures, and on whose word."""
     flags, width = [], round(stored[0] * display.aspect)
     if given is not None and stated is not None and round(stored[0] * stated) != width:
         sentence = (
