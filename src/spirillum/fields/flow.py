@@ -367,15 +367,15 @@ def _attributes(flow: Flow) -> dict[str, Any]:
 
 def _checked(points: Samples) -> Samples:
     try:
-        places = np.asarray(points, dtype=float)
+        coordinates = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError("points are no numbers; allowed: (n, 3), a row (x, y, z) in m for each point") from error
-    if places.ndim != 2 or places.shape[1] != 3:
-        raise InputError(f"points have shape {places.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
-    if not np.all(np.isfinite(places)):
-        first = int(np.argmin(np.all(np.isfinite(places), axis=1)))
-        raise InputError(f"point {first} = {places[first].tolist()} is not finite; allowed: coordinates in m")
-    return places
+    if coordinates.ndim != 2 or coordinates.shape[1] != 3:
+        raise InputError(f"points have shape {coordinates.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
+    if not np.all(np.isfinite(coordinates)):
+        first = int(np.argmin(np.all(np.isfinite(coordinates), axis=1)))
+        raise InputError(f"point {first} = {coordinates[first].tolist()} is not finite; allowed: coordinates in m")
+    return coordinates
 
 
 def _margin(extent: str | float | None) -> float | None:

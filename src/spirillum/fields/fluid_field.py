@@ -51,26 +51,26 @@ class FluidField(ABC):
 
     def in_fluid(self, points: Samples) -> Samples:
         """Return the points (n, 3) if they are all in the fluid."""
-        places = checked_points(points)
-        names = self.part_at(places)
+        xyz = checked_points(points)
+        names = self.part_at(xyz)
         if np.any(names != ""):
             first = int(np.argmax(names != ""))
-            at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
+            at = ", ".join(f"{1e3 * float(value):.4g}" for value in xyz[first])
             raise InputError(f"point {first} = ({at}) mm is inside the {names[first]}; allowed: points in the fluid")
-        return places
+        return xyz
 
 
 def checked_points(points: Samples) -> Samples:
     """Points as floats, (n, 3)."""
     try:
-        places = np.asarray(points, dtype=float)
+        xyz = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError("points are no numbers; allowed: rows (x, y, z) in m") from error
-    if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
-        raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
-    if np.any(np.abs(places) > _FARTHEST):
+    if xyz.ndim != 2 or xyz.shape[1] != 3 or not np.all(np.isfinite(xyz)):
+        raise InputError(f"points have shape {xyz.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
+    if np.any(np.abs(xyz) > _FARTHEST):
         raise InputError(f"points are farther away than {_FARTHEST:g} m; allowed: nearer ones")
-    return np.ascontiguousarray(places)
+    return np.ascontiguousarray(xyz)
 
 
 def name_parts(

@@ -255,11 +255,11 @@ def _classes(columns: Sequence[_Sources], radius: float) -> tuple[tuple[float, A
     rho = np.concatenate([np.repeat(part.rho, part.x.shape[1]) for part in columns])
     angle = np.concatenate([np.repeat(part.angle, part.x.shape[1]) for part in columns])
     x = np.concatenate([part.x.ravel() for part in columns])
-    places = np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
-    places = np.concatenate([places, places * [1.0, 1.0, -1.0]])  # half circles stand for whole ones
+    points = np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
+    points = np.concatenate([points, points * [1.0, 1.0, -1.0]])  # half circles stand for whole ones
     distance = radius - np.concatenate([rho, rho])
     number = np.floor(np.log2(distance / distance.min())).astype(int)
-    return tuple((float(distance[number == n].min()), cKDTree(places[number == n])) for n in np.unique(number))
+    return tuple((float(distance[number == n].min()), cKDTree(points[number == n])) for n in np.unique(number))
 
 
 def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: float) -> Iterator[_Sources]:
@@ -282,8 +282,8 @@ def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float)
     x_p, rho_p = panels.x[number], panels.rho[number]
     length = float(np.sum(np.hypot(np.diff(x_p), np.diff(rho_p))))
     steepest = cut / float(np.min(seat.distances(x_p, rho_p)))
-    places, gauss = np.polynomial.legendre.leggauss(panels.order + 4 + int(0.3 * steepest * length))
-    cardinal = panels.cardinals(places)
+    nodes, gauss = np.polynomial.legendre.leggauss(panels.order + 4 + int(0.3 * steepest * length))
+    cardinal = panels.cardinals(nodes)
     x, rho = cardinal @ x_p, cardinal @ rho_p
     modes = np.tensordot(cardinal, density, axes=(1, 0))  # (n, modes, 3)
     level = seat.level and float(np.ptp(rho_p)) < 1e-9 * seat.radius

@@ -52,7 +52,7 @@ class BandTask(StudyTask):
     """One model for the robots of one channel that share a pose of their bands."""
 
     model: str
-    place: int
+    pose: int
     """Index of the pose in the band of each robot."""
     robots: tuple[RobotBatch, ...]
     """The robots at that pose, one by one."""
@@ -99,9 +99,9 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
         robots = [block for _, block in batch.blocks(1)]
         for name in loaded.study.models:
             model = find_swimmer_model(name)
-            for place, sharing in _shared_poses(robots, model):
+            for pose, sharing in _shared_poses(robots, model):
                 there = tuple(sharing.values())
-                yield BandTask(number, indices[list(sharing)], name, place, there)
+                yield BandTask(number, indices[list(sharing)], name, pose, there)
                 number += 1
 
 
@@ -117,14 +117,14 @@ def _shared_poses(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tup
     for index, single in enumerate(robots):
         if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
             bands[index] = band_poses(single, model)
-    places = max((len(band) for band in bands.values()), default=0)
-    for place in range(places):
+    poses = max((len(band) for band in bands.values()), default=0)
+    for pose in range(poses):
         sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
         for index, band in bands.items():
-            key = (band[place].gap, band[place].pitch)
-            sharing.setdefault(key, {})[index] = robots[index].placed(band[place])
+            key = (band[pose].gap, band[pose].pitch)
+            sharing.setdefault(key, {})[index] = robots[index].placed(band[pose])
         for there in sharing.values():
-            yield place, there
+            yield pose, there
 
 
 def reference_pose(settings: Mapping[str, Any]) -> str:
@@ -160,12 +160,12 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
 def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
     """`gap_at_place` and `pitch_at_place` of every robot, (robots, poses), m and rad; NaN where it has no band."""
     tasks = [task for task, _ in answers]
-    places = max(task.place for task in tasks) + 1
+    poses = max(task.pose for task in tasks) + 1
     names = ("gap_at_place", "pitch_at_place")
-    found: dict[str, Values] = {name: np.full((count, places), np.nan) for name in names}
+    found: dict[str, Values] = {name: np.full((count, poses), np.nan) for name in names}
     for task in tasks:
-        found["gap_at_place"][task.indices, task.place] = task.robots[0].placement.gap
-        found["pitch_at_place"][task.indices, task.place] = task.robots[0].placement.pitch
+        found["gap_at_place"][task.indices, task.pose] = task.robots[0].placement.gap
+        found["pitch_at_place"][task.indices, task.pose] = task.robots[0].placement.pitch
     return found
 
 
@@ -184,13 +184,13 @@ def with_band(
         (models, robots, friction readings); NaN for models without a band.
     """
     pairs = list(answers)
-    places = max(task.place for task, _ in pairs) + 1
+    poses = max(task.pose for task, _ in pairs) + 1
     banded = {models.index(task.model) for task, _ in pairs}
     found: dict[str, Values] = {}
     for name in AT_POSES:
-        there = np.full((*flat[name].shape, places), np.nan)
+        there = np.full((*flat[name].shape, poses), np.nan)
         for task, part in pairs:
-            there[models.index(task.model), task.indices, :, task.place] = part[name]
+            there[models.index(task.model), task.indices, :, task.pose] = part[name]
         everywhere = np.concatenate([there, flat[name][..., None]], axis=-1)
         everywhere[[number for number in range(len(models)) if number not in banded]] = np.nan
         found[f"{name}_at_place"] = there

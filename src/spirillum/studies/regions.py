@@ -313,14 +313,14 @@ class _Cost(NamedTuple):
 
 
 def estimate_of(
-    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, crew: WorkerPool
+    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, pool: WorkerPool
 ) -> CostEstimate:
     """Estimate what is missing of a study."""
     cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0)
-    workers, base = crew.size, memory_in_use()
-    alone = crew.cluster is None and (workers == 1 or missing < 2)
+    workers, base = pool.size, memory_in_use()
+    alone = pool.cluster is None and (workers == 1 or missing < 2)
     here = base + (cost.memory if alone else AHEAD * workers * cost.encoded)
-    others = 0 if alone or crew.cluster is not None else min(workers, missing)
+    others = 0 if alone or pool.cluster is not None else min(workers, missing)
     return CostEstimate(
         results=loaded.study.size,
         memory=here + others * (base + cost.memory),

@@ -88,7 +88,7 @@ def computed_study(
     fingerprint: str,
     parts: Path | None,
     tell: Progress,
-    crew: WorkerPool | None = None,
+    pool: WorkerPool | None = None,
 ) -> xr.Dataset:
     """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
     todo: list[ModelTask | BandTask] = list(tasks(loaded))
@@ -107,7 +107,7 @@ def computed_study(
         _announce_solved(missing, tell)
         tell(missing[0].words, done, len(requested))
     jobs = (task.job(loaded, observed) for task in missing)
-    at_work = _worth(missing, crew or WorkerPool())
+    at_work = _worth(missing, pool or WorkerPool())
     for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
         task = requested[job.task.number]
         found[task.number] = part
@@ -151,14 +151,14 @@ _SHORT = 600_000
 """Robots in closed form below which other processes would start longer than they work."""
 
 
-def _worth(missing: Sequence[StudyTask], crew: WorkerPool) -> WorkerPool:
+def _worth(missing: Sequence[StudyTask], pool: WorkerPool) -> WorkerPool:
     """Who computes: this process where the others would start longer than they work."""
     quick = all(
         isinstance(task, HeldTask) or (isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form)
         for task in missing
     )
     short = quick and sum(task.size for task in missing) < _SHORT
-    return WorkerPool() if short and crew.cluster is None else crew
+    return WorkerPool() if short and pool.cluster is None else pool
 
 
 def warnings_of(loaded: LoadedStudy) -> list[Note]:
@@ -219,7 +219,7 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
     )
 
 
-def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
+def make_tables(loaded: LoadedStudy, pool: WorkerPool, tell: Progress) -> None:
     """Make the tables that robots lack in their tubes, where the study left the choice of the model to the program."""
     if not loaded.makes_tables:
         return
@@ -228,7 +228,7 @@ def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
         tell(f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
-        prepared_tables(list(missing), stage=stage, workers=1 if crew.cluster else crew.size, progress=tell)
+        prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=tell)
 
 
 def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:

@@ -207,8 +207,8 @@ def calibration_figures(found: Calibrated) -> dict[str, Figure]:
     from spirillum.calibration.identifiability import profiles
 
     figures = {
-        f"observed-{diameter * 1e3:g}mm": observed_figure(found, place)
-        for place, diameter in enumerate(found.experiment.channels)
+        f"observed-{diameter * 1e3:g}mm": observed_figure(found, index)
+        for index, diameter in enumerate(found.experiment.channels)
     }
     figures["residuals"] = residual_figure(found)
     if found.posterior is not None:

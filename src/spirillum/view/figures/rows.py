@@ -166,16 +166,16 @@ def _amplitude_look(number: int, count: int) -> tuple[str, str]:
 
 
 def _assumed_friction_row(shown: StudyView) -> PanelRow:
-    places = plotted_amplitudes(shown)
+    indices = plotted_amplitudes(shown)
     name = "effective_friction_at_assumed_rate"
 
     def draw(axes: Axes, part: StudyView, _x: Values) -> None:
         rates = np.asarray(part.dataset["assumed_motor_rate"].values, dtype=float)
         order = np.argsort(rates)
-        for number, place in enumerate(places):
-            colour, marker = _amplitude_look(number, len(places))
+        for number, index in enumerate(indices):
+            colour, marker = _amplitude_look(number, len(indices))
             for model in part.models:
-                friction = part.part(amplitude=place).values(name, model=model, friction="rotor")[order]
+                friction = part.part(amplitude=index).values(name, model=model, friction="rotor")[order]
                 axes.plot(
                     rates[order] / Hz,
                     np.where(friction > 0, friction, np.nan),
@@ -195,9 +195,9 @@ def _assumed_friction_row(shown: StudyView) -> PanelRow:
         "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends with the "
         "assumed rates, or where the motor could not turn faster even without friction."
     )
-    left = shown.whole.sizes["amplitude"] - len(places)
+    left = shown.whole.sizes["amplitude"] - len(indices)
     if left:
-        tells = f"{tells} Shown: {len(places)} of {len(places) + left} amplitudes."
+        tells = f"{tells} Shown: {len(indices)} of {len(indices) + left} amplitudes."
     return PanelRow("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
@@ -317,13 +317,13 @@ def _observed_entries(shown: StudyView) -> Iterator[Line2D]:
 
 def amplitude_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
-    places = plotted_amplitudes(shown)
+    indices = plotted_amplitudes(shown)
     amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = UnitPrefix.of(amplitudes, "m")
     entries = []
-    for number, place in enumerate(places):
-        colour, marker = _amplitude_look(number, len(places))
-        label = f"$B_o$ = {amplitudes[place] / scale.factor:.3g} {scale.unit}"
+    for number, index in enumerate(indices):
+        colour, marker = _amplitude_look(number, len(indices))
+        label = f"$B_o$ = {amplitudes[index] / scale.factor:.3g} {scale.unit}"
         entries.append(Line2D([], [], color=colour, marker=marker, markersize=3.2, linestyle="-", label=label))
     for model in shown.models:
         line = look_of_model(model).line

@@ -57,9 +57,9 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
     first, span = float(time[0]), float(time[-1] - time[0])
     for when, _ in events:
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
-    places = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
-    for numbers in _close_together(places) if numbered else []:
-        left = _left_end([places[number] for number in numbers])
+    positions = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
+    for numbers in _close_together(positions) if numbered else []:
+        left = _left_end([positions[number] for number in numbers])
         axes.annotate(
             str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
             (first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0),
@@ -72,18 +72,18 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
         )
 
 
-def _left_end(places: list[float]) -> float:
+def _left_end(positions: list[float]) -> float:
     """Left end of the labels of events at these shares of the axis, right of the panel's letter."""
-    return max(float(np.mean(places)) - 0.5 * _WIDE[len(places) > 1], _LETTER)
+    return max(float(np.mean(positions)) - 0.5 * _WIDE[len(positions) > 1], _LETTER)
 
 
-def _close_together(places: list[float]) -> list[list[int]]:
+def _close_together(positions: list[float]) -> list[list[int]]:
     """Numbers of the events from 0, those together that have no room for a label each."""
     found: list[list[int]] = []
-    for number in range(len(places)):
+    for number in range(len(positions)):
         found.append([number])
         while len(found) > 1:
-            before, after = ([places[one] for one in group] for group in found[-2:])
+            before, after = ([positions[one] for one in group] for group in found[-2:])
             if _left_end(before) + _WIDE[len(before) > 1] <= _left_end(after):
                 break
             last = found.pop()

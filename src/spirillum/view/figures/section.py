@@ -127,14 +127,14 @@ def _draw_wire_cut(
     depth = radius - np.minimum(distance, 3.0 * radius).reshape(first.size, second.size)
     if not depth.max() > 0:
         return
-    places = (first / unit, second / unit, depth.T)
-    axes.contourf(*places, levels=[0.0, 2.0 * radius], colors=[_FILL], zorder=6)
-    axes.contour(*places, levels=[0.0], colors=[_EDGE], linewidths=0.8, zorder=6.1)
+    coordinates = (first / unit, second / unit, depth.T)
+    axes.contourf(*coordinates, levels=[0.0, 2.0 * radius], colors=[_FILL], zorder=6)
+    axes.contour(*coordinates, levels=[0.0], colors=[_EDGE], linewidths=0.8, zorder=6.1)
 
 
 def _denser(line: Values, spacing: float) -> Values:
     """Points along a line so close that their distance and the line's are the same to the eye."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     count = int(np.clip(along[-1] / spacing, line.shape[0], _MOST_CELLS))
-    places = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(places, along, line[:, axis]) for axis in range(3)], axis=-1)
+    positions = np.linspace(0.0, along[-1], count)
+    return np.stack([np.interp(positions, along, line[:, axis]) for axis in range(3)], axis=-1)

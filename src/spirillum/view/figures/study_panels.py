@@ -41,7 +41,7 @@ def spread(count: int, most: int) -> list[int]:
     """At most `most` indices out of `count`, evenly spread, including the first and the last."""
     if count <= most:
         return list(range(count))
-    return sorted({int(place) for place in np.linspace(0, count - 1, most).round()})
+    return sorted({int(index) for index in np.linspace(0, count - 1, most).round()})
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class StudyView:
         """All of a study; `paper_figures` by channel, if it repeats a paper's."""
         return cls(dataset, dataset, paper_figures or {})
 
-    def part(self, **places: int | Sequence[int]) -> StudyView:
+    def part(self, **indices: int | Sequence[int]) -> StudyView:
         """Select a part of the study by indices along dimensions."""
-        return replace(self, dataset=self.dataset.isel(dict(places.items())))
+        return replace(self, dataset=self.dataset.isel(dict(indices.items())))
 
     @cached_property
     def models(self) -> tuple[str, ...]:
@@ -275,12 +275,12 @@ class StudyView:
             f"({', '.join(reasons)}{', …' if len(missing) > 3 else ''})."
         )
 
-    def paper_speed(self, place: int) -> tuple[float, float] | None:
+    def paper_speed(self, index: int) -> tuple[float, float] | None:
         """(Re_max, U) of the paper's caption for a channel; U = Re mu/(rho D_b), m/s."""
-        channel = str(self.whole["channel"].values[place])
-        if channel not in self.paper_figures or place >= len(self.robots):
+        channel = str(self.whole["channel"].values[index])
+        if channel not in self.paper_figures or index >= len(self.robots):
             return None
-        fluid, body = self.robots[place]["fluid"], self.robots[place]["body"]
+        fluid, body = self.robots[index]["fluid"], self.robots[index]["body"]
         reynolds = self.paper_figures[channel].largest_reynolds
         return reynolds, reynolds * fluid["viscosity"] / (fluid["density"] * body["diameter"])
 

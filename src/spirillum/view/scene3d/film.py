@@ -77,10 +77,10 @@ class CrossSection:
         draw.text((middle, 0.25 * middle), "front", anchor="mm", font=self._font, fill=FAINT)
         image[self._box] = np.asarray(square.resize((self._side,) * 2, Image.Resampling.BOX))
 
-    def _pixels(self, places: Samples) -> list[tuple[float, float]]:
+    def _pixels(self, points: Samples) -> list[tuple[float, float]]:
         """Pixels of the fine square for y and z, m, (n, 2)."""
         middle = 0.5 * self._side * _FINE
-        return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in places]
+        return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in points]
 
 
 CAMERAS = ("auto", "fixed", "follow")
@@ -264,8 +264,8 @@ class _Shots:
 
     def _add_grid(self, scene: Scene) -> None:
         corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
-        places = self._poses.position
-        scene.add_grid(self._view, places.min(axis=0) + corners.min(axis=0), places.max(axis=0) + corners.max(axis=0))
+        path = self._poses.position
+        scene.add_grid(self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0))
 
 
 def _channel_centre(dataset: xr.Dataset) -> float | None:

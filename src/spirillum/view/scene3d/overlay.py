@@ -177,10 +177,10 @@ def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, in
                 shrinkB=0,
             )
         )
-        place = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
+        position = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
         axes.text(
-            float(place[0]),
-            float(place[1]),
+            float(position[0]),
+            float(position[1]),
             f"${name}$",
             ha="center",
             va="center",

@@ -65,7 +65,7 @@ def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: flo
     return plotter.add_mesh(mesh, scalars="shade", rgb=True, lighting=False, show_scalar_bar=False)
 
 
-_LAMPS = (  # place about the camera (right, up, towards it), strength
+_LAMPS = (  # position about the camera (right, up, towards it), strength
     ((-0.6, 0.9, 0.8), 0.9),
     ((0.9, 0.3, 0.7), 0.35),
     ((0.1, 0.9, -0.6), 0.4),
@@ -85,8 +85,8 @@ def surroundings(rows: int = 64) -> Samples:
 
 def add_light(plotter: Any, pyvista: Any, *, surrounded: bool = True) -> None:
     """Light a scene; `surrounded` by bright surroundings, which surfaces with `pbr` reflect."""
-    for place, strength in _LAMPS:
-        lamp = pyvista.Light(position=place, focal_point=(0, 0, 0), color="white", intensity=strength)
+    for position, strength in _LAMPS:
+        lamp = pyvista.Light(position=position, focal_point=(0, 0, 0), color="white", intensity=strength)
         lamp.positional = False
         lamp.set_camera_light()
         plotter.add_light(lamp)
