@@ -28,7 +28,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import OneRobot, Part, StudyTask, gathered, groups
+from spirillum.studies.work import OneModel, OneRobot, Part, gathered, groups
 from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.steady import requirements, swim
@@ -48,19 +48,13 @@ AT_POSES = (
 
 
 @dataclass(frozen=True)
-class BandTask(StudyTask):
+class BandTask(OneModel):
     """One model for the robots of one channel that share a pose of their bands."""
 
-    model: str
     pose: int
     """Index of the pose in the band of each robot."""
     robots: tuple[RobotBatch, ...]
     """The robots at that pose, one by one."""
-
-    @property
-    def models(self) -> tuple[str, ...]:
-        """Models whose linear algebra is limited to one thread."""
-        return (self.model,)
 
     @property
     def words(self) -> str:
@@ -77,10 +71,6 @@ class BandTask(StudyTask):
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
         return set(AT_POSES)
-
-    def leading(self, readings: int) -> tuple[int, ...]:
-        """Return the sizes of the first axes of all arrays: robots, friction readings."""
-        return self.size, readings
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute steady swimming at this pose, (robots, friction readings); NaN where there is none."""

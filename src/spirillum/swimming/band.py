@@ -100,7 +100,7 @@ def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
 
 
 def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
-    """The poses of a robot's band, as many for every robot, from wide gaps to narrow ones and from level to steep.
+    """The poses of a robot's band, from wide gaps to narrow ones and from level to steep.
 
     As many for every robot, so that the poses of several robots compare: where a robot has no room, some are the same.
     """
