@@ -67,11 +67,7 @@ _LISTS = ("Sequence", "tuple", "list")
 
 
 def validate_arguments(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that looks at the kinds of its arguments first.
-
-    Returns:
-        The function; it raises `InputError` for an argument of a wrong kind, or one that it does not have.
-    """
+    """Return a function that raises `InputError` for an argument of a wrong kind or one that it does not have."""
     signature = inspect.signature(function)
     names = [name for name, item in signature.parameters.items() if item.kind is not item.VAR_KEYWORD]
     open_ended = len(names) < len(signature.parameters)

@@ -306,24 +306,11 @@ QUANTITIES: dict[str, Quantity] = {
 
 
 def unit_of(name: str) -> str:
-    """SI unit of a quantity.
-
-    Raises:
-        KeyError: for a name that the registry does not hold.
-    """
+    """SI unit of a quantity."""
     return QUANTITIES[name].unit
 
 
 def attributes(name: str, *, meaning: str | None = None, source: str | None = None) -> dict[str, Any]:
-    """Attributes of a dataset's variable: `units`, `long_name` and `source`.
-
-    Args:
-        name: a quantity's name.
-        meaning: half a sentence instead of the registry's, where the variable holds a special case of the quantity.
-        source: where these values come from, instead of the registry's.
-
-    Raises:
-        KeyError: for a name that the registry does not hold.
-    """
+    """Attributes of a dataset's variable: `units`, `long_name` and `source`, from the registry or as given."""
     item = QUANTITIES[name]
     return {"units": item.unit, "long_name": meaning or item.meaning, "source": source or item.source}

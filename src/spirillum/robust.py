@@ -41,22 +41,13 @@ def running_median(values: Samples, window: int) -> Samples:
 
 
 def stretches_of(mask: np.ndarray) -> list[np.ndarray]:
-    """Indices of a series that follow each other and are in a mask, stretch by stretch.
-
-    Args:
-        mask: (n,).
-    """
+    """Indices of a series that follow each other and are in a mask, stretch by stretch."""
     places = np.flatnonzero(mask)
     return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []
 
 
 def least_squares_line(time: Samples, values: Samples) -> LineFit:
-    """The least-squares line; its reference is the mean time.
-
-    Args:
-        time: (n,).
-        values: of one quantity, (n,), or of several, (n, k).
-    """
+    """The least-squares line through values (n,) or (n, k); its reference is the mean time."""
     middle, mean = float(time.mean()), values.mean(axis=0)
     spans = time - middle
     slope = spans @ (values - mean) / max(float(spans @ spans), 1e-300)
@@ -64,12 +55,7 @@ def least_squares_line(time: Samples, values: Samples) -> LineFit:
 
 
 def theil_sen_line(time: Samples, values: Samples) -> LineFit:
-    """Theil and Sen's line: the median slope of all pairs of points, through the median of what remains.
-
-    Args:
-        time: (n,), without repetitions.
-        values: of several quantities, (n, k).
-    """
+    """Theil and Sen's line: the median slope of all pairs of points, through the median of what remains, (n, k)."""
     earlier, later = np.triu_indices(len(time), 1)
     span = time[later] - time[earlier]
     slope = np.median((values[later] - values[earlier]) / span[:, None], axis=0)
@@ -89,10 +75,6 @@ def repeated_median_line(time: Samples, values: Samples) -> LineFit:
     """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
 
     It goes through the medians of at most 60 stretches of the series.
-
-    Args:
-        time: (n,), increasing.
-        values: (n,).
     """
     t, y = _medians_of_stretches(time), _medians_of_stretches(values)
     apart = ~np.eye(t.size, dtype=bool)

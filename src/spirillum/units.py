@@ -416,12 +416,7 @@ def display_unit(value: float | None, unit: str) -> str:
 
 
 def speed_unit(speed: float | None, rate: float | None) -> str:
-    """The unit in which people read a speed beside the tail's rate: one for the slow and the fast runs of a robot.
-
-    Args:
-        speed: m/s.
-        rate: of the tail, rad/s.
-    """
+    """The unit in which people read a speed beside the tail's rate: one for the slow and the fast runs of a robot."""
     if speed and rate and abs(speed) * Hz >= _ROBOTS_ADVANCE * abs(rate):
         return "mm/s"
     return display_unit(speed, "m/s")

@@ -158,8 +158,8 @@ class WorkerPool:
             _ = self.size
 
 
-def checked_crew(workers: int, cluster: str | None) -> WorkerPool:
-    """A crew of so many workers, or of those of a cluster."""
+def pool_of_workers(workers: int, cluster: str | None) -> WorkerPool:
+    """A pool of so many workers, or of those of a cluster."""
     if not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {str(workers)[:40]}; allowed: a whole number of 1 to {_MOST_WORKERS}")
     if cluster is not None and not _ADDRESS.fullmatch(cluster):
@@ -172,18 +172,18 @@ def checked_crew(workers: int, cluster: str | None) -> WorkerPool:
 def map_tasks(
     work: Callable[[_Task], _Answer],
     tasks: Iterable[_Task],
-    crew: WorkerPool,
+    pool: WorkerPool,
     *,
     besides: str = "",
     on_progress: Tell | None = None,
 ) -> Iterator[tuple[_Task, _Answer]]:
     """Tasks with their answers, in any order but from this process alone."""
-    if crew.cluster is None:
-        yield from imap_unordered(work, tasks, crew.workers, besides=besides, single=True)
+    if pool.cluster is None:
+        yield from imap_unordered(work, tasks, pool.workers, besides=besides, single=True)
         return
-    with _client(crew.cluster) as client:
-        _workers(client, crew.cluster)
-        yield from _on_cluster(_Hand(client, work, tasks, on_progress or (lambda _: None)), crew.cluster, besides)
+    with _client(pool.cluster) as client:
+        _workers(client, pool.cluster)
+        yield from _on_cluster(_Hand(client, work, tasks, on_progress or (lambda _: None)), pool.cluster, besides)
 
 
 def _client(address: str) -> Any:
@@ -264,11 +264,7 @@ class _Hand(Generic[_Task, _Answer]):
         self._waiting[self._client.submit(_at_worker, self._work, task, _about(), pure=False)] = task
 
     def done(self) -> list[Any]:
-        """Tasks that are done, or none after a while.
-
-        Raises:
-            OSError: if the scheduler is gone.
-        """
+        """Tasks that are done, or none after a while."""
         from distributed import wait
 
         try:

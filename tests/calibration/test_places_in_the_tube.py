@@ -221,7 +221,7 @@ def test_planted_roughness_and_dry_friction_come_back(tmp_path: Path) -> None:
     assert run.attrs["motion"] == "free"
     assert "dry friction is fitted and acts on a free robot: the run is a free motion" in run.attrs["warnings"]
     assert "the calibration was fitted to robots held at a pose" in run.attrs["warnings"]
-    with pytest.raises(InputError, match="motion = 'held' knows no dry friction"):
+    with pytest.raises(InputError, match="motion = 'held' has no dry friction"):
         sp.simulate(WIDE, calibration=file, motion="held", timing={"duration": "0.05 s"})
 
 

@@ -147,7 +147,7 @@ def test_designs_under_draws_swim_as_single_robots_do(unsure: sp.Design) -> None
     shares = np.array([[0.3, 0.2], [0.8, 0.25]])
     together = searched.quantity(searched.swum(shares), "forward_velocity")
     wavelength, amplitude = searched.space.values(shares)[1].tolist()
-    friction = float(searched.drawn.values["friction.effective"][5])
+    friction = float(searched.samples.values["friction.effective"][5])
     robot = sp.load(
         "biorob2012-wide",
         **{

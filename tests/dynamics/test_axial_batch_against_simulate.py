@@ -174,7 +174,7 @@ def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) 
 @pytest.mark.parametrize(
     ("ranges", "sentence"),
     [
-        ({"voltage": (3, 4)}, r"ranges\.voltage is not a number that can be drawn"),
+        ({"voltage": (3, 4)}, r"ranges\.voltage is not a number that can be sampled"),
         ({"friction": (0, 1)}, "allowed: factors above 0"),
         ({"friction": (1, 10**400)}, "allowed: low and high"),
         ({"viscosity": (-1, 1)}, r"ranges\.viscosity = -1; allowed: factors above 0"),

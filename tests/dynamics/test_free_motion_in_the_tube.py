@@ -14,7 +14,7 @@ from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.integration import observed_at
 from spirillum.dynamics.return_map import STEPS, ReturnMap
 from spirillum.dynamics.settling import lubrication_resistance
-from spirillum.dynamics.tube_simulation import held_against_check
+from spirillum.dynamics.tube_simulation import compare_with_check
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import least_checked_gap
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -213,9 +213,9 @@ def test_error_is_stated_up_to_the_yaw_at_which_the_table_was_checked(share: flo
     table, steps = motion.robot.table, motion.run.turn.steps
     gap, offset, pitch = (steps[:, STEPS.index(name)] for name in ("gap", "offset", "pitch"))
     yaw = share * np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
-    checked = held_against_check(table, gap=np.maximum(gap, 1e-3), offset=offset, pitch=pitch, yaw=yaw)
+    checked = compare_with_check(table, gap=np.maximum(gap, 1e-3), offset=offset, pitch=pitch, yaw=yaw)
     assert checked.known is known
-    assert ("there is no error estimate" in " ".join(checked.said)) is not known
+    assert ("there is no error estimate" in " ".join(checked.notes)) is not known
 
 
 def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() -> None:

@@ -64,5 +64,5 @@ def test_a_middle_without_a_steady_motion_has_no_intervals() -> None:
     known = posterior()
     found = free_motion(WIDE, fit=fit_of_posterior(known), roughness=ROUGH)
     orbiting = found._replace(run=found.run._replace(lying=replace(found.run.lying, state="orbits")))
-    with pytest.raises(sp.InputError, match="its middle comes to no steady motion"):
+    with pytest.raises(sp.InputError, match="its median reaches no steady motion"):
         intervals_of_free_motion(orbiting, known, posterior_for="new")

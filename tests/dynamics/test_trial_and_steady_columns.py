@@ -138,7 +138,7 @@ def test_a_magnetic_robot_in_one_piece_has_a_trial_and_the_reason_why_nothing_is
     assert found.trial is not None
     assert found.steady is not None
     assert math.isfinite(found.trial.values["forward_velocity"])
-    assert "drive.kind = 'magnetic': the field tells one time of a turn from another" in found.steady.reason
+    assert "drive.kind = 'magnetic': the motion depends on the phase of the field" in found.steady.reason
 
 
 def test_without_a_table_the_reason_says_how_to_get_one() -> None:

@@ -11,7 +11,7 @@ import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.registry import figures_of
-from spirillum.studies.columns import AT_PLACES, BandTask
+from spirillum.studies.columns import AT_POSES, BandTask
 from spirillum.view.figures.style import look_of_model
 
 MODELS = ["sbt", "walled"]
@@ -67,7 +67,7 @@ def test_every_entry_is_what_predict_says(leaning: Any, banded: Any) -> None:
         found = dataset.sel(**here, model="walled", friction="rotor")
         np.testing.assert_allclose(found["gap_at_place"], one.band.gap, rtol=1e-12)
         np.testing.assert_allclose(found["pitch_at_place"], one.band.pitch, rtol=1e-12)
-        for name in AT_PLACES:
+        for name in AT_POSES:
             np.testing.assert_allclose(found[f"{name}_at_place"], getattr(one.band.swimming, name), rtol=1e-12)
             limits = [float(found[f"{name}_{end}"]) for end in ("low", "high")]
             assert limits == pytest.approx(one.band.limits(name), rel=1e-12)
@@ -148,7 +148,7 @@ def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, 
     claims = evaluated(sp.study({**question, "models": ["slender"], "grid": grid}))
     (slower,) = [claim for claim in claims if claim.claim == "Robots travel slower in the narrow channel"]
     assert slower.verdict == "undecidable"
-    assert "no model of this study knows the channel's walls" in slower.reason
+    assert "no model of this study has the channel's walls" in slower.reason
 
 
 @pytest.mark.usefixtures("unplaced")

@@ -64,7 +64,7 @@ def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
     for end, limit in zip(("low", "high"), shown.band("forward_velocity", "sbt"), strict=True):
         stored = dataset[f"forward_velocity_interval_{end}"].sel(channel="narrow", model="sbt", friction="rotor")
         assert limit == pytest.approx(stored.values)
-    assert "Shades: 95 % intervals of the posterior (sbt, friction model 'rotor')" in shown.place_words
+    assert "Shades: 95 % intervals of the posterior (sbt, friction model 'rotor')" in shown.pose_words
     low, high = (dataset[f"forward_velocity_interval_{end}"].sel(model="sbt") for end in ("low", "high"))
     middle = dataset["forward_velocity"].sel(model="sbt")
     assert bool(((low < middle) & (middle < high)).all())

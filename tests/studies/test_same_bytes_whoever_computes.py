@@ -21,7 +21,7 @@ import spirillum as sp
 from spirillum.files import Stored, region_files, write_pieces
 from spirillum.results import study_store
 from spirillum.studies import regions, run
-from spirillum.worker_pool import checked_crew
+from spirillum.worker_pool import pool_of_workers
 
 AT = "0.5 Hz", "1 Hz"
 GRID = {
@@ -309,7 +309,7 @@ def test_a_scheduler_that_is_not_there_gets_a_sentence(
         sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr", workers=address)
     assert time.monotonic() - begun < 60.0
     with pytest.raises(sp.InputError, match="workers = 0"):
-        checked_crew(0, None)
+        pool_of_workers(0, None)
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.tube_pose import Seat
-from spirillum.swimming.band import TOLERANCE, at_place, band_places, left_open
+from spirillum.swimming.band import TOLERANCE, at_pose, band_poses, left_open
 from spirillum.swimming.steady import Swimming
 
 WIDE = "biorob2012-wide"
@@ -24,7 +24,7 @@ RADIUS = 20e-3
 
 def places(model: Any, placement: dict[str, Any] | None = None, **fields: Any) -> list[Placement]:
     robot = sp.load(WIDE, **{name.replace("__", "."): value for name, value in fields.items()})
-    return band_places(RobotBatch.of(robot, Placement.of(placement)), model)
+    return band_poses(RobotBatch.of(robot, Placement.of(placement)), model)
 
 
 @pytest.fixture
@@ -175,8 +175,8 @@ def test_places_are_resolved_as_a_band_needs(walled: Any) -> None:
     batch = RobotBatch.of(sp.load(WIDE))
     place = Placement.of({"gap": 1e-3, "pitch": 0.0})
     assert batch.options.tube.tolerance == 0.005
-    assert at_place(batch, place).options.tube.tolerance == TOLERANCE
-    assert at_place(batch, place).placement == place
+    assert at_pose(batch, place).options.tube.tolerance == TOLERANCE
+    assert at_pose(batch, place).placement == place
 
 
 def test_comparison_stays_at_the_reference_place(leaning: Any) -> None:

@@ -137,7 +137,7 @@ def test_axial_motion_is_that_of_the_steady_states(hand: str) -> None:
             assert found[name][n] == pytest.approx(getattr(one, name), rel=1e-9), name
     batch.step(1.0, remote=False)
     assert batch.observe()["position"] == pytest.approx(found["position"], rel=1e-12)
-    with pytest.raises(sp.InputError, match=r"ranges\.battery\.voltage is not a number that can be drawn"):
+    with pytest.raises(sp.InputError, match=r"ranges\.battery\.voltage is not a number that can be sampled"):
         sp.AxialBatch(robot, 2, model="rft", ranges={"battery.voltage": (1.0, 2.0)})
 
 

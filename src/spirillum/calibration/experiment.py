@@ -65,14 +65,10 @@ class Ratio:
     """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
 
     def error_of_mean(self, error: Samples | float) -> Samples:
-        """Standard error of each mean, SI: see `spirillum.swimming.drawn_resistance.error_of_mean`.
-
-        Args:
-            error: relative error of one trial by the scatter, (robots,), (draws, 1) or a number; NaN where unknown.
-        """
+        """Standard error of each mean, SI, from the relative error of one trial; NaN where it is unknown."""
         return error_of_mean(error, self.stated, self.scale, self.trials)
 
-    def drawn_error(self, count: int, rng: np.random.Generator) -> Samples:
+    def sampled_error(self, count: int, rng: np.random.Generator) -> Samples:
         """Draws of the relative error of one trial, given the scatter, (count, 1); NaN without repeated trials.
 
         Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.

@@ -38,7 +38,7 @@ from spirillum.calibration.identifiability import (
     identified,
     torque_error,
 )
-from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit, paper_fit
+from spirillum.calibration.least_squares import LeastSquares, least_squares_fit, paper_fit, sampled_fit
 from spirillum.calibration.methods import METHODS
 from spirillum.calibration.parameters import LEVEL, UNWALLED, Estimate, assumed_uncertainties, free_names, is_free_in
 from spirillum.calibration.posterior import Sampling, sampled
@@ -58,13 +58,7 @@ from spirillum.swimming.steady import requirements
 
 
 def is_fitted_in_tube(asked: str, free: str | Sequence[str] | None, method: str) -> bool:
-    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters.
-
-    Args:
-        asked: name of a model, or `auto`.
-        free: free parameters, as `fit_model` takes them.
-        method: method of the fit; the paper's inverts drag factors.
-    """
+    """Return whether a fit may include the walls: requested by name, or with `auto` allowed by its free parameters."""
     if asked != AUTO:
         return asked == WALLED
     return method != "paper" and is_free_in(WALLED, free)
@@ -213,7 +207,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
 def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
     """Intervals from draws around the best fit, in coordinates."""
     rng = np.random.default_rng(1)
-    z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
+    z, tau = sampled_fit(problem, fit, _FRICTION_DRAWS, rng)
     draws = problem.values(z)
     values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
     given, within, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
@@ -326,16 +320,11 @@ def _middle(draws: Samples) -> Estimate:
 def _friction(
     problem: Problem, z: Samples, best: Samples, error: Mapping[Quantity, float], reading: str, rng: np.random.Generator
 ) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...], tuple[Estimate, ...]]:
-    """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it.
-
-    Returns:
-        With the constants of fluid and motor as they are; with their stated uncertainties; and with the error of the
-        model's torque too, without intervals where that is not known.
-    """
+    """B_eff of every robot: with constants as they are, with their uncertainties, and with the torque's error too."""
     if "friction" not in problem.free:
         return (), (), ()
     ratio = problem.experiment.motor_rate
-    own_error = error.get("motor_rate", ratio.drawn_error(z.shape[0], rng))
+    own_error = error.get("motor_rate", ratio.sampled_error(z.shape[0], rng))
     rates = ratio.mean + ratio.error_of_mean(own_error) * rng.normal(size=(z.shape[0], problem.experiment.size))
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
     own = np.random.default_rng(2)  # one fluid, one motor and one model for all tails

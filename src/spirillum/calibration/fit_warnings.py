@@ -48,12 +48,7 @@ _OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
 
 
 def check_plausible(problem: Problem, z: Samples) -> None:
-    """Refuse an implausible fit: most often the observations are in other units.
-
-    Raises:
-        UnexplainedError: if the median misfit exceeds a factor of ten, or a parameter with a wide prior lies more than
-            five standard deviations from its middle.
-    """
+    """Raise `UnexplainedError` for an implausible fit: most often the observations are in other units."""
     source, model = problem.experiment.source, problem.model.name
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)

@@ -94,13 +94,7 @@ class Forward:
         return kinematics(self.balance(draws))
 
     def motor_rate(self, balance: TorqueBalance, draws: Draws, friction: Samples) -> Samples:
-        """omega_m at full throttle with B_eff in the joint, from (15), (17) and (18), rad/s, (draws, robots).
-
-        Args:
-            balance: `balance` of the draws.
-            draws: parameters.
-            friction: B_eff, N m s/rad.
-        """
+        """omega_m at full throttle with B_eff in the joint, from (15), (17) and (18), rad/s, (draws, robots)."""
         motor = self._motor(draws)
         body, tail = rates_per_torque(balance, friction_torques("rotor", friction, friction))
         per_current = motor.joint_torque_constant * (tail - body)
@@ -127,13 +121,7 @@ class Forward:
         return found
 
     def printed_turning(self, draws: Draws, motor_rate: Samples, tail_share: Samples) -> Samples:
-        """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates, (draws, robots).
-
-        Args:
-            draws: parameters.
-            motor_rate: omega_m, rad/s.
-            tail_share: observed omega/omega_m of each robot; NaN: as the model turns the body.
-        """
+        """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates, (draws, robots)."""
         s = self.balance(draws)
         torque, tail, _ = self._at_motor_rate(kinematics(s).turning, draws, motor_rate, tail_share)
         found: Samples = s.body_rate_as_printed(torque, tail) / tail

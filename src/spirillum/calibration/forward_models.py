@@ -32,7 +32,7 @@ from spirillum.kernels.native import thread_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement, gap_on_asperities
 from spirillum.robot.robot import Robot, with_numbers
-from spirillum.swimming.band import band_places
+from spirillum.swimming.band import band_poses
 from spirillum.swimming.drawn_resistance import Draws, TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.model_choice import WALLED, has_table
@@ -59,7 +59,7 @@ def place_ranges(batch: RobotBatch, model: SwimmerModel, names: Sequence[str]) -
         radius = 0.5 * float(one.body_diameter[0])
         rough = (ROUGHNESS_BAND[0] * radius, ROUGHNESS_BAND[1] * radius)
         known = {"gap": float(gap_on_asperities(rough[0]))} if "roughness" in names else {}
-        places = band_places(one.placed(Placement().model_copy(update=known)), model)
+        places = band_poses(one.placed(Placement().model_copy(update=known)), model)
         gaps = [place.gap or 0.0 for place in places]
         # The steepest pitch depends on the gap; what holds at every gap is the least of them.
         steepest = min(max(place.pitch or 0.0 for place in places if place.gap == gap) for gap in gaps)

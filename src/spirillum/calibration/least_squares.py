@@ -309,14 +309,10 @@ def _discrepancy(
     return found
 
 
-def drawn_fit(
+def sampled_fit(
     problem: Problem, fit: LeastSquares, count: int, rng: np.random.Generator
 ) -> tuple[Samples, dict[Quantity, Samples]]:
-    """Draws around a fit: discrepancies given the residuals, then the parameters given each discrepancy.
-
-    Returns:
-        Coordinates, (draws, free numbers), and discrepancies by quantity, (draws,).
-    """
+    """Samples around a fit: coordinates (draws, free numbers), and discrepancies by quantity, (draws,)."""
     squares = _squares(problem, fit.z, fit.error)
     predicted = problem.predicted_at(fit.z)
     columns = sensitivities(problem, fit.z)

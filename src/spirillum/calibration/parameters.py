@@ -289,13 +289,7 @@ def is_free_in(model: str, free: str | Sequence[str] | None) -> bool:
 
 
 def free_names(free: str | Sequence[str] | None, model: str, *, released: bool = False) -> tuple[str, ...]:
-    """Names of the free parameters.
-
-    Args:
-        free: names, or one text with commas; None: the default ones.
-        model: name of the model.
-        released: trials are fitted, in which the run decides where the robot lies.
-    """
+    """Names of the free parameters, from names or one text with commas; the default ones for None."""
     if free is None:
         return _FREE_IN_TRIALS if released else DEFAULT_FREE[model]
     names = listed_names(free)
@@ -372,11 +366,7 @@ def _possible_models(model: str, free: str | Sequence[str] | None) -> tuple[str,
 
 
 def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, float]:
-    """Stated uncertainties of what a fit takes from the robot: parameter to half of its relative 95 % interval.
-
-    Args:
-        given: field of the robot (see `ASSUMABLE`) to a share, such as ``"5%"`` or 0.05; None: none.
-    """
+    """Stated uncertainties of what a fit takes from the robot: parameter to half of its relative 95 % interval."""
     found = {}
     for field, share in (given or {}).items():
         if field not in ASSUMABLE:

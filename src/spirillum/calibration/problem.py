@@ -97,11 +97,7 @@ class Problem:
         return found
 
     def draws(self, z: Samples) -> dict[str, Samples]:
-        """Parameters at coordinates.
-
-        Returns:
-            Parameter to (draws, robots), or (draws, 1) where all robots share it.
-        """
+        """Parameters at coordinates, (draws, robots), or (draws, 1) where all robots share one."""
         values = self._all_values(z)
         found = {name: values[:, places] for name, places in self._places.items()}
         if "roughness" in found:  # a robot that rests on its asperities

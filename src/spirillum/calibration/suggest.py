@@ -302,12 +302,7 @@ def _jackknife(left_out: Samples) -> float:
 
 
 def _information(seen: Samples, noise: Samples) -> tuple[float, Samples, Samples]:
-    """Expected information, bits, with the covariances of the predicted means and of what is seen of them.
-
-    Args:
-        seen: predicted means, relative, (quantities, draws).
-        noise: variance of discrepancy and errors, (quantities, draws).
-    """
+    """Expected information, bits, with the covariances of the predicted means and of their observations."""
     spread = np.cov(seen).reshape(len(seen), len(seen))
     errors = np.diag(noise.mean(axis=1))
     gain = 0.5 * (np.linalg.slogdet(spread + errors)[1] - np.linalg.slogdet(errors)[1]) / np.log(2.0)

@@ -109,7 +109,7 @@ def _complete_models(incomplete: str) -> list[str]:
     without={
         **NO_FORM,
         "resolution.phases": "an option of the robot, model.tube.phases",
-        "calibrated": "factors stand for walls that are not in the flow",
+        "calibrated": "factors represent walls that are not in the flow",
     },
     complete={"model": _complete_models, "frame": complete_frames},
     robot=optional_robot("A preset's name or a TOML file; none with --run."),

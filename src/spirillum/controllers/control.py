@@ -79,12 +79,7 @@ _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
 
 
 def record(run: LoopRun, plant: Plant) -> xr.Dataset:
-    """A controlled run.
-
-    Returns:
-        Dataset over `time` (the robot after every event), `frame_time` (the camera), `reading_time` (the meter) and
-        `decision_time` (the controller), SI.
-    """
+    """A controlled run over `time`, `frame_time`, `reading_time` (meter) and `decision_time` (controller), SI."""
     import xarray as xr
 
     moments = run.moments

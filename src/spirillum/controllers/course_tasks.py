@@ -52,7 +52,6 @@ class _Watching(Controller):
     """A controller that follows the robot; an oracle is given position and coming flow."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, *, knowing: bool = False) -> None:
-        """Begin."""
         self.knowing = self.blind = knowing
         seen = lab if not knowing else Lab.of(_EXACT).model_copy(update={"remote": lab.remote})
         self._follower = PositionFilter(seen, speed / duty, walk=_WALK, drift=_DRIFT)
@@ -104,7 +103,6 @@ class KeepCourse(_Watching):
         flow: FlowPulse | None = None,
         carried: float = 0.0,
     ) -> None:
-        """Begin."""
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._flow, self._carried = self._way * set_speed, flow, carried
         self._leash, self._course, self._until = leash * _CATCH_UP * set_speed, 0.0, 0.0
@@ -127,7 +125,6 @@ class SaveBattery(_Watching):
     def __init__(
         self, lab: Lab, speed: float, duty: float, set_speed: float, band: float, *, knowing: bool = False
     ) -> None:
-        """Begin."""
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._band = set_speed, band
         self._on = True
@@ -146,7 +143,6 @@ class Steady(Controller):
     blind = True
 
     def __init__(self, duty: float, *, share: float = 1.0, cycle: float = 5.0) -> None:
-        """Begin."""
         self._duty, self._share, self._cycle = duty, share, cycle
 
     def decide(self, news: Message) -> float:

@@ -152,15 +152,7 @@ class PositionFilter:
     def __init__(
         self, lab: Lab, speed: float, *, start: float = 0.0, walk: float = _SPEED_WALK, drift: float = _DRIFT
     ) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            speed: predicted at full duty, m/s; its own uncertainty is as large.
-            start: place at time 0, m.
-            walk: sigma_s over the predicted speed, 1/sqrt(s).
-            drift: sigma_w, m/s.
-        """
+        """Start at a speed of full duty, m/s, as uncertain as large; `walk` in 1/sqrt(s), `drift` in m/s."""
         self._noise = max(lab.camera.position_noise, 1e-6) ** 2
         self._wander, self._memory = lab.camera.position_wander, lab.camera.memory
         self._delay = lab.remote.delay

@@ -144,12 +144,7 @@ class Lab(Section):
 
     @classmethod
     def of(cls, value: Self | str | Path | Mapping[str, Any] | None) -> Self:
-        """A lab from what a caller may give.
-
-        Args:
-            value: a lab, its tables by name, a TOML file with them, or None: the defaults. A number is a quantity in SI
-                in tables, and none in a file.
-        """
+        """A lab from itself, its tables by name, a TOML file or None; only tables may give numbers, in SI."""
         if isinstance(value, cls):
             return value
         if isinstance(value, str | Path):
@@ -175,12 +170,7 @@ class Lab(Section):
 
     @classmethod
     def read(cls, path: str | Path | None, changes: Mapping[str, Any]) -> Self:
-        """A lab from its file with some fields changed.
-
-        Args:
-            path: TOML file; None: the defaults.
-            changes: values by dotted name, as ``{"camera.latency": "50 ms"}``; quantities with their unit.
-        """
+        """A lab from its file, with fields changed by dotted name, as ``{"camera.latency": "50 ms"}``."""
         tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
         for name, value in changes.items():
             table, dot, entry = name.partition(".")

@@ -107,11 +107,7 @@ def learnt(
     sights: Sequence[Detection],
     readings: Sequence[MeterReading],
 ) -> RobotEstimate | None:
-    """The posterior of friction and gap.
-
-    Returns:
-        Medians and 95 % intervals; None before there are two blocks.
-    """
+    """Medians and 95 % intervals of friction and gap; None before there are two blocks."""
     blocks = [block for number, one in enumerate(stretches) for block in _blocks(paths, number, one, sights)]
     if len(blocks) < 2:
         return None
@@ -298,7 +294,6 @@ class Learner:
     """What has been seen of a run, and the factors estimated from it."""
 
     def __init__(self, lab: Lab, bank: Bank) -> None:
-        """Begin."""
         self._lab, self._bank = lab, bank
         self._sights: list[Detection] = []
         self._readings: list[MeterReading] = []

@@ -249,23 +249,7 @@ def run_loop(
     pace: Callable[[float], None] | None = None,
     progress: Progress | None = None,
 ) -> LoopRun:
-    """Let a controller drive a plant.
-
-    Args:
-        plant: the robot, where its run begins; it is moved.
-        controller: a new one.
-        lab: sensors and remote.
-        duration: of the run, s.
-        seed: of all errors of sensors and remote.
-        senses: camera, meter and remote of this run; None: those of the lab. They are closed at its end.
-        flow: the pulse of flow of this run; None: none.
-        pace: told the time of each decision before it is taken, s; it may wait.
-        progress: called with stage, number done, and total.
-
-    Returns:
-        The run; with an interrupt, an end of the channel or a wrong command what was done until then. The drive is off
-        at its end.
-    """
+    """Let a controller drive a plant; an interrupt or a wrong command ends the run, and the drive is off at its end."""
     loop = _Loop(plant, controller, lab, senses or Senses(lab, seed), flow)
     loop.run.moments.append(plant.observe())
     loop.run.flows.append(0.0)

@@ -90,7 +90,6 @@ class Steer(Controller):
     """Feedback of the lateral position."""
 
     def __init__(self, lab: Lab, known: Steering, law: Law, *, knowing: bool = False) -> None:
-        """Begin."""
         self.knowing = self.blind = knowing
         self._known, self._law, self._delay = known, law, lab.remote.delay
         self._rate = known.rate
@@ -160,12 +159,6 @@ class Replay(Controller):
     blind = True
 
     def __init__(self, rate: float, tilts: Sequence[tuple[float, complex]] = ()) -> None:
-        """Begin.
-
-        Args:
-            rate: of the field, rad/s.
-            tilts: times, s, from which on a tilt is sent, and the tilts, rad.
-        """
         self._rate, self._tilts = rate, tilts
 
     def decide(self, news: Message) -> Command:

@@ -40,15 +40,6 @@ class StopController(Controller):
     """From camera alone."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, goal: float, tolerance: float) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            speed: predicted while the drive is on, m/s, with its sign.
-            duty: of the drive while it is on.
-            goal: where to stop, m.
-            tolerance: how far beside it is good, m.
-        """
         self._follower = PositionFilter(lab, speed / duty)
         self._delay, self._duty, self._way = lab.remote.delay, duty, float(np.sign(speed))
         self._aim, self._back = goal - self._way * _SHORT * tolerance, _HYSTERESIS * tolerance
@@ -84,7 +75,6 @@ class Timed(Controller):
     blind = True
 
     def __init__(self, lab: Lab, on: float, duty: float) -> None:
-        """Begin."""
         self._off_at, self._duty = on - 0.5 * lab.remote.period, duty
 
     def decide(self, news: Message) -> float:
@@ -102,7 +92,6 @@ class KnowingStop(Controller):
     knowing = True
 
     def __init__(self, lab: Lab, duty: float, goal: float, way: float, flow: FlowPulse | None, carried: float) -> None:
-        """Begin."""
         self._delay, self._duty, self._goal, self._way = lab.remote.delay, duty, goal, way
         self._flow, self._carried = flow, carried
 

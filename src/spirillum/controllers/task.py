@@ -117,13 +117,7 @@ class Task(Options):
 
 
 def carried_by_flow(plant: Plant, velocity: float, duration: float) -> float:
-    """Way of the robot, its drive off, over that of a mean flow that carries it; 0 without a flow.
-
-    Args:
-        plant: the robot where it starts; it is not moved.
-        velocity: mean flow, m/s.
-        duration: how long it lasts, s.
-    """
+    """Distance of the robot, its drive off, over that of a mean flow that carries it; 0 without a flow."""
     if not velocity or not duration:
         return 0.0
     moved = []
@@ -194,11 +188,7 @@ def run_job(
 
 
 def outcome_of(job: ControlJob) -> Outcome:
-    """Do a run for its score alone.
-
-    Raises:
-        KeyboardInterrupt: if the run was interrupted.
-    """
+    """Do a run for its score alone; an interrupt is raised again."""
     plant, drawn = draw_plant(job)
     run = run_job(job, plant, drawn)
     if run.interrupted:

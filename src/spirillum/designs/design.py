@@ -80,7 +80,7 @@ def design(
             designs lack.
         bench: `mandrel`, `clearance`.
         model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from
-            some designs that are solved for, the best of them in the end. `slender` is asked itself where more than
+            some designs that are solved for, the best of them in the end. `slender` is evaluated itself where more than
             three fields of the tail, or fields of the body, are varied and nothing is unknown. `auto` is that of the
             posterior, else `tube` for a robot in a channel, and `slender` without one, or `sbt` where the flow cannot
             be learned.
@@ -110,8 +110,8 @@ def design(
     wound = Manufacturability.of(bench)
     wound.check(space.batch(np.array([[0.0], [1.0]]) * np.ones(space.size)))
 
-    def under(drawn: SampledRobots) -> Evaluation:
-        return Evaluation(space, chosen, objectives, conditions, wound, drawn, options.confidence, rate)
+    def under(samples: SampledRobots) -> Evaluation:
+        return Evaluation(space, chosen, objectives, conditions, wound, samples, options.confidence, rate)
 
     searched = under(unknowns.draws(options.draws, options.seed))
     archive, on_progress = Archive(), progress or (lambda _what, _done, _total: None)
@@ -126,7 +126,7 @@ def design(
     if len(objectives) > 1:
         front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, on_progress=on_progress)
     drawn = unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED, _SETS)
-    stated = replace(searched, drawn=drawn)
+    stated = replace(searched, samples=drawn)
     answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
     answer = replace(answer, learned=learned, model_reason=choice.reason)
     if choice.model == WALLED and rate is None and posterior is None:
@@ -166,9 +166,9 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
         why = outside[0].sentence()
     else:
         swum = searched.swum(shares[None])
-        asked = [goal.quantity.name for goal in searched.objectives]
-        asked += [condition.quantity.name for condition in searched.conditions]
-        undefined = [name for name in asked if np.isnan(searched.quantity(swum, name)).all()]
+        requested = [goal.quantity.name for goal in searched.objectives]
+        requested += [condition.quantity.name for condition in searched.conditions]
+        undefined = [name for name in requested if np.isnan(searched.quantity(swum, name)).all()]
         if undefined and swum.valid.all():
             return (
                 f"{undefined[0]} has no value for {searched.space.robot.name}, as its drive, joint and placement are, "
@@ -176,8 +176,8 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
             )
         worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
         kept = [words for words, excess in worst.items() if excess > 0]
-        limits = reynolds_limits(searched.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
-        inertia = stokes_flow_problem(searched.drawn.batch, limits)
+        limits = reynolds_limits(searched.samples.batch, swum.reynolds_number, swum.tail_reynolds_number)
+        inertia = stokes_flow_problem(searched.samples.batch, limits)
         why = inertia.replace("; ", ", ") or (f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion")
     words = ", ".join(f"{path} = {with_unit(value, _unit(searched.space, path))}" for path, value in values.items())
     return (
@@ -218,11 +218,11 @@ def _answer(
     uncertainty = None
     if not unknowns.known:
         uncertainty = Uncertainty(
-            stated.drawn.number,
+            stated.samples.number,
             low,
             high,
-            _met(objective, own[0], stated.drawn.sets),
-            _deciding(stated.drawn.values, own[0]),
+            _met(objective, own[0], stated.samples.sets),
+            _deciding(stated.samples.values, own[0]),
         )
     alternatives = [_alternative("today", None, stated, own[0], unknowns)]
     leading = best_apart(searched, archive, best, CONFIRMED)
@@ -306,7 +306,7 @@ def _alternative(
         better = objective.sign * (best - values) > 0
     else:
         better = (objective.target.excess(best) <= 0) & ~(objective.target.excess(values) <= 0)
-    share = _share(better, stated.drawn.sets) if not unknowns.known else (float(np.mean(better)),) * 3
+    share = _share(better, stated.samples.sets) if not unknowns.known else (float(np.mean(better)),) * 3
     buildable = all_hold(stated.limits(None if shares is None else shares[None]))
     return Alternative(
         name,
@@ -355,11 +355,11 @@ def _warnings(
     if stated.model.name in known.calibration:
         found += calibration_warnings(built, stated.model.name)
     reading = friction_reading(given.friction.reading)
-    if not {"friction.effective", "friction", "shared_friction"} & set(stated.drawn.values):
+    if not {"friction.effective", "friction", "shared_friction"} & set(stated.samples.values):
         found += drive_warnings(known, stated.model, reading, swum, stated.tail_rate)
     found += unknowns.fit.answer_warnings(known, stated.model, reading, stated.tail_rate)
     found += _near_step_out(built, swum)
-    limits = reynolds_limits(stated.drawn.batch, swum.reynolds_number, swum.tail_reynolds_number)
+    limits = reynolds_limits(stated.samples.batch, swum.reynolds_number, swum.tail_reynolds_number)
     found += [limit.caution() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     found += reynolds_warnings(limits).values()
     if any("end of its range" in words for words in bound_by):

@@ -114,7 +114,7 @@ class Design(DisplayMixin):
     front: Mapping[str, Samples] | None = field(repr=False)
     """With two objectives, designs of which none is better in both: fields and both objectives, (points,)."""
     searched: Evaluation = field(repr=False, compare=False)
-    """Designs under the draws of the search, for those who want to know more of them."""
+    """Designs under the draws of the search, for further analysis."""
     bound_by: tuple[str, ...]
     """What the best design touches: ends of ranges and conditions."""
     swum: int
@@ -331,14 +331,10 @@ _SHORT = {"today": "today's design", "runner_up": "the runner-up"}
 
 
 def lead_warnings(answer: Design) -> tuple[Note, ...]:
-    """Sentences on fields without influence, on a better design, and on differences below the error of the objective.
-
-    Returns:
-        One sentence for each such error; none where every lead is larger.
-    """
-    said = _without_effect(answer)
-    if len(said) == len(answer.profiles):  # every design is the best one
-        return said
+    """Notes on fields without influence, on a better design, and on leads below the error of the objective."""
+    notes = _without_effect(answer)
+    if len(notes) == len(answer.profiles):  # every design is the best one
+        return notes
     leads: dict[tuple[float, str], list[str]] = {}
     best, sign = answer.objective, answer.objectives[0].sign
     for other in answer.alternatives:
@@ -351,10 +347,10 @@ def lead_warnings(answer: Design) -> tuple[Note, ...]:
                 f"{ALTERNATIVES[other.name]}, outside these ranges, is better than the best one within them by "
                 f"{percent(-lead)}; widen the ranges"
             )
-            said += (Note("design-at-limit", words),)
+            notes += (Note("design-at-limit", words),)
         elif lead < error[0]:
             leads.setdefault(error, []).append(f"{_SHORT[other.name]} by {percent(lead)}")
-    return said + tuple(
+    return notes + tuple(
         Note(
             "design-tie",
             f"the best design leads {' and '.join(led)}, within the error of {percent(error)} {of}; they may be equal",

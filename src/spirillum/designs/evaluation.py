@@ -183,7 +183,7 @@ class Evaluation:
     objectives: tuple[Objective, ...]
     conditions: tuple[Condition, ...]
     bench: Manufacturability
-    drawn: SampledRobots
+    samples: SampledRobots
     confidence: float
     """Share of the draws that must satisfy a condition."""
     tail_rate: float | None = None
@@ -192,9 +192,9 @@ class Evaluation:
     def swum(self, shares: Samples | None) -> Swimming:
         """Every design under every draw, the draws of one design one after the other; None: the robot as it is."""
         if shares is None:
-            return self._swim(self.drawn.batch)
-        designs, draws = len(shares), self.drawn.number
-        batch = self.drawn.batch.taken(np.tile(np.arange(self.drawn.batch.size), designs))
+            return self._swim(self.samples.batch)
+        designs, draws = len(shares), self.samples.number
+        batch = self.samples.batch.taken(np.tile(np.arange(self.samples.batch.size), designs))
         columns = {path: np.repeat(column, draws) for path, column in self.space.columns(shares).items()}
         return self._swim(batch.with_values(columns))
 
@@ -203,15 +203,11 @@ class Evaluation:
 
     def quantity(self, swum: Swimming, name: str) -> Samples:
         """A quantity of what `swum` gives, (designs, draws)."""
-        found: Samples = np.asarray(getattr(swum, name)).reshape(-1, self.drawn.number)
+        found: Samples = np.asarray(getattr(swum, name)).reshape(-1, self.samples.number)
         return found
 
     def scores(self, shares: Samples) -> DesignScores:
-        """What designs are worth; those that cannot be built are not swum.
-
-        Args:
-            shares: of the ranges, (designs, variables).
-        """
+        """What designs are worth, by shares of the ranges, (designs, variables); impossible ones are not swum."""
         count = len(shares)
         excess = self.unbuildable(shares)
         cost = np.tile(REFUSED + excess, (len(self.objectives), 1))
@@ -254,7 +250,7 @@ class Evaluation:
 
     def broken(self, swum: Swimming) -> Samples:
         """Largest excess over all conditions, (designs,); 0 or less where all are kept."""
-        found = np.full(swum.valid.size // self.drawn.number, -_MOST)
+        found = np.full(swum.valid.size // self.samples.number, -_MOST)
         for condition in self.conditions:
             found = np.maximum(found, self.excess(condition, swum))
         return found

@@ -223,7 +223,7 @@ def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callabl
 def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
     """Whether a search learns the flow of a model: always with walls, else where the fields allow it.
 
-    A model in closed form is asked itself.
+    A model in closed form is evaluated itself.
     """
     if model.closed_form:
         return False
@@ -243,10 +243,10 @@ def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
     return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
 
 
-def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
+def chosen_model(requested: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
     """The named model, or with `auto` the most complete one that applies to the robot."""
-    choice = choose_model(asked, robot, fit=unknowns.fit)
-    if asked != AUTO or unknowns.posterior is not None:
+    choice = choose_model(requested, robot, fit=unknowns.fit)
+    if requested != AUTO or unknowns.posterior is not None:
         return choice
     own, strange = _changing_the_flow(space, unknowns)
     if not strange and len(own) <= _MOST_FIELDS:
@@ -286,11 +286,7 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 def learned_best(
     blank: Evaluation, unknowns: Unknowns, name: str, seed: int, on_progress: Progress, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
-    """The best design by a model that solves for the flow.
-
-    Returns:
-        Designs with the learned model, all that the last search has swum, the best of them, and how well it is known.
-    """
+    """Designs with the learned model, all that the last search has swum, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
     empty = replace(blank, model=corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))

@@ -217,7 +217,7 @@ class ConfirmedDesign:
     """One of the best designs with what it does in a trial."""
 
     shares: Samples
-    """Its place in the ranges that are searched, (variables,)."""
+    """Its position in the ranges that are searched, (variables,)."""
     robot: Robot
     held: float
     """Forward velocity held at its pose, m/s; NaN where that would have to be solved for."""
@@ -225,14 +225,7 @@ class ConfirmedDesign:
 
 
 def best_apart(searched: Evaluation, archive: Archive, best: Samples, count: int) -> list[Samples]:
-    """Return the best designs, the best of all first, each of which differs from those before it by a tenth of a range.
-
-    Args:
-        searched: designs under the draws of the search.
-        archive: all designs of the search.
-        best: the best of all.
-        count: how many at most.
-    """
+    """Return the best designs, the best of all first, each of which differs from those before by a tenth of a range."""
     shares, values = archive.all()
     objective = searched.objectives[0]
     worth = values[0] * (1.0 if objective.target is not None else objective.sign)

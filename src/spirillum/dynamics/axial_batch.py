@@ -43,7 +43,7 @@ def checked_ranges(axial: AxialRobot, ranges: Mapping[str, Any] | None) -> dict[
     for name, given in (ranges or {}).items():
         if name not in allowed:
             raise InputError(
-                f"ranges.{str(name)[:60]} is not a number that can be drawn{did_you_mean(str(name)[:60], allowed)}; "
+                f"ranges.{str(name)[:60]} is not a number that can be sampled{did_you_mean(str(name)[:60], allowed)}; "
                 f"allowed: {', '.join(allowed)}"
             )
         pair = list(given) if isinstance(given, (tuple, list)) else []
@@ -82,11 +82,11 @@ def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> N
         changed = motor.model_copy(update={"resistance": motor.resistance.model_copy(update=resistance)})
         problem = motor_current_problem(changed, battery.model_copy(update=of_battery))
         if problem:
-            said = ", ".join(f"{name} = {value:g}" for name, value in zip(names, corner, strict=True))
-            raise InputError(f"ranges with {said}: {problem}")
+            stated = ", ".join(f"{name} = {value:g}" for name, value in zip(names, corner, strict=True))
+            raise InputError(f"ranges with {stated}: {problem}")
 
 
-def drawn_numbers(
+def sampled_numbers(
     axial: AxialRobot, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[Samples, Samples]:
     """Numbers of robots sampled from ranges, (count, len(PARAMETERS)), and their factors of the viscosity, (count,)."""
@@ -110,7 +110,7 @@ def posterior_numbers(axial: AxialRobot, posterior: str | Path, count: int) -> S
     known = read_posterior(posterior, steady.model.name)
     if known.places_robots:
         raise InputError(
-            f"{posterior} was fitted to places in the tube, each of which is a flow of its own; allowed: one of drag "
+            f"{posterior} was fitted to poses in the tube, each of which is a flow of its own; allowed: one of drag "
             "factors and friction, or ranges"
         )
     drawn = known.drawn(axial.robot, count, np.random.default_rng(1))
@@ -132,7 +132,7 @@ _POOL = 500
 class AxialBatch:
     """Robots in axial motion, all of them one step at a time; for one thread.
 
-    All are the same robot, or are drawn around it. Arrays have one value for each robot, SI, signed about +x.
+    All are the same robot, or are sampled around it. Arrays have one value for each robot, SI, signed about +x.
     """
 
     @validate_arguments
@@ -159,7 +159,7 @@ class AxialBatch:
             friction: reading of the friction; None: the robot's own.
             calibration: calibration file whose factors replace the robot's.
             placement: where they are held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
-            ranges: what they are drawn from: `friction` and `viscosity`, low and high factor of the robot's own,
+            ranges: what they are sampled from: `friction` and `viscosity`, low and high factor of the robot's own,
                 evenly in the logarithm; other numbers of `axial_robot.PARAMETERS`, such as `battery.voltage`, in SI.
             posterior: file of a calibration's posterior, from whose draws they are taken, before the ranges.
             seed: of the draws.
@@ -217,7 +217,7 @@ class AxialBatch:
         chosen = np.arange(self.count) if which is None else np.flatnonzero(self._chosen("which", which))
         if not len(chosen) or not (self._ranges or self._pool is not None):
             return
-        numbers, viscosity = drawn_numbers(self.axial, len(chosen), rng, self._ranges)
+        numbers, viscosity = sampled_numbers(self.axial, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
             own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
@@ -266,12 +266,12 @@ class AxialBatch:
             duty = np.where(self._chosen("remote", remote), self.axial.duty, 0.0)
         if flow is not None and self.axial.flow is None:
             raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
-        asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
+        requested = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
         states = self.states.copy()
-        self.axial.advance(self.numbers, states, number, asked, carried)
+        self.axial.advance(self.numbers, states, number, requested, carried)
         self._check_stokes(self._rates(states, carried), carried)
-        self.states, self._duty, self._flow = states, asked, carried
+        self.states, self._duty, self._flow = states, requested, carried
         self.time += number
 
     def observe(self) -> dict[str, Samples]:
@@ -298,7 +298,7 @@ class AxialBatch:
             tail_reynolds(batch, rates["tail_rotation_rate"] * thinner),
         )
         limits.append(flow_limit(batch, float(np.abs(flow * thinner).max())))
-        new = {flag: said for flag, said in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
+        new = {flag: note for flag, note in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
         self._inertia += tuple(new)
         self.warnings += tuple(new.values())
 

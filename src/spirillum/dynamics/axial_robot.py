@@ -7,7 +7,7 @@ duty d, imposed mean flow U_m, polarity p and joint torque tau = K_m I, (17) and
     L dI/dt = p d V(|I|) - R(|I|) I - K_b (omega - Omega),
     (U, Omega, omega) = (a, b, c)_tau tau + (a, b, c)_m U_m.
 
-A motor with a curve of torque against rate has no current: its torque stands in its place, with a torque constant of 1,
+A motor with a curve of torque against rate has no current: its torque replaces it, with a torque constant of 1,
 and follows duty and flow at once.
 
 Runs of `simulate`, batches, systems of python-control and FMUs all rest on these numbers and equations.
@@ -91,7 +91,7 @@ PARAMETERS = (
         )
     ),
 )
-"""The numbers in the order of the compiled equations, which know them by their columns."""
+"""The numbers in the order of the compiled equations, which index them by column."""
 STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
 """The state; quantities of the registry. The compiled equations have two integrals of the current behind it."""
 INPUTS = ("duty", "mean_flow")
@@ -121,7 +121,7 @@ class AxialRobot:
     prediction: Prediction
     """The steady motion, with robot, model and friction."""
     values: tuple[float, ...]
-    """Of `PARAMETERS`; those of motor and battery say nothing of a motor with a curve."""
+    """Of `PARAMETERS`; those of motor and battery do not apply to a motor with a curve."""
 
     @classmethod
     def of(cls, steady: Prediction) -> AxialRobot:
@@ -177,7 +177,7 @@ class AxialRobot:
 
     @property
     def outputs(self) -> dict[str, int]:
-        """Its outputs, quantities of the registry, and their places among `OUTPUTS`."""
+        """Its outputs, quantities of the registry, and their indices in `OUTPUTS`."""
         if self.curve is None:
             return {name: place for place, name in enumerate(OUTPUTS)}
         other = {"motor_torque": "drive_torque"}
@@ -201,11 +201,7 @@ class AxialRobot:
         return float(found[0, kernel.CURRENT])
 
     def check_steady(self, duty: float, flow: float) -> list[Note]:
-        """Refuse a robot that moves far outside Stokes flow where a duty and a flow have become steady.
-
-        Returns:
-            A warning for each Reynolds number that is too large for an accurate answer.
-        """
+        """Refuse a robot far outside Stokes flow at a steady duty and flow; return a note for each exceeded limit."""
         batch, current = self.prediction.batch, self.steady_current(self.numbers, duty, flow)
         speed, tail, _ = motion(self.numbers, current, flow)
         limits = reynolds_limits(batch, body_reynolds(batch, speed), tail_reynolds(batch, tail))
@@ -272,14 +268,7 @@ def outputs(p: Samples, states: Samples, duty: Any, flow: Any) -> Samples:
 
 
 def rates(p: Samples, current: float, duty: float, flow: float) -> Samples:
-    """d/dt of the state and its two integrals, (7,), which depends on the current alone.
-
-    Args:
-        p: the robot's numbers, (18,).
-        current: I, A.
-        duty: 0 to 1.
-        flow: imposed mean flow, m/s.
-    """
+    """d/dt of the state and its two integrals, (7,), by the robot's numbers, current, duty and imposed mean flow."""
     found = np.empty(kernel.STATES)
     kernel.rates(p, current, duty, flow, found)
     return found
@@ -370,13 +359,13 @@ def axial_run(prediction: Prediction, timing: Timing, integrator: AxialIntegrato
     dataset = _dataset(robot, moments, duty, integrator.states(robot, moments, duty))
     events = [{"time": switch.time, "what": f"duty {switch.duty:g}"} for switch in switches]
     limits = motion_limits(batch, dataset["forward_velocity"].values, dataset["tail_rotation_rate"].values)
-    said = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
+    notes = [*prediction.warnings, *unused, *check_stokes_flow(batch, limits).values()]
     found = dataset.isel(time=np.isin(moments, time)).assign(_averages(dataset, prediction, switches, end))
     return found.assign_attrs(
         events=json.dumps(events),
         switches=", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
         integrator=integrator.name,
-        **note_attributes(said),
+        **note_attributes(notes),
     )
 
 

@@ -170,12 +170,12 @@ class ModelComparison(DisplayMixin):
     def warnings(self) -> tuple[Note, ...]:
         """What to be careful about, a sentence each; one that holds for some models only names them."""
         count = len(self.predictions)
-        said: dict[Note, list[str]] = {}
+        models_of: dict[Note, list[str]] = {}
         for name, answer in self.predictions.items():
             for note in answer.warnings:
-                said.setdefault(note, []).append(name)
+                models_of.setdefault(note, []).append(name)
         found = [
-            note if len(names) == count else note.prefixed(f"{', '.join(names)}: ") for note, names in said.items()
+            note if len(names) == count else note.prefixed(f"{', '.join(names)}: ") for note, names in models_of.items()
         ]
         calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
         return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
@@ -279,7 +279,7 @@ def compare_models(
             the robot's drive decides, and the models differ in their rates too.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
-            factors that stand for walls in some models and not in others hide how the models differ.
+            factors that represent walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.
@@ -337,10 +337,10 @@ def compare_models(
 
 def _chosen(models: Sequence[str] | None) -> list[str]:
     """Names of the models."""
-    asked = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
-    if not asked:
+    requested = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
+    if not requested:
         raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")
-    names = [find_swimmer_model(name).name for name in asked]
+    names = [find_swimmer_model(name).name for name in requested]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise InputError(f"model '{twice[0]}' is named twice; allowed: each model once")

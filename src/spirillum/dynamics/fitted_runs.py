@@ -25,8 +25,8 @@ from spirillum.notes import Note, note_attributes, notes_in
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.scalars import is_whole
-from spirillum.swimming.drawn_resistance import PosteriorFor, drawn_discrepancy
-from spirillum.swimming.intervals import drawn_batch, intervals_over
+from spirillum.swimming.drawn_resistance import PosteriorFor, sampled_discrepancy
+from spirillum.swimming.intervals import intervals_over, sampled_batch
 from spirillum.swimming.model_choice import ModelChoice, choose_model
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import LEVEL, Intervals, Swimming
@@ -52,52 +52,35 @@ _OVER = ("", "_on", "_steady")
 def chosen_run(
     model: str, motion: str | None, robot: Robot, placement: Placement, fit: Fit
 ) -> tuple[ModelChoice, str, list[Note]]:
-    """Model and motion of a run: the requested ones, else those of the robot and the fit.
-
-    Args:
-        model: name of the model, or `auto`.
-        motion: `free` or `held`; None: `held` with a fitted model of the axial entries, or of one place without dry
-            friction, else `free`, as with a fit of trials.
-        robot: the robot.
-        placement: where it starts.
-        fit: fitted values that are used.
-
-    Returns:
-        Both, and what was chosen instead of the usual, a sentence each.
-    """
+    """Model and motion of a run, the requested ones or those of robot and fit, with a sentence on each exception."""
     choice = choose_model(model, robot, placement=placement, fit=fit)
-    said: list[Note] = []
+    notes: list[Note] = []
     if not choice.fitted:
         if fit.models and choice.model not in fit.models:
             words = (
                 f"{fit.name} was fitted with model '{fit.models[0]}', and the run uses '{choice.model}', on which its "
                 f"factors do not act; use --model {fit.models[0]}"
             )
-            said.append(Note("fit-not-used", words, ("model",)))
-        return choice, motion or "free", said
-    said.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
+            notes.append(Note("fit-not-used", words, ("model",)))
+        return choice, motion or "free", notes
+    notes.append(Note("model-chosen", f"the run uses model '{choice.model}': {choice.reason}", ("model",)))
     chosen = find_swimmer_model(choice.model)
     if motion is None and chosen.placed and fit.friction_coefficient:
         words = "dry friction is fitted and acts on a free robot: the run is a free motion"
-        said.append(Note("model-chosen", words, ("motion",)))
+        notes.append(Note("model-chosen", words, ("motion",)))
         motion = "free"
     if motion is None and (chosen.axial_only or chosen.placed) and not fit.of_trials:
-        why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
+        why = "has the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one pose"
         words = f"model '{choice.model}' {why}: the run is axial motion, with two degrees of freedom"
-        said.append(Note("model-chosen", words, ("motion",)))
-        return choice, "held", said
+        notes.append(Note("model-chosen", words, ("motion",)))
+        return choice, "held", notes
     if motion != "held" and chosen.placed and fit.posterior is None and not fit.of_trials:
-        said.append(CALIBRATED_HELD)
-    return choice, motion or "free", said
+        notes.append(CALIBRATED_HELD)
+    return choice, motion or "free", notes
 
 
-def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
-    """How many draws of a posterior are run.
-
-    Args:
-        draws: the number that is asked for, 0 for the median alone; None: 100.
-        posterior: the posterior; None without one.
-    """
+def sample_count(draws: int | None, posterior: PosteriorFile | None) -> int:
+    """Number of posterior samples that are run: the requested one, 0 for the median alone; None: 100."""
     given: Any = _DRAWS if draws is None else draws
     if not is_whole(given) or not (int(given) == 0 or _FEWEST <= int(given) <= _MOST):
         raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}, or 0")
@@ -146,7 +129,7 @@ def discrepancy_factors(
     whose: PosteriorFor = "new",
 ) -> dict[str, Samples]:
     """Factors of a model's discrepancy on the mean speed and rates of a run of each draw, (draws,) each."""
-    off = drawn_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
+    off = sampled_discrepancy(posterior, predicted, rng, robot if whose == "measured" else None)
     one = np.ones_like(off["advance"])
     if robot.drive is not None and robot.drive.joint == "fixed":
         off["turning"] = one
@@ -173,7 +156,7 @@ def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset
 DRAWS = 40
 """Draws of a posterior that are followed: some second each."""
 _LEAST_SHARE = 0.95
-"""Share of the draws that have to come to a steady motion."""
+"""Share of the draws that have to reach a steady motion."""
 
 
 def intervals_of_free_motion(
@@ -183,7 +166,7 @@ def intervals_of_free_motion(
     lying, robot = found.run.lying, found.prediction.robot
     if lying.state != "steady":
         raise InputError(
-            f"posterior with motion 'free': its middle comes to no steady motion ({lying.statement}); allowed: motion "
+            f"posterior with motion 'free': its median reaches no steady motion ({lying.statement}); allowed: motion "
             "'held', or `simulate` with the posterior"
         )
     unbound = without_reynolds_bound(robot)  # the middle was refused, or allowed, for all
@@ -193,7 +176,7 @@ def intervals_of_free_motion(
     for number, (place, one) in enumerate(zip(places, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
             progress("draws of the posterior", number, len(places))
-        held, links, _ = prepare_release(one, found.laid._replace(contact=posterior.contact(place)))
+        held, links, _ = prepare_release(one, found.release._replace(contact=posterior.contact(place)))
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multiplier) > STABLE:
             continue
@@ -202,13 +185,13 @@ def intervals_of_free_motion(
     lost = len(places) - len(steady)
     if lost > (1.0 - _LEAST_SHARE) * len(places):
         raise InputError(
-            f"posterior with motion 'free': {lost} of {len(places)} draws come to no steady motion near that "
+            f"posterior with motion 'free': {lost} of {len(places)} draws reach no steady motion near that "
             "of the middle; allowed: motion 'held', or `simulate` with the posterior"
         )
     names = [item.name for item in fields(Swimming)]
     whole = Swimming(**{name: np.concatenate([getattr(one, name) for one in swum]) for name in names})
     kept = posterior.at(steady)
-    batch = drawn_batch(robot, kept.model, kept.of(robot, rng), kept.count)
+    batch = sampled_batch(robot, kept.model, kept.of(robot, rng), kept.count)
     own_drive = found.prediction.tail_rate is None
     reading = found.prediction.friction
     return intervals_over(

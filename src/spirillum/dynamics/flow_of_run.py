@@ -80,8 +80,8 @@ def flow_of_run(
 
     Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
     wall. No force and torque but weight, contact and a field act on the robot. A film thinner than a fiftieth of the
-    body's diameter is drawn as thick as that, with the same velocities: to resolve it would take many minutes. The
-    sideways force is then not given, and a warning says so. A yawed robot takes one to three minutes, as it has no
+    body's diameter is computed as thick as that, with the same velocities: to resolve it would take many minutes. The
+    sideways force is then not given, with a warning. A yawed robot takes one to three minutes, as it has no
     mirror image.
 
     Args:
@@ -89,10 +89,10 @@ def flow_of_run(
         time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
         frame: `lab` (that of the channel), or `body` (moving with the robot's velocity along the channel).
         resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03.
-        progress: told that the flow is being solved for, once the run is known to be right.
+        progress: called when the flow is solved for, after the run is checked.
 
     Raises:
-        InputError: for another run, a moment outside it, or a place that cannot be resolved.
+        InputError: for another run, a moment outside it, or a pose that cannot be resolved.
     """
     check_choice("frame", frame, get_args(Frame))
     at = moment_of_run(run, time, resolution)
@@ -138,8 +138,8 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
         numbers_of(one, name, ("axis",), (3,))
     attitude = attitudes_of(one)[0]
     if float(one["wall_gap"][0]) < 0.0:
-        said = show(float(one["wall_gap"][0]), "um")
-        raise InputError(f"the run's variable 'wall_gap' is {said}; allowed: at least 0 m, a body inside its tube")
+        stated = show(float(one["wall_gap"][0]), "um")
+        raise InputError(f"the run's variable 'wall_gap' is {stated}; allowed: at least 0 m, a body inside its tube")
     texts = {name: one.attrs.get(name, "") for name in ("warnings", "fitted_by")}
     texts |= note_attributes(notes_in(one.attrs)) if isinstance(texts["warnings"], str) else {}
     for name, text in texts.items():
@@ -163,18 +163,18 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
     rotor = body + float(now["motor_rotation_rate"]) * np.eye(6)[3]
     mean_flow = float(now["mean_flow"])
     drawn = max(gap, _THINNEST * robot.body.diameter)
-    asked = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
-    with _said_of_the_run():
+    requested = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
+    with _run_notes():
         friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
-        batch = RobotBatch.of(robot, Placement.of(asked))
+        batch = RobotBatch.of(robot, Placement.of(requested))
         if broken(requirements(batch, Tube())):
             drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
-        batch = RobotBatch.of(robot, Placement.of({**asked, "gap": drawn}))
+        batch = RobotBatch.of(robot, Placement.of({**requested, "gap": drawn}))
         check_domain(robot, Tube(), batch)
     notes = list(notes_in(now.attrs))
     if gap < drawn:
         words = (
-            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is drawn "
+            f"the lubrication film of {show(gap, 'um')} is too thin to resolve: the robot is shown "
             f"{show(drawn - gap, 'um')} further off the wall; ignore film pressure and force"
         )
         notes.append(Note("drawn-otherwise", words, ("wall_gap", "held_force")))
@@ -204,7 +204,7 @@ def _motion(now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None) 
 
 
 @contextmanager
-def _said_of_the_run() -> Iterator[None]:
+def _run_notes() -> Iterator[None]:
     """Restate errors of a placement in terms of the run."""
     try:
         yield

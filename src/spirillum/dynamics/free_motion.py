@@ -18,7 +18,7 @@ from spirillum.dynamics.integration import Progress, Reach, integrate, observed_
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.return_map import STEPS
 from spirillum.dynamics.run_summary import DutyInterval
-from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, state_at_release
+from spirillum.dynamics.start import InitialPose, check_in_table, check_roughness, state_at_release
 from spirillum.dynamics.steady_state_search import LongRun, long_run
 from spirillum.dynamics.timing import Switch
 from spirillum.dynamics.tube_options import InTube, with_contact
@@ -26,9 +26,9 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import (
     Checked,
     check_in_tube,
-    held_against_check,
-    held_by_friction,
+    compare_with_check,
     links_in_tube,
+    sticking_notes,
 )
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact
@@ -92,7 +92,7 @@ class FreeMotion(NamedTuple):
     """What its rates follow from."""
     start_gap: float
     """Smallest distance between body and wall at release, m."""
-    laid: Release
+    release: Release
     """Initial pose."""
     checked: Checked
     """Whether its table was checked at this pose."""
@@ -112,24 +112,10 @@ def free_motion(
     turns_shown: int = 0,
     progress: Progress | None = None,
 ) -> FreeMotion:
-    """Follow a robot after release in its tube to its steady motion.
-
-    Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
-        tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
-        friction: reading of the friction; None: the robot's own.
-        fit: fitted values that replace the robot's: friction, roughness, coefficient of dry friction.
-        placement: where it is laid down, the ends of the channel, and a constant flow.
-        weight: let weight and buoyancy act, if the masses are known.
-        roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
-        in_tube: azimuth of the start and coefficient of dry friction.
-        until: gap that it has to reach, m; None: no such gap.
-        turns_shown: of the tail in the path at least.
-        progress: called with stage, number done, and total.
-    """
-    placed, asked = Placement.of(placement), InTube.of(in_tube)
+    """Follow a robot after release in its tube to its steady motion, or to the gap `until`; otherwise as `settle`."""
+    placed, requested = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
-    _check(asked)
+    _check(requested)
     own = load(robot)
     contact = fit.contact()
     if fit.posterior is not None:
@@ -138,16 +124,16 @@ def free_motion(
     ready, _, batch = prepared(own, "tube", fit=fit, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(
-            "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: drive.kind = "
+            "drive.kind = 'magnetic': the motion depends on the phase of the field; allowed: drive.kind = "
             "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
-    rough, touching = with_contact(contact, height, asked)
+    rough, touching = with_contact(contact, height, requested)
     check_in_tube(ready, placed, touching, rough)
     if ready.channel is not None:
         _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
-    laid = Release(table, placed, asked, height, contact, tail_rate, friction, weight)
-    held, links, start = prepare_release(ready, laid)
+    release = Release(table, placed, requested, height, contact, tail_rate, friction, weight)
+    held, links, start = prepare_release(ready, release)
     state = state_at_release(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()), ready.body.diameter)
     check_in_table(links, state, observed_at(links, state)[rigid_links.OUTSIDE])
@@ -162,7 +148,7 @@ def free_motion(
     limits = reynolds_limits(batch, swimming.reynolds_number, swimming.tail_reynolds_number)
     inertia = check_stokes_flow(batch, limits)
     checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
-    stuck = held_by_friction(
+    stuck = sticking_notes(
         links,
         forward=float(swimming.forward_velocity[0]),
         turning=0.5 * ready.body.diameter * float(swimming.body_rotation_rate[0]),
@@ -170,8 +156,8 @@ def free_motion(
     )
     warnings = (
         *held.warnings,
-        *(said for said in inertia.values() if said not in held.warnings),
-        *(checked.said if lies and not stuck else ()),
+        *(note for note in inertia.values() if note not in held.warnings),
+        *(checked.notes if lies and not stuck else ()),
         *_said(run, links, weight=weight),
         *stuck,
     )
@@ -182,33 +168,33 @@ def free_motion(
     source = fit.source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
     found = replace(found, lying=run.lying)
-    return FreeMotion(found, run, links, gap, laid, checked)
+    return FreeMotion(found, run, links, gap, release, checked)
 
 
-def prepare_release(robot: Robot, laid: Release) -> tuple[Prediction, TubeRobot, StartPlace]:
+def prepare_release(robot: Robot, release: Release) -> tuple[Prediction, TubeRobot, InitialPose]:
     """The robot held at its initial pose, the coefficients of its rates with its drive on, and that pose."""
-    rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
+    rough, touching = with_contact(release.contact, release.roughness, release.in_tube)
     held = predict(
-        robot, model="tube", tail_rate=laid.tail_rate, friction=laid.friction, placement=laid.placement, band=False
+        robot,
+        model="tube",
+        tail_rate=release.tail_rate,
+        friction=release.friction,
+        placement=release.placement,
+        band=False,
     )
-    links, start = links_in_tube(held, laid.table, laid.placement, touching, rough, weight=laid.weight)
+    links, start = links_in_tube(held, release.table, release.placement, touching, rough, weight=release.weight)
     return held, _driven(links, held), start
 
 
-def _check(asked: InTube) -> None:
+def _check(requested: InTube) -> None:
     """Refuse what changes in time."""
-    for item in field_values(asked):
+    for item in field_values(requested):
         if item.path in ("wait", "flow") and item.value is not None:
             raise InputError(f"in_tube.{item.path} = {item.text} has no steady motion; allowed: with `simulate`")
 
 
 def _check_until(until: float | None, gap: float) -> None:
-    """Refuse a gap to be reached that is none below the start.
-
-    Args:
-        until: the gap, m; None: no such gap.
-        gap: at the start, m.
-    """
+    """Refuse a final gap that does not lie below the initial one."""
     if until is not None and not until < gap:
         raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
 
@@ -227,7 +213,7 @@ def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
 def _checked(run: LongRun, links: TubeRobot) -> Checked:
     """Compare the poses of the last turn with those at which the table was checked."""
     names = ("gap", "offset", "pitch", "yaw")
-    return held_against_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
+    return compare_with_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
 
 
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
@@ -246,15 +232,7 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[Note]:
 
 
 def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:
-    """Means of a motion over a time.
-
-    Args:
-        held: the robot where it was laid down.
-        links: what its rates follow from.
-        state: at the start, (19,).
-        time: over which means are taken, s.
-        turns: of the tail in that time.
-    """
+    """Means of a motion from a state, (19,), over a time, s, with `turns` of the tail in it."""
     samples = min(turns * _SAMPLES, _MOST_SAMPLES)
     moments = np.linspace(0.0, time, samples + 1)
     duty = float(links.drive[rigid_links.DUTY])

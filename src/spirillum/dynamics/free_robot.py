@@ -65,14 +65,7 @@ class WallFilms:
 
 
 def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> WallFilms:
-    """The films between a robot and its channel.
-
-    Args:
-        robot: the robot; without a channel it has none.
-        roughness: height of what keeps the surfaces apart, m; None: `ROUGHNESS_SHARE` of the body's radius.
-        drag: resistance of the robot to sideways motion, N s/m.
-        load: force of the order that presses the robot to the wall, N: it halves a film as thick as the roughness.
-    """
+    """The lubrication films between a robot and its channel; a film as thick as the roughness is halved by `load`."""
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:

@@ -1,4 +1,4 @@
-"""Integration of a free robot's motion in time, with what happens on the way.
+"""Integration of a free robot's motion in time, with its events.
 
 The gap, dry friction and the motor's current are stiff: `spirillum.kernels.stiff_steps` takes linearly implicit steps.
 Samples and events lie inside them on the method's continuous output, so that a step is as long as the motion allows.

@@ -32,7 +32,7 @@ from spirillum.dynamics.record import series_of, tail_angle_of
 from spirillum.dynamics.rotating_field import Field, TurningField
 from spirillum.dynamics.run_file import RobotPose
 from spirillum.dynamics.start import (
-    StartPlace,
+    InitialPose,
     check_in_table,
     check_roughness,
     links_without_walls,
@@ -111,11 +111,7 @@ class PlantState:
 
 
 def uninterrupted(moment: Snapshot) -> Snapshot:
-    """The moment at the end of a step of a look ahead, of which nothing is kept.
-
-    Raises:
-        KeyboardInterrupt: if the step was interrupted, which a plant itself says as the end of its run.
-    """
+    """The moment at the end of a step of a look ahead; an interrupt of the step is raised as `KeyboardInterrupt`."""
     if moment.ended == INTERRUPTED:
         raise KeyboardInterrupt
     return moment
@@ -151,12 +147,12 @@ class Plant:
             weight: let weight and buoyancy act, if the masses are known.
             roughness: of the wall, with its unit or a float in m; None: 1e-4 of the body's radius.
             in_tube: with `tube`: `azimuth`, `friction_coefficient`, and `flow` over time, see `InTube`.
-            progress: told how far a table is that has to be made.
+            progress: called while a table is made.
 
         Raises:
-            InputError: for wrong input, or a robot or a place that the model does not know.
+            InputError: for wrong input, or a robot or a pose outside the model's domain.
         """
-        placed, asked = Placement.of(placement), InTube.of(in_tube)
+        placed, requested = Placement.of(placement), InTube.of(in_tube)
         height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
         own = load(robot)
         if own.drive is None:
@@ -166,12 +162,12 @@ class Plant:
         walled = chosen.model == "tube"
         if not walled:
             check_full(find_swimmer_model(chosen.model))
-        if asked.wait:
+        if requested.wait:
             raise InputError("in_tube.wait is given to a plant; allowed: a step with the remote off")
-        if not walled and asked != InTube():
+        if not walled and requested != InTube():
             raise InputError(f"in_tube is given with model '{chosen.model}'; allowed: only with model 'tube'")
         if walled:
-            check_in_tube(own, placed, asked, height)
+            check_in_tube(own, placed, requested, height)
         self.steady: Prediction = predict(
             own,
             model=chosen,
@@ -185,7 +181,7 @@ class Plant:
         self.warnings: tuple[Note, ...] = self.steady.warnings
         """What to be careful about, a sentence each; a step that leaves Stokes flow adds to them."""
         self._inertia: tuple[str, ...] = ()
-        self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
+        self._placed, self._requested, self._height, self._weight = placed, requested, height, weight
         self._table = table_for(RobotBatch.of(own, placed), progress=progress) if walled else None
         self._reach = reach_of(own)
         self._links: FreeRobot
@@ -289,7 +285,7 @@ class Plant:
                 its axis, `strength`, see `Field`.
 
         Returns:
-            The moment at the end of the step; `ended` says why if it came early.
+            The moment at the end of the step; `ended` gives the reason if it came early.
 
         Raises:
             InputError: for wrong input, a run that has ended, or a motion far outside Stokes flow; nothing has then
@@ -309,8 +305,8 @@ class Plant:
             self.impose_flow(parse_option("flow", flow, KINDS["velocity"]))
         if asked_field is not None:
             self.impose_field(asked_field)
-        asked = 0.0 if self._now.spent else command
-        run = self._moved(float(dt), asked)
+        requested = 0.0 if self._now.spent else command
+        run = self._moved(float(dt), requested)
         try:
             self._check_stokes(run)
         except InputError:
@@ -323,7 +319,7 @@ class Plant:
         self._now = PlantState(
             float(run.time[-1]),
             tuple(run.states[-1].tolist()),
-            asked,
+            requested,
             command,
             self._now.flow,
             self._now.field,
@@ -350,7 +346,7 @@ class Plant:
             velocity: m/s; None: none is, and the ends of the tube decide.
 
         Raises:
-            InputError: for a velocity that is not finite, or a model that knows none.
+            InputError: for a velocity that is not finite, or a model without one.
         """
         if velocity is not None and not math.isfinite(as_number(velocity)):
             raise InputError(f"velocity = {as_given(velocity, 'm/s')}; allowed: a finite number of m/s, or None")
@@ -360,11 +356,11 @@ class Plant:
         self._now = replace(self._now, flow=velocity, checkpoint=self._begun_anew())
 
     @validate_arguments
-    def impose_field(self, asked: Field) -> None:
+    def impose_field(self, requested: Field) -> None:
         """From now on the field of a magnetic robot is another one; its angle does not jump.
 
         Args:
-            asked: what changes of it.
+            requested: what changes of it.
 
         Raises:
             InputError: for a robot that no field turns.
@@ -372,7 +368,7 @@ class Plant:
         old = self._now.field
         if old is None:
             raise InputError(f"{self.robot.name} has no drive.kind = 'magnetic': no field turns it")
-        field = old.changed(asked, self._now.time)
+        field = old.changed(requested, self._now.time)
         if field != old:
             self._links = field.on(self._links)
             self._now = replace(self._now, field=field, checkpoint=self._begun_anew())
@@ -383,7 +379,7 @@ class Plant:
         rates = seen[:, rigid_links.ROTATION] + seen[:, rigid_links.JOINT]
         limits = motion_limits(batch, seen[:, : rigid_links.ROTATION], rates)
         limits.append(flow_limit(batch, abs(self._now.flow or 0.0)))
-        new = {flag: said for flag, said in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
+        new = {flag: note for flag, note in check_stokes_flow(batch, limits).items() if flag not in self._inertia}
         self._inertia += tuple(new)
         self.warnings += tuple(new.values())
 
@@ -400,8 +396,8 @@ class Plant:
         links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
         self._links = links if self._now.field is None else self._now.field.on(links)
 
-    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, StartPlace]:
-        return links_in_tube(self.steady, table, placed, self._asked, self._height, weight=self._weight)
+    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, InitialPose]:
+        return links_in_tube(self.steady, table, placed, self._requested, self._height, weight=self._weight)
 
     def _commanded(self, *, remote: bool | None, duty: float | None) -> float:
         """Commanded duty."""
@@ -420,7 +416,7 @@ class Plant:
         now = self._now
         times = np.array([now.time, now.time + dt])
         switches = [Switch(now.time, duty)]
-        if now.checkpoint is not None:  # its last step is taken again, as far as it goes beyond what was asked for
+        if now.checkpoint is not None:  # its last step is taken again, as far as it exceeds the requested time
             old = [] if now.checkpoint.time == now.time else [Switch(now.checkpoint.time, now.duty)]
             switches = [*old, *(switches if duty != now.duty or not old else [])]
         start = now.checkpoint or np.array(now.state)

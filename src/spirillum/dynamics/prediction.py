@@ -52,8 +52,8 @@ def predict(  # noqa: PLR0913 - the options of the command
     the last two are computed where they are read. With `motion="held"` it has the first alone.
 
     With `motion="free"` and the model `tube` the robot is followed in its tube from the placement to its steady motion,
-    with weight, film and contact (`spirillum.settle` has the way there). Where it reaches none, `lying.statement` says
-    why. Everything else is `spirillum.swimming.prediction.predict`, whose docstring says more of each argument.
+    with weight, film and contact (`spirillum.settle` returns the path). If it reaches none, `lying.statement` states
+    why. With a DC motor the current follows from (17) at the drive's duty, the effective friction from (18).
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -67,7 +67,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         posterior: file of a calibration's posterior, for intervals.
         posterior_for: with a posterior, intervals of a `new` tail, or of this `measured` one.
         resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
-        placement: where in the channel the robot lies, or is laid down.
+        placement: where in the channel the robot lies, or is released.
         band: of `tube`, with the band over unknown gap and pitch, or the reference pose alone; None: with it
             where the robot has a table, without which it takes minutes; not of free motion in the tube.
         motion: `held` (lateral motion and tilt constrained) or `free`; None: `held`, in the tube
@@ -155,12 +155,12 @@ def predict(  # noqa: PLR0913 - the options of the command
         return replace(answer, warnings=(*answer.warnings, *idle))
     from spirillum.dynamics.fitted_runs import intervals_of_free_motion
 
-    said = [FITTED_HELD] if fit.posterior.answer == "held" else []
+    notes = [FITTED_HELD] if fit.posterior.answer == "held" else []
     intervals = intervals_of_free_motion(found, fit.posterior, posterior_for=whose, progress=progress)
     return replace(
         answer,
         swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
         intervals=intervals,
         interval_of=interval_statement(fit.posterior, answer.robot, whose),
-        warnings=(*answer.warnings, *said, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
+        warnings=(*answer.warnings, *notes, *fit.run_warnings(answer.robot, answer.model, answer.friction)),
     )

@@ -2,7 +2,7 @@
 
 The state is seen whenever the tail stands at the same angle against the wall: a turn then maps place and attitude to
 place and attitude. A steady motion is a fixed point of that map, whatever happens within a turn, and the eigenvalues
-of the map's derivative say how a small distance from it grows or shrinks in a turn. Steps and equations are those of a
+of the map's derivative give how a small distance from it grows or shrinks in a turn. Steps and equations are those of a
 run.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach, observed_at, watched_limits
-from spirillum.dynamics.start import StartPlace, state_at
+from spirillum.dynamics.start import InitialPose, state_at
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links, stiff_steps
@@ -24,8 +24,8 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.contacts import SITE_ROTOR
 
 SEARCHING = 10.0 * TubeRobot.tolerance
-"""Error of a time step on the way to a fixed point, which is refined at that of a run, as is its multiplier."""
-_ON = False  # a step may go beyond where it is asked to stop
+"""Error of a time step during the search for a fixed point, which is refined at that of a run, as is its multiplier."""
+_ON = False  # a step may exceed the requested end
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
 _MOST_STEPS = 75_000
@@ -92,11 +92,7 @@ class ReturnMap:
     """Number of steps that were taken, shared with maps of other tolerances."""
 
     def after(self, state: Samples) -> Turn:
-        """The next turn of the tail from a state, (19,).
-
-        Raises:
-            EndedTurnError: if the turn cannot be followed to its end.
-        """
+        """The next turn of the tail from a state, (19,); `EndedTurnError` if it cannot be followed to its end."""
         robot, data = self.robot, self.robot.data
         limits, sizes = watched_limits(robot, _NOWHERE), robot.step_sizes()
         y = state.copy()
@@ -266,7 +262,7 @@ def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Ch
         slope = np.eye(free.size) - here.derivative[np.ix_(free, free)]
         newton, step = np.zeros(4), np.zeros(4)
         newton[free] = np.linalg.lstsq(slope, here.change[free], rcond=None)[0]
-        if size < _STILL:  # where many places are brought back, a step would go to another of them
+        if size < _STILL:  # where many fixed points are close, a step would go to another
             return here
         if _size(newton[free]) < _SMALLEST:
             return place.change(here.x + newton) or here
@@ -316,7 +312,7 @@ class _Place:
         """The state at coordinates, (19,)."""
         from scipy.optimize import brentq
 
-        start = StartPlace(pitch=float(x[2]), yaw=float(x[3]), azimuth=float(x[0]), phase=self._phase)
+        start = InitialPose(pitch=float(x[2]), yaw=float(x[3]), azimuth=float(x[0]), phase=self._phase)
         radius = float(self._robot.tube[kernel.RADIUS])
         offset = brentq(
             lambda e: self._closeness(state_at(start, e)) - x[1], 1e-6 * radius, radius, xtol=1e-15 * radius, rtol=1e-15

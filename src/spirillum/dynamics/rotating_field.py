@@ -98,9 +98,9 @@ class TurningField:
         level = np.cos(self.pitch)
         return np.array([level * np.cos(self.yaw), level * np.sin(self.yaw), np.sin(self.pitch)])
 
-    def changed(self, asked: Field, time: float) -> TurningField:
+    def changed(self, requested: Field, time: float) -> TurningField:
         """The field from a time on; its angle does not jump."""
-        given = asked.model_dump(exclude_none=True)
+        given = requested.model_dump(exclude_none=True)
         rate = given.get("rotation_rate", self.rotation_rate)
         return replace(self, **given, phase=self.phase + (self.rotation_rate - rate) * time)
 
@@ -113,14 +113,9 @@ class TurningField:
         return replace(links, drive=drive)
 
 
-def in_tilted_field(links: _A, asked: Field) -> _A:
-    """A robot in the field of its file, which rotates about the given axis.
-
-    Args:
-        links: what its rates follow from.
-        asked: yaw and pitch of the axis; what is not given is 0.
-    """
-    given = asked.model_dump(exclude_none=True)
+def in_tilted_field(links: _A, requested: Field) -> _A:
+    """A robot in the field of its file, which rotates about an axis of given yaw and pitch, by default 0."""
+    given = requested.model_dump(exclude_none=True)
     if not given:
         return links
     own = TurningField.of(links)
@@ -130,7 +125,7 @@ def in_tilted_field(links: _A, asked: Field) -> _A:
         if name in given:
             place = "magnetic.field" if name == "strength" else f"magnetic.{name}"
             raise InputError(f"field.{name} of a run; allowed: {place} of the robot")
-    return own.changed(asked, 0.0).on(links)
+    return own.changed(requested, 0.0).on(links)
 
 
 _TILT = 0.1
@@ -205,7 +200,7 @@ def magnetic_sweep(
     loaded = load(robot)
     if model == AUTO and loaded.channel is not None and loaded.magnetic is not None:
         raise InputError(
-            f"{loaded.name} has a channel, whose walls a sweep does not know; allowed: model 'slender' or 'rft', which "
+            f"{loaded.name} has a channel, whose walls a sweep omits; allowed: model 'slender' or 'rft', which "
             "leave them out, or `simulate` at each rate"
         )
     choice = ModelChoice(UNBOUNDED, NO_CHANNEL) if model == AUTO else ModelChoice(model)
@@ -217,11 +212,11 @@ def magnetic_sweep(
     held = replace(predict(without_reynolds_bound(own), model=choice, calibrated=False), robot=own)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
-    asked = _usual_rates(held) if given is None else given
-    _check_work(asked, turns, held.step_out_rate)
+    requested = _usual_rates(held) if given is None else given
+    _check_work(requested, turns, held.step_out_rate)
     batch = replace(held.batch, options=own.model)
-    closed = swim(held.batch.with_values({"magnetic.rotation_rate": asked}), held.model, calibrated=False)
-    inertia = _check_stokes(batch, asked, closed.forward_velocity, closed.tail_rotation_rate)
+    closed = swim(held.batch.with_values({"magnetic.rotation_rate": requested}), held.model, calibrated=False)
+    inertia = _check_stokes(batch, requested, closed.forward_velocity, closed.tail_rotation_rate)
     links = two_links(
         held.robot,
         held.batch,
@@ -235,16 +230,16 @@ def magnetic_sweep(
     level: Samples = np.array([1.0, 0.0, 0.0, 0.0])
     attitude: Samples = level
     found, settled = [], []
-    for done, rate in enumerate(asked):
+    for done, rate in enumerate(requested):
         if progress is not None:
-            progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, asked.size)
+            progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, requested.size)
         mean, still = _settled(links, float(rate), _pushed(attitude), turns)
         attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
         found.append(mean)
         settled.append(still)
         inertia |= _check_stokes(batch, np.array([rate]), np.array([mean.velocity]), np.array([mean.rate]))
-    said = [*_without_walls(held), *held.robot.warnings, *inertia.values()]
-    return _dataset(held, closed, asked, found, np.array(settled, dtype=float), turns, said)
+    notes = [*_without_walls(held), *held.robot.warnings, *inertia.values()]
+    return _dataset(held, closed, requested, found, np.array(settled, dtype=float), turns, notes)
 
 
 def _check_stokes(batch: RobotBatch, rates: Samples, speed: Samples, turning: Samples) -> dict[str, Note]:
@@ -275,21 +270,21 @@ def _given_rates(rates: Sequence[str | float] | Samples) -> Samples:
     given: Any = [rates] if isinstance(rates, str) else rates
     if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:
         raise InputError(f"rates = {str(rates)[:40]}; allowed: a list of rates")
-    asked = np.array(
+    requested = np.array(
         [parse_option("rates", float(r) if isinstance(r, np.floating) else r, KINDS["rate"]) for r in given]
     )
-    if not 1 <= asked.size <= _MOST_RATES:
-        raise InputError(f"rates has {asked.size} values; allowed: 1 to {_MOST_RATES}")
-    before = np.concatenate([[0.0], asked[:-1]])
-    wrong = np.flatnonzero((np.abs(asked) <= np.abs(before)) | (asked * asked[0] <= 0))
+    if not 1 <= requested.size <= _MOST_RATES:
+        raise InputError(f"rates has {requested.size} values; allowed: 1 to {_MOST_RATES}")
+    before = np.concatenate([[0.0], requested[:-1]])
+    wrong = np.flatnonzero((np.abs(requested) <= np.abs(before)) | (requested * requested[0] <= 0))
     if wrong.size:
         first = int(wrong[0])
         after = f" after {show(float(before[first]), 'Hz')}" if first else ""
         raise InputError(
-            f"rates: {show(float(asked[first]), 'Hz')}{after} does not increase in size from above 0 in one sense; "
+            f"rates: {show(float(requested[first]), 'Hz')}{after} does not increase in size from above 0 in one sense; "
             "allowed: increasing rates, all > 0 or < 0"
         )
-    return asked
+    return requested
 
 
 def _check_work(rates: Samples, turns: float, step_out: float) -> None:

@@ -40,9 +40,9 @@ def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape
     variable = dataset[name]
     dims = ("time", *more)
     if set(variable.dims) != set(dims) or variable.transpose(*dims).shape[1:] != shape:
-        said = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
+        stated = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
         wanted = ", ".join(["time", *(f"{dim}: {size}" for dim, size in zip(more, shape, strict=True))])
-        raise InputError(f"the run's variable {name!r} has the dimensions ({said}); allowed: ({wanted})")
+        raise InputError(f"the run's variable {name!r} has the dimensions ({stated}); allowed: ({wanted})")
     if variable.dtype.kind not in "fiu":
         raise InputError(f"the run's variable {name!r} holds no numbers ({variable.dtype}); allowed: numbers")
     values = np.asarray(variable.transpose(*dims).values, dtype=float)
@@ -56,14 +56,10 @@ def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape
 
 
 def check_increasing(time: Samples) -> None:
-    """Refuse times of a run between which nothing moves.
-
-    Args:
-        time: times of its samples, s.
-    """
+    """Refuse times of a run between which nothing moves."""
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
-        said = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
-        raise InputError(f"the run {said}; allowed: at least 2, increasing")
+        stated = f"has {time.size} samples of time" if time.size < 2 else "has times that do not increase"
+        raise InputError(f"the run {stated}; allowed: at least 2, increasing")
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:
@@ -241,12 +237,7 @@ def _turned(start: Samples, end: Samples, share: float) -> Samples:
 
 
 def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
-    """The robot's way from a run: one with six degrees of freedom, or an axial one.
-
-    Args:
-        dataset: what `spirillum.simulate` returns.
-        height: z of the motor axis in an axial run, which does not hold it, m.
-    """
+    """Poses of a run in six degrees of freedom, or of an axial one at z = `height` of the motor axis, m."""
     time = numbers_of(dataset, "time", ())
     check_increasing(time)
     if "attitude" in dataset:

@@ -135,7 +135,7 @@ _MOST_ALIKE = 4
 """Events of one kind that are listed one by one."""
 
 
-class Told(NamedTuple):
+class MergedEvent(NamedTuple):
     """An event, or the first of many that are alike."""
 
     time: float
@@ -148,21 +148,17 @@ class Told(NamedTuple):
     """When for the last time, s."""
 
 
-def told(events: Sequence[tuple[float, str]]) -> list[Told]:
-    """Events in the order of time; those that come more than a few times, as where a contact bounces, are one.
-
-    Args:
-        events: time, s, and what happened.
-    """
+def merged_events(events: Sequence[tuple[float, str]]) -> list[MergedEvent]:
+    """Events in the order of time; those that come more than a few times, as where a contact bounces, are one."""
     moments_of: dict[str, list[float]] = {}
     for when, what in events:
         moments_of.setdefault(what, []).append(when)
     found = []
     for what, moments in moments_of.items():
         if len(moments) > _MOST_ALIKE:
-            found.append(Told(min(moments), what, len(moments), max(moments)))
+            found.append(MergedEvent(min(moments), what, len(moments), max(moments)))
         else:
-            found += [Told(when, what, 1, when) for when in moments]
+            found += [MergedEvent(when, what, 1, when) for when in moments]
     return sorted(found)
 
 
@@ -189,13 +185,7 @@ class DutyInterval(NamedTuple):
 
 
 def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[DutyInterval]:
-    """Times at constant duty in which the drive is on.
-
-    Args:
-        switches: every switching, the first at 0.
-        end: end of the run, or of its drive, s.
-        begin: beginning of the run, s.
-    """
+    """Times at constant duty in which the drive is on."""
     found: list[DutyInterval] = []
     before = 0.0
     ends = [*(switch.time for switch in switches[1:]), end]

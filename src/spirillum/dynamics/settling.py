@@ -1,6 +1,6 @@
 """Settling of a robot after release in its tube: drainage of its film, and its steady state.
 
-It is the free motion of `spirillum.predict` with the way there: the same run, the same steady motion.
+It is the free motion of `spirillum.predict` with the trajectory: the same run, the same steady motion.
 
 The film under a level robot: what resists its sinking, and what pushes it sideways as it swims.
 In thin films the resistance to sinking approaches 3 sqrt(2) pi mu L (a_e/h)^(3/2), 1/a_e = 1/a - 1/R, for a cylinder
@@ -56,14 +56,7 @@ class LubricationFilm(NamedTuple):
 
 
 def film_at(motion: Prediction, table: TubeTable, gap: float, offset: float) -> LubricationFilm:
-    """The film under a level robot.
-
-    Args:
-        motion: the robot as it swims at that gap, held level.
-        table: its table.
-        gap: of the body, m.
-        offset: e of its mid-length, m.
-    """
+    """The film under a level robot."""
     phases = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
     matrices = [table.at(offset, phase=float(phase))[0][:7, :7] for phase in phases]
     full: Samples = motion.robot.fluid.viscosity * np.mean(matrices, axis=0)
@@ -108,7 +101,7 @@ class Settling(DisplayMixin):
     """Settling of a robot, SI; azimuths about +x from the lowest point of the tube."""
 
     prediction: Prediction
-    """The steady motion that it comes to, means over a turn of the tail."""
+    """The steady motion that it reaches, means over a turn of the tail."""
     until: float
     """Gap to which the drainage is timed, m."""
     films: tuple[LubricationFilm, ...]
@@ -257,7 +250,7 @@ def settle(
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
-        placement: where it is laid down: `gap` or `eccentricity`, `pitch`, `yaw`; `ends` of the channel, or a `flow`.
+        placement: where it is released: `gap` or `eccentricity`, `pitch`, `yaw`; `ends` of the channel, or a `flow`.
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: `azimuth` of the start and `friction_coefficient`, see `spirillum.simulate`.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.dynamics.axial_robot import axial_run
-from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
+from spirillum.dynamics.fitted_runs import chosen_run, sample_count, with_intervals
 from spirillum.dynamics.free_robot import TwoLinks
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
@@ -70,7 +70,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
     model. With `tube` the walls, film, contact and dry friction are those of the robot's table (`spirillum.prepare`),
     which is made first where there is none; by its defaults such a run is the trial of `spirillum.predict`, whose
-    values are the averages while the drive is on. The other models know no walls: films of fluid keep the robot off
+    values are the averages while the drive is on. The other models have no walls: films of fluid keep the robot off
     that of its channel.
 
     Args:
@@ -79,7 +79,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` or
             `torque-speed` drive. None: `free`, but `held` where the model is that of a posterior or
-            calibration and knows the axial entries only, or was fitted to one place in the tube without dry friction.
+            calibration and has the axial entries only, or was fitted to one pose in the tube without dry friction.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
@@ -112,18 +112,18 @@ def simulate(  # noqa: PLR0913 - the options of the command
     known = fit.posterior
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
-    number = drawn_number(draws, known)
+    number = sample_count(draws, known)
     if friction is not None:
         friction_reading(friction)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     own = load(robot)
     central = own if known is None else known.central(own)
     contact = fit.contact()
-    choice, motion, said = chosen_run(model, motion, central, placed, fit)
+    choice, motion, notes = chosen_run(model, motion, central, placed, fit)
     model = choice.model
     fit, idle = fit.acting_on(central, find_swimmer_model(model))
-    known, said = fit.posterior, [*said, *idle]
-    held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
+    known, notes = fit.posterior, [*notes, *idle]
+    held, requested, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
     walled = model == "tube" and not held
@@ -132,15 +132,15 @@ def simulate(  # noqa: PLR0913 - the options of the command
         _check_held(placed if fixed is None else Placement(), roughness, fit, weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
-    _check_in_tube(asked, model, walled=walled, drawn=known is not None)
+    _check_in_tube(requested, model, walled=walled, drawn=known is not None)
     if walled:
         check_not_resolved(own, resolution)
-        asked, times = asked.of_trial(placed), times.of_trial()
+        requested, times = requested.of_trial(placed), times.of_trial()
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None
         there = placed if drawn is None else drawn.placed(one, placed, draw)
-        rough, touching = with_contact(contact if drawn is None else drawn.contact(draw), height, asked)
+        rough, touching = with_contact(contact if drawn is None else drawn.contact(draw), height, requested)
         table = _table(one, there, touching, rough, tell) if walled else None
         steady = predict(
             one,
@@ -161,8 +161,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
     dataset = run(central, times, progress)
     if known is not None:
         reading = friction_reading(central.friction.reading if friction is None else friction)
-        said += [FITTED_HELD] if walled and known.answer == "held" else []
-        said += fit.run_warnings(central, find_swimmer_model(model), reading)
+        notes += [FITTED_HELD] if walled and known.answer == "held" else []
+        notes += fit.run_warnings(central, find_swimmer_model(model), reading)
     if known is not None and number:
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
@@ -176,8 +176,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
         )
     more = {"model_reason": choice.reason} if choice.reason else {}
     more |= {f"field_{name}": angle for name, angle in about.model_dump(exclude_none=True).items()}
-    said += _along_tilted_axis(dataset, about)
-    return dataset.assign_attrs(**note_attributes([*said, *notes_in(dataset.attrs)]), **more)
+    notes += _along_tilted_axis(dataset, about)
+    return dataset.assign_attrs(**note_attributes([*notes, *notes_in(dataset.attrs)]), **more)
 
 
 def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
@@ -197,14 +197,14 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[Note]:
 
 
 def _table(
-    robot: Robot, placed: Placement, asked: InTube, roughness: float | None, progress: Progress | None
+    robot: Robot, placed: Placement, requested: InTube, roughness: float | None, progress: Progress | None
 ) -> TubeTable:
     """The robot's table, made if there is none, once all else is known to be right."""
     batch = RobotBatch.of(robot, placed)
     outside = broken(requirements(batch, TabledTube({})))
     if outside:
         raise InputError(f"{robot.name} with model 'tube': {outside[0].sentence()}")
-    check_in_tube(robot, placed, asked, roughness)
+    check_in_tube(robot, placed, requested, roughness)
     return table_for(batch, progress=progress)
 
 
@@ -228,26 +228,26 @@ def _free_run(
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
-    said = [*steady.warnings, *_left_out(steady, links, weight=weight), *unused]
+    notes = [*steady.warnings, *_left_out(steady, links, weight=weight), *unused]
     more = {}
     if links.is_walled:
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.roughness
-    attrs = free_attributes(steady, links, run, reach, title, said)
+    attrs = free_attributes(steady, links, run, reach, title, notes)
     dataset = dataset_of(steady, links, run, on, more, attrs)
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     way = [*vertical_drift(dataset), *check_stokes_flow(steady.batch, limits).values()]
-    dataset.attrs |= note_attributes([*way, *said])
+    dataset.attrs |= note_attributes([*way, *notes])
     dataset.attrs["error_estimate"] = in_stokes_flow(dataset.attrs["error_estimate"], *limits)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
 
-def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:
+def _check_in_tube(requested: InTube, model: str, *, walled: bool, drawn: bool) -> None:
     """Refuse settings of a free run in a tube for any other, and to continue one with draws of a posterior."""
-    if not walled and asked != InTube():
-        name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
+    if not walled and requested != InTube():
+        name = next(name for name, value in requested.model_dump().items() if value != getattr(InTube(), name))
         given = "motion 'held'" if model == "tube" else f"model '{model}'"
         raise InputError(f"in_tube.{name} is given with {given}; allowed: only with model 'tube', motion 'free'")
-    if drawn and asked.continued is not None:
+    if drawn and requested.continued is not None:
         raise InputError(
             "in_tube.continued is given together with a posterior, each draw of which moves in its own way; allowed: "
             "one of them"
@@ -255,12 +255,12 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> N
 
 
 def _check_held(placement: Placement, roughness: str | float | None, fit: Fit, *, weight: bool) -> None:
-    """Refuse what only a free run knows."""
+    """Refuse options of free runs."""
     if fit.posterior is not None and fit.of_trials:
         raise InputError(f"motion = 'held' with {fit.name}, which was fitted to trials; allowed: motion 'free'")
     if fit.contact().friction_coefficient:
         raise InputError(
-            f"{fit.name} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
+            f"{fit.name} has a friction_coefficient, and motion = 'held' has no dry friction; allowed: model "
             "'tube' with motion 'free'"
         )
     given = [

@@ -25,7 +25,7 @@ from spirillum.units import show
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its seat, (19,)."""
+    """The state of a robot at rest in its initial pose, (19,)."""
     _check(robot, placement)
     state = np.zeros(STATES)
     state[PHASE] = start_phase(robot)
@@ -51,9 +51,9 @@ def _check(robot: Robot, placement: Placement) -> None:
     for name, unit in kinds.items():
         value = getattr(placement, name)
         if value != getattr(unset, name):
-            said = show(value, unit) if unit else f"'{value}'"
+            stated = show(value, unit) if unit else f"'{value}'"
             raise InputError(
-                f"placement.{name} = {said} is nothing that a free run knows by a model without walls; allowed: gap or "
+                f"placement.{name} = {stated} has no effect in a free run without walls; allowed: gap or "
                 "eccentricity, and pitch, or model 'tube'"
             )
     if robot.channel is None and (placement.gap is not None or placement.eccentricity is not None):
@@ -108,13 +108,7 @@ def turning_rate(steady: Prediction) -> float:
 
 
 def links_without_walls(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
-    """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall.
-
-    Args:
-        steady: the robot with friction and drive, by a model with all entries of the resistance matrix.
-        roughness: height of the wall's asperities, m; None: 1e-4 of the body's radius.
-        weight: let weight and buoyancy act, if the masses are known.
-    """
+    """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall."""
     effective = steady.effective_friction
     return two_links(
         steady.robot,
@@ -154,7 +148,7 @@ def resting_state(robot: Robot, links: TwoLinks, placement: Placement) -> Sample
 
 
 @dataclass(frozen=True)
-class StartPlace:
+class InitialPose:
     """A pose in the tube; SI, angles in rad."""
 
     gap: float | None = None
@@ -171,7 +165,7 @@ class StartPlace:
     """Phase of the tail relative to the body, which has not rolled since release."""
 
 
-def state_at_release(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
+def state_at_release(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:
     """The state of a robot at rest at a pose, (19,)."""
     radius, a = float(links.tube[tube_motion.RADIUS]), 0.5 * robot.body.diameter
     if start.eccentricity is not None:
@@ -189,13 +183,7 @@ def state_at_release(robot: Robot, links: TubeRobot, start: StartPlace) -> Sampl
 
 
 def check_roughness(roughness: float, gap: float, diameter: float) -> None:
-    """Refuse asperities that films thinner than a table holds would cover, or that are pressed by more than the weight.
-
-    Args:
-        roughness: height of the asperities, m.
-        gap: smallest gap of the robot at its start, m.
-        diameter: of its body, m.
-    """
+    """Refuse asperities that films thinner than a table holds would cover, or pressed by more than the weight."""
     if roughness < THINNEST_GAP * diameter:
         raise InputError(
             f"roughness = {show(roughness, 'um')}; allowed: at least {show(THINNEST_GAP * diameter, 'um')}, because "
@@ -218,7 +206,7 @@ def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
         )
 
 
-def state_at(start: StartPlace, offset: float) -> Samples:
+def state_at(start: InitialPose, offset: float) -> Samples:
     """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, in place of the start's gap."""
     from scipy.spatial.transform import Rotation
 
@@ -231,7 +219,7 @@ def state_at(start: StartPlace, offset: float) -> Samples:
     return state
 
 
-def _offset(robot: Robot, start: StartPlace, gap: float, radius: float) -> float:
+def _offset(robot: Robot, start: InitialPose, gap: float, radius: float) -> float:
     """Offset at which the body's smallest gap is `gap`, m."""
     body = outlines_of(robot)["body"]
     offset = Seat.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset

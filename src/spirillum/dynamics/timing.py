@@ -118,12 +118,6 @@ def sample_times(end: float, turn: float, samples_per_turn: int, switches: Seque
 
     A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
     which of the two is rounded up.
-
-    Args:
-        end: length of the run, s.
-        turn: time of a turn, s.
-        samples_per_turn: samples in it.
-        switches: times of switchings within the run, s.
     """
     check_samples(samples_per_turn)
     count = math.ceil(end / turn * samples_per_turn)
@@ -181,7 +175,7 @@ class Timetable(NamedTuple):
     """Evenly spaced samples from 0 to the end, s."""
     switches: list[Switch]
     """Every switching of the remote, the first at 0."""
-    said: list[Note]
+    notes: list[Note]
     """Where the schedule of the remote and the run do not meet, a sentence each."""
 
 
@@ -224,14 +218,14 @@ class Timing(Options):
 
     def _unused(self, switches: Sequence[Switch], end: float) -> list[Note]:
         """Parts of the schedule beyond the end of the run, a sentence each."""
-        said = []
+        notes = []
         if all(switch.duty == 0 for switch in switches):
             words = f"the remote switches nothing on before the run ends at {end:.4g} s"
-            said.append(Note("schedule-outside-run", words, ("on",)))
+            notes.append(Note("schedule-outside-run", words, ("on",)))
         late = [(start, stop) for start, stop in self.on or () if start >= end]
         if late:
             first, last = late[0]
             also = f" and {len(late) - 1} more" if len(late) > 1 else ""
             words = f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s"
-            said.append(Note("schedule-outside-run", words, ("on",)))
-        return said
+            notes.append(Note("schedule-outside-run", words, ("on",)))
+        return notes

@@ -65,11 +65,11 @@ class InTube(Options):
         return self if given else self.model_copy(update={"wait": 0.0 if moved else TRIAL_WAIT})
 
 
-def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:
+def with_contact(contact: FittedContact, roughness: float | None, requested: InTube) -> tuple[float | None, InTube]:
     """Roughness and settings of a run, with fitted values in place of those that are not given."""
-    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
-        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
-    return contact.roughness if roughness is None else roughness, asked
+    if requested.friction_coefficient is None and contact.friction_coefficient is not None:
+        requested = requested.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    return contact.roughness if roughness is None else roughness, requested
 
 
 def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:
@@ -84,10 +84,6 @@ def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] 
 
 
 def read_flow(path: str | Path) -> Samples:
-    """Read and check a flow file.
-
-    Returns:
-        Times, s, and velocities, m/s, (n, 2).
-    """
+    """Read and check a flow file: times, s, and velocities, m/s, (n, 2)."""
     found = read_series(path, _WHAT, _LIMITS, _LARGEST)
     return np.array(found) * (1.0, 1e-3)

@@ -194,7 +194,7 @@ def _wire(robot: Robot) -> Samples:
 def _stations(robot: Robot) -> Samples:
     """Stations along the wires: of a helix of one size to find its crests, of any other the line itself."""
     form = robot.tail.form
-    xi = _station_places(robot)
+    xi = _station_positions(robot)
     line = centreline_of(robot, xi)
     parts = (line.position, line.tangent * line.stretch[:, None])
     rows = [
@@ -204,7 +204,7 @@ def _stations(robot: Robot) -> Samples:
     return np.ascontiguousarray(np.concatenate(rows))
 
 
-def _station_places(robot: Robot) -> Samples:
+def _station_positions(robot: Robot) -> Samples:
     """Distances of the stations from the root, m."""
     tail = robot.tail
     if tail.form.is_helix:

@@ -23,7 +23,7 @@ from spirillum.dynamics.integration import (
 from spirillum.dynamics.record import dataset_of, free_attributes, tail_angle_of
 from spirillum.dynamics.run_file import numbers_of
 from spirillum.dynamics.run_summary import stretches_on
-from spirillum.dynamics.start import StartPlace, check_in_table, check_roughness, reach_of, state_at_release
+from spirillum.dynamics.start import InitialPose, check_in_table, check_roughness, reach_of, state_at_release
 from spirillum.dynamics.timing import Switch, Timetable
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
@@ -51,7 +51,7 @@ _ASIDE = 1e-3
 def tube_run(
     steady: Prediction,
     robot: TubeRobot,
-    start: StartPlace | xr.Dataset,
+    start: InitialPose | xr.Dataset,
     times: Timetable,
     *,
     wait: float = 0.0,
@@ -72,11 +72,11 @@ def tube_run(
     before: tuple[Event, ...] = ()
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
-    if isinstance(start, StartPlace):
-        laid = state_at_release(steady.robot, robot, start)
-        check_roughness(robot.roughness, float(robot.gaps(laid).min()), steady.robot.body.diameter)
-        check_in_table(robot, laid, observed_at(robot, laid)[rigid_links.OUTSIDE])
-        first, before = _waited(robot, laid, wait, reach, progress)
+    if isinstance(start, InitialPose):
+        released = state_at_release(steady.robot, robot, start)
+        check_roughness(robot.roughness, float(robot.gaps(released).min()), steady.robot.body.diameter)
+        check_in_table(robot, released, observed_at(robot, released)[rigid_links.OUTSIDE])
+        first, before = _waited(robot, released, wait, reach, progress)
     else:
         first = _checkpoint(start)
         moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])
@@ -88,19 +88,19 @@ def tube_run(
     run = integrate(robot, first, moments, times.switches, reach, progress)
     if run.time.size < _FEWEST:
         what = run.events[-1].what if run.events else "the equations have no next step"
-        if isinstance(start, StartPlace):
+        if isinstance(start, InitialPose):
             raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
         raise InputError(f"the run cannot be continued: {what}; allowed: a run that ended where it can go on")
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(times.switches, driven, float(run.time[0]))
     ended = float(run.time[-1])
-    said = [*steady.warnings]
+    notes = [*steady.warnings]
     if ended < times.end:
         words = f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}"
-        said.append(Note("run-cut-short", words, ("duration",)))
-    said += times.said
+        notes.append(Note("run-cut-short", words, ("duration",)))
+    notes += times.notes
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
-    attrs = free_attributes(steady, robot, run, reach, title, said)
+    attrs = free_attributes(steady, robot, run, reach, title, notes)
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
@@ -190,10 +190,10 @@ def series_in_tube(run: Trajectory) -> dict[str, Samples]:
     }
 
 
-def _in_the_tube(run: Trajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
+def _in_the_tube(run: Trajectory, start: InitialPose | xr.Dataset) -> dict[str, Samples]:
     """These, azimuth and tail angle counted on from the run that is continued."""
     found = series_in_tube(run)
-    if not isinstance(start, StartPlace):
+    if not isinstance(start, InitialPose):
         last = start.isel(time=-1)
         begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
         found["tail_angle"] = tail_angle_of(run.states, begun)

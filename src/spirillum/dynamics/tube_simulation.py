@@ -14,7 +14,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.rotating_field import Field, in_tilted_field
 from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.dynamics.run_summary import end_state
-from spirillum.dynamics.start import StartPlace, check_roughness, start_phase, turning_rate
+from spirillum.dynamics.start import InitialPose, check_roughness, start_phase, turning_rate
 from spirillum.dynamics.timing import Switch, Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -142,7 +142,7 @@ def run_in_tube(
     table: TubeTable,
     times: Timing,
     placed: Placement,
-    asked: InTube,
+    options: InTube,
     roughness: float | None,
     field: Field,
     weight: bool,  # noqa: FBT001 - one of the run's settings
@@ -152,33 +152,35 @@ def run_in_tube(
     """A run with six degrees of freedom in the robot's tube."""
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
-    links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
+    links, start = links_in_tube(steady, table, placed, options, roughness, weight=weight)
     links = replace(in_tilted_field(links, field), tolerance=tolerance)
     turn = links.turn
     timetable = times.timetable(turn, own)
-    begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links, timetable.switches)
-    dataset = tube_run(steady, links, begun, timetable, wait=asked.wait or 0.0, progress=progress)
+    begun = (
+        start if options.continued is None else earlier_run(options.continued, steady, table, links, timetable.switches)
+    )
+    dataset = tube_run(steady, links, begun, timetable, wait=options.wait or 0.0, progress=progress)
     places = {name: dataset[of].values for name, of in _PLACES.items()}
-    checked = held_against_check(links.table, **places, time=dataset["time"].values)
-    said = list(notes_in(dataset.attrs))
+    checked = compare_with_check(links.table, **places, time=dataset["time"].values)
+    notes = list(notes_in(dataset.attrs))
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
-    if asked.flow is not None:
+    if options.flow is not None:
         limits.append(flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max())))
-        said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
+        notes += _flow_beyond(links.flow, float(dataset["time"][-1]), options.flow)
     if weight and not links.weight.any():
-        said.append(NO_WEIGHT)
-    said += check_stokes_flow(steady.batch, limits).values()
-    stuck = held_by_friction(
+        notes.append(NO_WEIGHT)
+    notes += check_stokes_flow(steady.batch, limits).values()
+    stuck = sticking_notes(
         links,
         forward=float(dataset["mean_forward_velocity_steady"]),
         turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
         contact_force=float(dataset["contact_force"][-1]),
     )
     error = in_stokes_flow(table.speed_error_at(1.0), *limits)
-    said += stuck or (checked.said if np.isfinite(error) else [])
+    notes += stuck or (checked.notes if np.isfinite(error) else [])
     return dataset.assign_attrs(
-        **note_attributes(said),
-        state=end_state(dataset, said, float(links.tube[kernel.SLIDING])),
+        **note_attributes(notes),
+        state=end_state(dataset, notes, float(links.tube[kernel.SLIDING])),
         error_estimate=error if checked.known and not stuck else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
@@ -188,18 +190,18 @@ def run_in_tube(
 
 
 def links_in_tube(
-    steady: Prediction, table: TubeTable, placed: Placement, asked: InTube, roughness: float | None, *, weight: bool
-) -> tuple[TubeRobot, StartPlace]:
+    steady: Prediction, table: TubeTable, placed: Placement, options: InTube, roughness: float | None, *, weight: bool
+) -> tuple[TubeRobot, InitialPose]:
     """Coefficients of a robot's rates in its tube, and its initial pose."""
     turn = 2.0 * np.pi / turning_rate(steady)
-    around = _around(steady.robot, placed, asked, roughness)
+    around = _around(steady.robot, placed, options, roughness)
     links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
-    start = StartPlace(
+    start = InitialPose(
         gap=placed.gap,
         eccentricity=placed.eccentricity,
         pitch=placed.pitch or 0.0,
         yaw=placed.yaw,
-        azimuth=asked.azimuth,
+        azimuth=options.azimuth,
         phase=start_phase(steady.robot),
     )
     return links, start
@@ -219,26 +221,26 @@ def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[Note]:
     return []
 
 
-def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
+def check_in_tube(robot: Robot, placed: Placement, options: InTube, roughness: float | None) -> None:
     """Refuse requests that a run in a tube does not support, before minutes go into a table."""
     check_usual_resolution(robot.model)
     if placed.tail_drop:
         raise InputError(
-            f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"
+            f"placement.tail_drop = {show(placed.tail_drop, 'mm')} has no effect in a free run; allowed: 0 mm"
         )
-    _around(robot, placed, asked, roughness)
-    if asked.continued is not None:
-        _check_continued(placed, asked)
+    _around(robot, placed, options, roughness)
+    if options.continued is not None:
+        _check_continued(placed, options)
         return
     if roughness is not None and robot.channel is not None:
         gap = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
         check_roughness(roughness, gap, robot.body.diameter)
 
 
-def _check_continued(placed: Placement, asked: InTube) -> None:
+def _check_continued(placed: Placement, options: InTube) -> None:
     """Refuse another start of a run that begins where another one ended."""
     given = {f"placement.{name}" for name in placed.model_fields_set if getattr(placed, name) is not None}
-    given |= {f"in_tube.{name}" for name in asked.model_fields_set}
+    given |= {f"in_tube.{name}" for name in options.model_fields_set}
     for name in (*(f"placement.{field}" for field in _STARTS), "in_tube.azimuth", "in_tube.wait"):
         if name in given:
             raise InputError(
@@ -247,19 +249,19 @@ def _check_continued(placed: Placement, asked: InTube) -> None:
             )
 
 
-def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> Surroundings:
+def _around(robot: Robot, placed: Placement, options: InTube, roughness: float | None) -> Surroundings:
     channel = robot.channel
     length = np.inf if channel is None or channel.length is None else channel.length
     radius = np.nan if channel is None else 0.5 * channel.diameter
-    if asked.flow is not None and (placed.flow is not None or placed.ends is not None):
+    if options.flow is not None and (placed.flow is not None or placed.ends is not None):
         raise InputError(
-            f"in_tube.flow = {str(asked.flow)[:80]} is given together with placement.flow or placement.ends; allowed: "
-            "one of them, for an imposed flow leaves the ends no say"
+            f"in_tube.flow = {str(options.flow)[:80]} excludes placement.flow and placement.ends; allowed: one of the "
+            "three"
         )
     ends = kernel.IMPOSED
     flow: Samples = np.zeros((1, 2))
-    if asked.flow is not None:
-        flow = read_flow(asked.flow)
+    if options.flow is not None:
+        flow = read_flow(options.flow)
     elif placed.flow is not None:
         flow = np.array([[0.0, placed.flow]])
     else:
@@ -271,7 +273,7 @@ def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | N
         length=length + END_LOSS * radius,
         flow=flow,
         roughness=roughness,
-        coefficient=FRICTION_COEFFICIENT if asked.friction_coefficient is None else asked.friction_coefficient,
+        coefficient=FRICTION_COEFFICIENT if options.friction_coefficient is None else options.friction_coefficient,
     )
 
 
@@ -282,24 +284,15 @@ class Checked(NamedTuple):
     """Whether the motion keeps to yaws at which the table was checked."""
     near: bool
     """Whether it comes nearer to the glass than where the flow around a whole robot was solved for."""
-    said: list[Note]
+    notes: list[Note]
     """Cautions about both, a sentence each."""
 
 
-def held_against_check(
+def compare_with_check(
     table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
 ) -> Checked:
-    """Compare the poses of a motion with those at which its table was checked.
-
-    Args:
-        table: the packed table.
-        gap: smallest distance of body and wall, (n,), m.
-        offset: of the body's mid-length from the tube's axis, (n,), m.
-        pitch: nose up, (n,), rad.
-        yaw: nose to the side, (n,), rad.
-        time: of the places, (n,), s, where one differs from another; None: a motion that repeats itself.
-    """
-    said = []
+    """Compare the poses of a motion, (n,), with those at which its table was checked; None: it repeats itself."""
+    notes = []
     checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
     held = range_of(table)
@@ -316,32 +309,25 @@ def held_against_check(
             f"{_from(time, beyond[0])}it tilts beyond its table (pitch {up:.3g} deg, yaw {aside:.3g} deg): the "
             "resistance is that of the nearest pose inside, without error estimate"
         )
-        said.append(Note("table-not-checked", words, ("wall_pitch", "wall_yaw", "error_estimate")))
+        notes.append(Note("table-not-checked", words, ("wall_pitch", "wall_yaw", "error_estimate")))
     elif beyond.size:
         most = beyond[np.argmax(np.abs(yaw[beyond]))]
         words = (
             f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg, and its table was "
             f"checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
         )
-        said.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
+        notes.append(Note("table-not-checked", words, ("wall_yaw", "error_estimate")))
     least = least_checked_gap(table)
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
         falls = f"{_falls(time, int(near[0]))} {_length(float(gap[near].min()))}"
         words = f"{falls}: below {_length(least)} its table is {BELOW}"
-        said.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
-    return Checked(not beyond.size, bool(near.size), said)
+        notes.append(Note("table-not-checked", words, ("wall_gap", "error_estimate")))
+    return Checked(not beyond.size, bool(near.size), notes)
 
 
-def held_by_friction(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
-    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other.
-
-    Args:
-        robot: what its rates in the tube follow from.
-        forward: mean forward velocity, m/s.
-        turning: mean speed of the body's surface by its rotation, m/s.
-        contact_force: mean force of the asperities, N.
-    """
+def sticking_notes(robot: TubeRobot, *, forward: float, turning: float, contact_force: float) -> list[Note]:
+    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
     smoothed = float(robot.tube[kernel.SLIDING])
     if not contact_force > 0.0 or not np.hypot(forward, turning) < smoothed:
         return []

@@ -49,13 +49,7 @@ class _Resistance(NamedTuple):
 
 
 def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
-    """Masses, joint, buoyancy and 12x12 resistance of a robot, SI.
-
-    Args:
-        robot: a checked robot.
-        model: `rft` or `slender`.
-        phase: phase of the tail at joint angle zero, rad.
-    """
+    """Masses, joint, buoyancy and 12x12 resistance of a robot, SI; the joint angle is zero at the tail's `phase`."""
     resistance = _resistance(robot, model)
     links = links_of(robot)
     content = {

@@ -156,13 +156,7 @@ def _is_closed(vertices: np.ndarray, faces: Faces) -> bool:
 
 
 def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:
-    """A binary STL file.
-
-    Args:
-        vertices: in the unit of the file, (n, 3).
-        faces: outward oriented, (m, 3).
-        title: for the head of the file, which has room for 80 characters with the mark of this program.
-    """
+    """A binary STL file; its title has room for 80 characters with the mark of this program."""
     corners = vertices.astype(np.float32)[faces]
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     normal = np.cross(b - a, c - a)
@@ -196,11 +190,7 @@ class MeshFile(NamedTuple):
 
 
 def mesh_files(pieces: Sequence[RobotMesh]) -> list[MeshFile]:
-    """Surfaces of one colour each, then one closed body for each part.
-
-    Args:
-        pieces: of the robot at phase 0.
-    """
+    """Surfaces of one colour each, then one closed body for each part."""
     surfaces: dict[tuple[str, str], list[tuple[Samples, Faces]]] = {}
     colours: dict[tuple[str, str], tuple[float, float, float]] = {}
     for piece in pieces:

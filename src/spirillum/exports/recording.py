@@ -121,13 +121,7 @@ def colour(red: float, green: float, blue: float, opacity: float = 1.0) -> Json:
 
 
 def triangles(vertices: Samples, faces: np.ndarray, colours: Samples) -> list[Json]:
-    """A surface, by one list of triangles for each of its colours.
-
-    Args:
-        vertices: (n, 3), m.
-        faces: (m, 3).
-        colours: sRGB of each triangle, (m, 3).
-    """
+    """A surface, by one list of triangles for each of its sRGB colours, (m, 3)."""
     shades, which = np.unique(colours, axis=0, return_inverse=True)
     found = []
     for number, shade in enumerate(shades):

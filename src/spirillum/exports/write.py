@@ -49,13 +49,7 @@ _METAL = {"shaft": 0.9, "coupling": 0.9, "stub": 0.9, "arm": 0.9, "tail": 0.9}
 
 
 def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
-    """A scene with the nodes robot, body and rotor, in metres; turning rotor about its x axis turns the tail.
-
-    Args:
-        name: of the robot.
-        pieces: at phase 0 of the tail.
-        phase: phase of the tail, rad, to which the node of the rotor is turned.
-    """
+    """A scene with the nodes robot, body and rotor, in metres; turning rotor about its x axis turns the tail."""
     import_optional("trimesh", "a coloured scene")
     from trimesh import Scene, Trimesh
     from trimesh.visual import TextureVisuals

@@ -65,7 +65,7 @@ class Flow(DisplayMixin):
     """Sideways force on the robot from outside, N.
 
     Of a robot whose lateral motion is held: what holds it at this phase; far away in unbounded fluid the flow is its.
-    At a moment of a free run: weight, contact and a field; NaN where it is drawn `lifted`.
+    At a moment of a free run: weight, contact and a field; NaN where the robot is shown `lifted`.
     """
     lifted: float = 0.0
     """Increase of the wall distance for the flow around a robot on a thin lubrication film in a run, m."""
@@ -179,7 +179,7 @@ class Flow(DisplayMixin):
 
         Args:
             plane: `xz` (side view), `xy` (from above) or `yz` (across the axis).
-            offset: place of the plane on the axis across it, with its unit (``"-50 mm"``) or a float in m.
+            offset: position of the plane on the axis across it, with its unit (``"-50 mm"``) or a float in m.
             extent: how far the plane reaches beyond the robot on every side, with its unit or a float in m;
                 None: a little more than the robot's largest diameter. In a tube it ends at the glass.
             resolution: points along the plane's longer side.
@@ -239,7 +239,7 @@ def flow(
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        calibrated: apply calibration factors to the motion. They stand for walls that are not in the flow, which
+        calibrated: apply calibration factors to the motion. They represent walls that are not in the flow, which
             then pulls at the robot; without them it swims free of force.
         resolution: of the model: `accuracy`, and with `tube` also `tolerance` and `phases`; None: the robot's own, but
             accuracy `high` with `slender`. The flow of `standard` leaves out the torque of the wire's spin.
@@ -259,8 +259,8 @@ def flow(
     wanted = Resolution.of(resolution)
     if wanted.accuracy is None and choice.model == "slender":
         wanted = wanted.model_copy(update={"accuracy": "high"})
-        said = "solved at accuracy 'high', where `predict` takes 'standard'"
-        choice = replace(choice, reason=f"{choice.reason}, {said}" if choice.reason else said)
+        difference = "solved at accuracy 'high', where `predict` takes 'standard'"
+        choice = replace(choice, reason=f"{choice.reason}, {difference}" if choice.reason else difference)
     prediction = predict(
         robot,
         model=choice.model,
@@ -310,14 +310,7 @@ def seat_in_tube(
     placement: Placement | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> Seat | None:
-    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`.
-
-    Args:
-        robot: the robot.
-        model: `slender`, `tube` or `auto`.
-        placement: where in the channel the robot lies.
-        resolution: of the models; None: the robot's own.
-    """
+    """The tube and the robot's pose in it, before anything is solved; None with the model `slender`."""
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
         return None
@@ -374,15 +367,15 @@ def _attributes(flow: Flow) -> dict[str, Any]:
 
 def _checked(points: Samples) -> Samples:
     try:
-        places = np.asarray(points, dtype=float)
+        coordinates = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError("points are no numbers; allowed: (n, 3), a row (x, y, z) in m for each point") from error
-    if places.ndim != 2 or places.shape[1] != 3:
-        raise InputError(f"points have shape {places.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
-    if not np.all(np.isfinite(places)):
-        first = int(np.argmin(np.all(np.isfinite(places), axis=1)))
-        raise InputError(f"point {first} = {places[first].tolist()} is not finite; allowed: coordinates in m")
-    return places
+    if coordinates.ndim != 2 or coordinates.shape[1] != 3:
+        raise InputError(f"points have shape {coordinates.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
+    if not np.all(np.isfinite(coordinates)):
+        first = int(np.argmin(np.all(np.isfinite(coordinates), axis=1)))
+        raise InputError(f"point {first} = {coordinates[first].tolist()} is not finite; allowed: coordinates in m")
+    return coordinates
 
 
 def _margin(extent: str | float | None) -> float | None:

@@ -27,11 +27,7 @@ class FluidField(ABC):
 
     @abstractmethod
     def part_at(self, points: Samples) -> np.ndarray:
-        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Name of the part that contains each point, `glass` at and beyond a tube's wall, empty for the fluid, (n,)."""
 
     @abstractmethod
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
@@ -46,43 +42,35 @@ class FluidField(ABC):
         return np.asarray(self.part_at(points) != "")
 
     def velocity(self, points: Samples) -> Samples:
-        """Velocity of the fluid, m/s, (n, 3).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Velocity of the fluid at points (n, 3), m/s."""
         return self.fields(points)[0]
 
     def pressure(self, points: Samples) -> Samples:
-        """Pressure of the fluid above that far away, in a tube above the mean of both ends, Pa, (n,).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """Pressure of the fluid above that far away, in a tube above the mean of both ends, Pa, (n,)."""
         return self.fields(points)[1]
 
     def in_fluid(self, points: Samples) -> Samples:
         """Return the points (n, 3) if they are all in the fluid."""
-        places = checked_points(points)
-        names = self.part_at(places)
+        xyz = checked_points(points)
+        names = self.part_at(xyz)
         if np.any(names != ""):
             first = int(np.argmax(names != ""))
-            at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
+            at = ", ".join(f"{1e3 * float(value):.4g}" for value in xyz[first])
             raise InputError(f"point {first} = ({at}) mm is inside the {names[first]}; allowed: points in the fluid")
-        return places
+        return xyz
 
 
 def checked_points(points: Samples) -> Samples:
     """Points as floats, (n, 3)."""
     try:
-        places = np.asarray(points, dtype=float)
+        xyz = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError("points are no numbers; allowed: rows (x, y, z) in m") from error
-    if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
-        raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
-    if np.any(np.abs(places) > _FARTHEST):
+    if xyz.ndim != 2 or xyz.shape[1] != 3 or not np.all(np.isfinite(xyz)):
+        raise InputError(f"points have shape {xyz.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
+    if np.any(np.abs(xyz) > _FARTHEST):
         raise InputError(f"points are farther away than {_FARTHEST:g} m; allowed: nearer ones")
-    return np.ascontiguousarray(places)
+    return np.ascontiguousarray(xyz)
 
 
 def name_parts(
@@ -192,14 +180,7 @@ def _rotation(angle: float) -> Samples:
 
 
 def flow_field(batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float) -> FlowField:
-    """Flow around one robot whose parts move with given twists.
-
-    Args:
-        batch: one robot, inside the domain of the model `slender`.
-        body_twist: velocity (m/s) and rotation (rad/s) of the body about the origin, body axes, (6,).
-        rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
-        phase: phase phi of the tail, rad.
-    """
+    """Flow around one robot whose parts move with given twists about the origin, body axes: m/s and rad/s, (6,)."""
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     solids = tuple(RobotGeometry.of(batch).outlines.items())
     return FlowField(robot_solution(batch), solids, twists, float(phase), float(batch.viscosity[0]))

@@ -50,8 +50,8 @@ class PointGrid:
 
     def points(self, start: int, stop: int) -> Samples:
         """Points number `start` to `stop`, z fastest, (n, 3)."""
-        places = np.unravel_index(np.arange(start, stop), self.shape)
-        points: Samples = np.stack([axis[place] for axis, place in zip(self.axes, places, strict=True)], axis=-1)
+        indices = np.unravel_index(np.arange(start, stop), self.shape)
+        points: Samples = np.stack([axis[index] for axis, index in zip(self.axes, indices, strict=True)], axis=-1)
         return points
 
 
@@ -137,8 +137,8 @@ def _sizes(box: dict[str, tuple[float, float]], resolution: int) -> tuple[float,
 
 def _even(centre: float, spacing: float, count: int) -> Samples:
     """Points about a centre, with one spacing for all axes: no direction is resolved better than another."""
-    places: Samples = centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
-    return places
+    coordinates: Samples = centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
+    return coordinates
 
 
 def dataset_on(
@@ -173,8 +173,8 @@ def dataset_on(
         "pressure": ("Pa", f"fluid pressure, {'zero far away' if seat is None else 'above the mean of both ends'}"),
     }
     data: dict[str, Any] = {
-        name: (dims, values[:, place].reshape(shape), {"units": unit, "long_name": meaning})
-        for place, (name, (unit, meaning)) in enumerate(columns.items())
+        name: (dims, values[:, column].reshape(shape), {"units": unit, "long_name": meaning})
+        for column, (name, (unit, meaning)) in enumerate(columns.items())
     }
     solids = "body, coupling or tail" if seat is None else "body, coupling or tail, or outside the tube"
     meaning = f"whether the point is inside {solids}"
@@ -184,6 +184,6 @@ def dataset_on(
 
 def _coordinates(grid: PointGrid) -> Iterator[tuple[str, Any]]:
     along = {"x": "forward, from the body's mid-length", "y": "to the left", "z": "up"}
-    for axis, places in zip(_AXES, grid.axes, strict=True):
+    for axis, coordinates in zip(_AXES, grid.axes, strict=True):
         attributes = {"units": "m", "long_name": f"{axis}, {along[axis]}"}
-        yield axis, (axis, places, attributes) if places.size > 1 else ((), float(places[0]), attributes)
+        yield axis, (axis, coordinates, attributes) if coordinates.size > 1 else ((), float(coordinates[0]), attributes)

@@ -192,13 +192,7 @@ class _Reflection:
 
     @classmethod
     def of(cls, strengths: Strengths, density: Amplitudes, forces: Samples) -> _Reflection:
-        """Add up the waves of all forces.
-
-        Args:
-            strengths: solids in their seat, and wires.
-            density: of the tractions, (panels, p, modes, 3).
-            forces: at the wires' stations, (stations, 3).
-        """
+        """Add up the waves of all forces at the stations and of the tractions on the panels of the solids."""
         from scipy.special import k0e, k1e
 
         from spirillum.kernels.stokes_flow import wave_amplitudes
@@ -246,12 +240,7 @@ class _Reflection:
         return field
 
     def _range(self, placed: Samples, distance: Samples) -> Samples:
-        """Distance by which waves are damped between forces, wall and points, (n,); those of far forces cancel.
-
-        Args:
-            placed: points, (n, 3).
-            distance: of the points from the wall, (n,).
-        """
+        """Damping distance of waves between forces, wall and points, (n,); those of far forces cancel."""
         found = np.full(len(placed), np.inf)
         for least, tree in self.classes:
             apart, _ = tree.query(placed)
@@ -266,11 +255,11 @@ def _classes(columns: Sequence[_Sources], radius: float) -> tuple[tuple[float, A
     rho = np.concatenate([np.repeat(part.rho, part.x.shape[1]) for part in columns])
     angle = np.concatenate([np.repeat(part.angle, part.x.shape[1]) for part in columns])
     x = np.concatenate([part.x.ravel() for part in columns])
-    places = np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
-    places = np.concatenate([places, places * [1.0, 1.0, -1.0]])  # half circles stand for whole ones
+    points = np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
+    points = np.concatenate([points, points * [1.0, 1.0, -1.0]])  # half circles stand for whole ones
     distance = radius - np.concatenate([rho, rho])
     number = np.floor(np.log2(distance / distance.min())).astype(int)
-    return tuple((float(distance[number == n].min()), cKDTree(places[number == n])) for n in np.unique(number))
+    return tuple((float(distance[number == n].min()), cKDTree(points[number == n])) for n in np.unique(number))
 
 
 def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: float) -> Iterator[_Sources]:
@@ -293,8 +282,8 @@ def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float)
     x_p, rho_p = panels.x[number], panels.rho[number]
     length = float(np.sum(np.hypot(np.diff(x_p), np.diff(rho_p))))
     steepest = cut / float(np.min(seat.distances(x_p, rho_p)))
-    places, gauss = np.polynomial.legendre.leggauss(panels.order + 4 + int(0.3 * steepest * length))
-    cardinal = panels.cardinals(places)
+    nodes, gauss = np.polynomial.legendre.leggauss(panels.order + 4 + int(0.3 * steepest * length))
+    cardinal = panels.cardinals(nodes)
     x, rho = cardinal @ x_p, cardinal @ rho_p
     modes = np.tensordot(cardinal, density, axes=(1, 0))  # (n, modes, 3)
     level = seat.level and float(np.ptp(rho_p)) < 1e-9 * seat.radius
@@ -335,15 +324,7 @@ def _ring_forces(modes: Amplitudes, theta: Samples) -> Samples:
 def tube_flow_field(
     batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float, mean_flow: float
 ) -> TubeFlowField:
-    """Flow around one robot in its tube whose parts move with given twists.
-
-    Args:
-        batch: one robot in its place, inside the domain of the model `tube`.
-        body_twist: velocity (m/s) and rotation (rad/s) of the body about the origin, body axes, (6,).
-        rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
-        phase: phase phi of the tail, rad.
-        mean_flow: mean velocity of the fluid through the tube, m/s.
-    """
+    """Flow around one robot in its tube whose parts move with given twists, as in `flow_field`, in a mean flow, m/s."""
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     held = held_robot(batch, 0, phase)
     solids = tuple(RobotGeometry.of(batch).outlines.items())

@@ -78,12 +78,7 @@ def _is_at(handle: int | None, folder: Path) -> bool:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep a folder for this process while the block runs; leftovers of dead runs in it are removed.
-
-    Raises:
-        Busy: if another run is writing there.
-        OSError: if it is no folder, or cannot be made or read.
-    """
+    """Keep a folder for this process in the block, without leftovers; raise `Busy` if another run writes there."""
     for _ in range(_TRIES):  # another run may remove it between the two, when it has failed and left it empty
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -108,9 +103,6 @@ def private_folder(parent: Path) -> Iterator[Path]:
 
     Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
     that what was made in it takes its place at once.
-
-    Raises:
-        OSError: if it cannot be made.
     """
     sweep(parent)
     for _ in range(_TRIES):  # another run may take it for a leftover before it is locked

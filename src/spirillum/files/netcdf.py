@@ -70,13 +70,7 @@ def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.Fi
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") -> None:
-    """Write NetCDF-4, compressed, whole or not at all.
-
-    Args:
-        dataset: what is written.
-        path: the file.
-        replace: what it may replace, see `atomic_write`.
-    """
+    """Write NetCDF-4, compressed, whole or not at all; what it may replace is that of `atomic_write`."""
     from xarray.backends import H5NetCDFStore
 
     encoding = {
@@ -121,12 +115,7 @@ def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, gr
 
 
 def group_of(file: h5netcdf.File, group: str | None = None) -> xr.Dataset:
-    """A group of an open file as a dataset, loaded whole.
-
-    Args:
-        file: from `open_netcdf`.
-        group: its name; None: the file itself.
-    """
+    """A group of an open file, or the file itself, as a dataset, loaded whole."""
     import xarray as xr
     from xarray.backends import H5NetCDFStore
 

@@ -53,11 +53,7 @@ def written_by_us(path: Path, begins: bytes = b"") -> bool:
 
 @contextmanager
 def guard_inputs(*inputs: str | Path | None) -> Iterator[None]:
-    """While the block runs, these files and folders are not written over.
-
-    Args:
-        inputs: files or folders that are read; None is passed over.
-    """
+    """While the block runs, these files and folders are not written over; None is passed over."""
     found: list[Path] = []
     for path in inputs:
         with suppress(OSError, RuntimeError, ValueError):
@@ -70,13 +66,7 @@ def guard_inputs(*inputs: str | Path | None) -> Iterator[None]:
 
 
 def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"") -> Path:
-    """The target of a path, links followed, which a new file may replace.
-
-    Args:
-        path: where a file is to be written.
-        replace: what it may replace.
-        begins: what a file of this kind begins with, see `written_by_us`.
-    """
+    """The target of a path, links followed, which a new file may replace; see `atomic_write`."""
     checked_path(path, _ANYTHING)
     try:
         real = path.resolve()
@@ -120,10 +110,6 @@ def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", s
         replace: what it may replace.
         begins: what a file of this kind begins with, see `written_by_us`.
         sync: wait until the disk has it; not needed for what is computed again where it is damaged.
-
-    Raises:
-        InputError: if the folder cannot be written to, or something is there that may not be replaced.
-        OSError: if there is no space.
     """
     with atomic_write_all({path: begins}, replace=replace, sync=sync) as temporary:
         yield temporary[path]
@@ -133,12 +119,7 @@ def atomic_write(path: Path, *, replace: Replace = "own", begins: bytes = b"", s
 def atomic_write_all(
     paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
 ) -> Iterator[dict[Path, Path]]:
-    """Give temporary paths of files that belong together; all are made before the first is renamed.
-
-    Raises:
-        InputError: if a folder cannot be written to, or something is there that may not be replaced.
-        OSError: if there is no space.
-    """
+    """Give temporary paths of files that belong together; all are made before the first is renamed."""
     begins = dict(paths) if isinstance(paths, Mapping) else dict.fromkeys(paths, b"")
     places = {path: check_replaceable(path, replace, start) for path, start in begins.items()}
     with ExitStack() as stack:
@@ -195,12 +176,7 @@ def holds_own_only(folder: Path) -> bool:
 
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
-    """Give a temporary folder; when the block ends without an error it replaces `path`, with all its content.
-
-    Raises:
-        InputError: if the folder above cannot be written to, or something has come to stand there meanwhile.
-        OSError: if there is no space.
-    """
+    """Give a temporary folder; when the block ends without an error it replaces `path`, with all its content."""
     checked_path(path, "a new folder")
     try:
         parent = path.parent.resolve()

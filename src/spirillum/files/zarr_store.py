@@ -55,11 +55,7 @@ def store_target(path: str | Path) -> Path:
 def store_files(
     variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], attributes: Mapping[str, Any]
 ) -> dict[str, bytes]:
-    """Files of a store without its regions: its metadata, and the variables that are written whole.
-
-    Returns:
-        Paths within the store with what stands there; the one that says what is in it comes last.
-    """
+    """Content of the files without regions by path (metadata, variables written whole); the root's comes last."""
     import zarr
     from zarr.storage import MemoryStore
 
@@ -81,11 +77,7 @@ def store_files(
 def region_files(
     variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], places: Mapping[str, Place]
 ) -> dict[str, bytes]:
-    """Files of one region of some variables, in their order.
-
-    Raises:
-        ValueError: if a region is not one whole chunk.
-    """
+    """Files of one region of some variables, in their order."""
     import zarr
     from zarr.storage import MemoryStore
 
@@ -118,11 +110,7 @@ def is_whole(path: Path) -> bool:
 
 
 def _check_whole_chunk(name: str, item: Stored, place: Place) -> None:
-    """Refuse a region that is not exactly one chunk, or the last one along a dimension.
-
-    Raises:
-        ValueError: if it is not.
-    """
+    """Refuse a region that is not exactly one chunk, or the last one along a dimension."""
     for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
         if start % part or stop != min(start + part, size):
             raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
@@ -152,12 +140,7 @@ def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
-    """Write files that belong together into a claimed folder: all are on the disk before the first is renamed.
-
-    Raises:
-        InputError: where a folder in it is a link or cannot be written to, or a file is a folder.
-        OSError: if there is no space.
-    """
+    """Write files that belong together into a claimed folder: all are on the disk before the first is renamed."""
     for key in pieces:
         if (folder / key).is_dir():
             raise InputError(f"{folder / key} is a folder; allowed: a file of the store, or nothing: remove it")

@@ -42,11 +42,7 @@ def _as_list(value: Any) -> Any:
 
 
 def _fitted_model(name: str) -> str:
-    """The name of a model that may have been fitted, or none.
-
-    Raises:
-        ValueError: for any other name.
-    """
+    """The name of a model that may have been fitted, or none."""
     if name and name not in SWIMMER_MODELS:
         raise ValueError(f"a model that swims: {', '.join(SWIMMER_MODELS)}")
     return name

@@ -290,12 +290,7 @@ class Fit:
 
 
 def friction_acts(reading: str, rate: float | None) -> bool:
-    """Whether B_eff acts on an answer: at a prescribed tail rate it is inferred from it, but where it brakes the body.
-
-    Args:
-        reading: reading of the friction.
-        rate: prescribed tail rate; None: the robot's own drive.
-    """
+    """Whether B_eff acts on an answer: at a prescribed tail rate only where it brakes the body."""
     return rate is None or reading == "body"
 
 

@@ -87,11 +87,7 @@ class PosteriorAttributes(_Table):
 
     @classmethod
     def of(cls, attributes: dict[str, Any]) -> PosteriorAttributes:
-        """Attributes as they were read.
-
-        Raises:
-            ValueError: if one is missing or wrong.
-        """
+        """Attributes as they were read."""
         return cls.model_validate({name: _plain(value) for name, value in attributes.items()})
 
 

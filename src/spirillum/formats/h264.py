@@ -30,15 +30,7 @@ class H264Writer:
         self._colours = np.empty((3 * stream.height // 2, stream.width), dtype=np.uint8)
 
     def add(self, image: np.ndarray, number: int | None = None) -> None:
-        """Append a frame.
-
-        Args:
-            image: (height, width, 3) sRGB bytes, of the film's size.
-            number: its time in ticks, later than that of the frame before; None: the next tick.
-
-        Raises:
-            ValueError: for a picture of another size.
-        """
+        """Append a frame of sRGB bytes; its number, in ticks, is later than that before, or None: the next tick."""
         size = 2 * len(self._colours) // 3, self._colours.shape[1], 3
         if image.shape != size:
             raise ValueError(f"a frame of shape {image.shape} in a film of frames of shape {size}")

@@ -257,11 +257,7 @@ def check_present(table: Table, needed: Sequence[str]) -> None:
 def read_series(
     path: str | Path, what: str, limits: Mapping[str, tuple[float, float]], largest: int
 ) -> list[tuple[float, ...]]:
-    """Read a CSV file of values over time.
-
-    Returns:
-        The rows, in the order of `limits`.
-    """
+    """Read a CSV file of values over time; columns are in the order of `limits`."""
     table = read_table(path, what, largest=largest)
     if not set(limits) <= set(table.header):
         shown = ", ".join(table.header)[:80]

@@ -52,11 +52,7 @@ _DERIVED: Mapping[str, Mapping[str, int]] = {
 
 
 def base_units(unit: str) -> dict[str, int]:
-    """Exponents of `kg`, `m`, `s`, `A` and `rad` in a unit of the registry, such as ``m/(s N m)``.
-
-    Raises:
-        KeyError: for a symbol that is in none of the FMU's units.
-    """
+    """Exponents of `kg`, `m`, `s`, `A` and `rad` in a unit of the registry, such as ``m/(s N m)``."""
     found: Counter[str] = Counter()
     above, _, below = unit.partition("/")
     for side, sign in ((above, 1), (below.strip("()"), -1)):

@@ -53,12 +53,7 @@ class Receiver:
     """The far end: what a microcontroller beside the motor does. Its caller gives it the time."""
 
     def __init__(self, name: str = "spirillum", watchdog: float = WATCHDOG) -> None:
-        """A motor that is off.
-
-        Args:
-            name: what it calls itself, without spaces.
-            watchdog: time after which it switches off by itself, s.
-        """
+        """A motor that is off."""
         if not name.isprintable() or len(name.split()) != 1 or " " in name:
             raise InputError(f"name = {clipped(name)}; allowed: a word without spaces")
         if not 0.0 < watchdog <= 10.0:
@@ -257,11 +252,7 @@ def _check_length(duration: Any) -> None:
 
 
 def _number_in(word: str, high: float) -> float:
-    """A number of an answer.
-
-    Raises:
-        ValueError: if it is none from 0 to `high`.
-    """
+    """A number of an answer."""
     number = float(word)
     if not 0.0 <= number <= high:
         raise ValueError(word)

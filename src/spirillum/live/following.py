@@ -88,7 +88,6 @@ class CameraWatch:
     """Compares what stands still in the last pictures with what stood still when the robot was learnt."""
 
     def __init__(self, start: Start, *, ruled: bool) -> None:
-        """Begin."""
         self._start, self._ruled = start, ruled
         self._first: StillPicture | None = None
         self._pictures: list[np.ndarray] = []
@@ -142,7 +141,6 @@ class Following:
     def __init__(
         self, video: Video, setup: Setup, robot: Robot, learnt: InitialDetection, outline: OutlineCheck, window: float
     ) -> None:
-        """Begin."""
         self.video, self.setup, self.robot, self.learnt, self.outline = video, setup, robot, learnt, outline
         ruled = setup.markers.spacing is not None
         self.follower = FrameTracker(learnt.known, learnt.still, ahead=False)

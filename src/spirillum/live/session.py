@@ -183,12 +183,7 @@ class _Log:
     _clocks: Note | None = None
 
     def run(self, report: OnObservation) -> None:
-        """Track all frames; what interrupts it is noted, if any frame was tracked.
-
-        Raises:
-            InputError: if the source does not begin.
-            KeyboardInterrupt: if it was interrupted before.
-        """
+        """Track all frames; an interrupt is noted if any frame was tracked."""
         try:
             with closing(_paced(self.source, self.pace)) as frames:
                 for frame in frames:

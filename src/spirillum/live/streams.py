@@ -87,15 +87,7 @@ def source_of(
     camera: CameraSetup | None = None,
     between: tuple[float, float | None] = (0.0, None),
 ) -> Source:
-    """The source that a word names.
-
-    Args:
-        word: a video or folder, `camera:0` or `/dev/video0`, or the address of a stream.
-        size: width and height that a camera is asked for, pixels.
-        fps: frames a second that it is asked for.
-        camera: of the setup, for the rate of a folder's images, and for what replaces a video's own times or pixels.
-        between: first and last time of a video that count, s.
-    """
+    """The source of a word: a video, a folder, `camera:0` or `/dev/video0` at a size and rate, or a stream address."""
     pace, aspect = (None, None) if camera is None else (camera.frames_per_second, camera.pixel_aspect_ratio)
     scheme = word.partition("://")[0].lower() if "://" in word else ""
     device = re.fullmatch(r"camera:(.+)", word) or re.fullmatch(r"/dev/video(\d+)", word)

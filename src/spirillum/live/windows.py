@@ -29,11 +29,6 @@ class Window:
     """The readings of one series in the last seconds."""
 
     def __init__(self, length: float) -> None:
-        """Begin empty.
-
-        Args:
-            length: of the window, s.
-        """
         self.length = length
         self._readings: deque[tuple[float, float]] = deque()
 
@@ -113,7 +108,6 @@ class CausalAngle:
     """Gives each angle the whole periods that bring it nearest to its prediction by an alpha-beta filter."""
 
     def __init__(self, period: float) -> None:
-        """Begin."""
         self.period = period
         self.restarts = 0
         """How often tracking restarted, so that angles before and after are not comparable."""
@@ -124,13 +118,7 @@ class CausalAngle:
         self._count = self._outliers = 0
 
     def update(self, time: float, angle: float, error: float) -> float:
-        """The continuous angle of a frame, rad; NaN where it is unreadable or an outlier.
-
-        Args:
-            time: of the frame, s; later than before.
-            angle: modulo the period, rad; NaN where it is unreadable.
-            error: its standard error, rad.
-        """
+        """The continuous angle of a frame, rad; NaN where it is unreadable or an outlier."""
         if not math.isfinite(angle):
             return math.nan
         self._times = [*self._times[-UNWRAPPING.start :], time]

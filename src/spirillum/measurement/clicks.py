@@ -106,12 +106,7 @@ def nose_side(nose: tuple[float, float], rear: tuple[float, float]) -> str:
 
 
 def across(points: Sequence[tuple[float, float]], direction: str) -> list[tuple[float, float]]:
-    """Points in the order in which stripes follow each other: from the left of a robot that looks along to its right.
-
-    Args:
-        points: pixels (u, v).
-        direction: where the nose points.
-    """
+    """Points in the order of stripes: from the left of a robot that looks along `direction` to its right."""
     right = _RIGHT.get(str(direction))
     if right is None:
         raise InputError(f"robot.direction = {clipped(direction)}; allowed: {', '.join(_RIGHT)}")
@@ -119,13 +114,7 @@ def across(points: Sequence[tuple[float, float]], direction: str) -> list[tuple[
 
 
 def stripe_names(image: np.ndarray, clicks: Sequence[tuple[float, float]], allowed: Sequence[str] = ()) -> list[str]:
-    """Names of the colours at some pixels.
-
-    Args:
-        image: 8-bit RGB, (h, w, 3).
-        clicks: pixels (u, v).
-        allowed: names to choose from; empty: all that there are.
-    """
+    """Names of the colours at some pixels, from those allowed, or from all."""
     if not clicks:
         return []
     height, width = image.shape[:2]

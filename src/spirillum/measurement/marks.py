@@ -98,16 +98,7 @@ class Marks:
 
 
 def read_marks(path: str | Path) -> dict[str, Marks]:
-    """Read a table of manual readings.
-
-    Args:
-        path: CSV with some of the columns `MARK_COLUMNS`. Angles are cumulative (370 after a full turn and ten
-            degrees). If all of them lie within one turn and a step exceeds half a turn, they are taken as angles
-            modulo 360 and unwrapped.
-
-    Returns:
-        The readings by video; the key is empty where the table has no such column.
-    """
+    """Read a CSV table of manual readings by video; angles within one turn are unwrapped."""
     table = read_readings(path, _WHAT)
     _check_columns(table)
     rows: dict[str, list[TableRow]] = {}

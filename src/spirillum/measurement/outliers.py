@@ -79,11 +79,7 @@ def _far(residual: Samples, least: Samples) -> np.ndarray:
 
 
 def outlying_trial(values: Sequence[float]) -> int | None:
-    """The trial that does not fit in with the others, by Grubbs' test (1950), two-sided, at 1 %.
-
-    Returns:
-        Its index; None if all fit, or with fewer than three.
-    """
+    """Index of the outlier by Grubbs' test (1950), two-sided, at 1 %; None if all fit or with fewer than three."""
     numbers = np.asarray(values, dtype=float)
     known = np.flatnonzero(np.isfinite(numbers))
     count = known.size

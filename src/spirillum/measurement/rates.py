@@ -183,13 +183,7 @@ def rate_of(
 
 
 def mean_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float, float, float]:
-    """Mean of a series and its confidence interval, with the noise model of `rate_of` without periodic errors.
-
-    Args:
-        time: true times, s, (n,).
-        values: the series, (n,); NaN where it was not measured.
-        level: confidence level.
-    """
+    """Mean of a series and its confidence interval, with the noise model of `rate_of` without periodic errors."""
     used = np.isfinite(values) & np.isfinite(time) & ~outlying_frames(time, values)
     if used.sum() < _FEWEST or np.ptp(time[used]) <= 0:
         return float(values[used].mean()) if used.any() else np.nan, np.nan, np.nan

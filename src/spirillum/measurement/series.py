@@ -137,11 +137,7 @@ _SEEN = {
 
 
 def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str | None:
-    """Text of an observations file, a row a trial with its own intervals, as `spirillum calibrate` reads it.
-
-    Returns:
-        The text; None if the robot swims in no channel, or nothing was measured.
-    """
+    """Text of an observations file, a row a trial; None without a channel, or if nothing was measured."""
     if robot.channel is None:
         return None
     kept = [trial for trial in trials if any(math.isfinite(trial.quantities[name].value) for name in _SEEN)]

@@ -39,13 +39,7 @@ def apparent_distance(height: float, camera: float, surface: float | None, index
 
 
 def spacing_at_axis(setup: Setup, changed: str = "", by: float = 0.0) -> float:
-    """Length at the height of the robot's axis that looks as long as the ruler's spacing at the height of the ruler, m.
-
-    Args:
-        setup: the setup; without a ruler the spacing is 1.
-        changed: a number of the setup that is changed, by its dotted name.
-        by: how much it is changed by.
-    """
+    """Length at the robot's axis that looks as long as the ruler's spacing (without one: 1), with one field changed."""
 
     def number(name: str, value: float) -> float:
         return value + by if name == changed else value
@@ -234,12 +228,7 @@ def scale_confirmed(size: float, flags: Iterable[Flag]) -> bool:
 
 
 def setup_remarks(setup: Setup, *, confirmed: bool = False) -> list[Note]:
-    """Notes on the uncertainties of a setup for users of its lengths.
-
-    Args:
-        setup: the setup.
-        confirmed: whether videos show the robot as large as they should: values of the example are then no concern.
-    """
+    """Notes on the uncertainties of a setup; without those of the example where videos confirm the robot's size."""
     found = []
     if not depth_shares(setup):
         words = (

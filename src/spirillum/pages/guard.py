@@ -31,12 +31,7 @@ class Strangers:
     """Open connections without a key, the oldest first; used by the server's one thread."""
 
     def __init__(self, most: int = _MOST, patience: float = _PATIENCE) -> None:
-        """No connection yet.
-
-        Args:
-            most: connections without a key that are open at once.
-            patience: time in which a connection has to show the key, s.
-        """
+        """No connection yet."""
         self._most, self._patience = most, patience
         self._waiting: dict[_Address, tuple[asyncio.BaseTransport, asyncio.TimerHandle]] = {}
 

@@ -56,7 +56,6 @@ class BackgroundJob:
     """Running module: its last progress message, and its state."""
 
     def __init__(self, module: str, request: Mapping[str, Any], announce: Callable[[], None] = lambda: None) -> None:
-        """Begin."""
         self._tell, self._stopped = announce, False
         self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
         self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments

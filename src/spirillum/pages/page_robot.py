@@ -60,12 +60,7 @@ class Flowing(BackgroundJob):
 
 
 def plane_shown(plane: xr.Dataset, phase: float) -> dict[str, Any]:
-    """Flow plane for the page: velocities along x and z in rows of rising z, m/s, NaN in solids.
-
-    Args:
-        plane: what `Flow.plane` returns for `xz`.
-        phase: of the tail, rad.
-    """
+    """Flow plane `xz` for the page: velocities along x and z in rows of rising z, m/s, NaN in solids."""
     velocity = [plane[name].transpose("z", "x").values for name in ("velocity_x", "velocity_z")]
     speed = np.hypot(*velocity)
     warnings = list(notes_in(plane.attrs))

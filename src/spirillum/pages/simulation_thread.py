@@ -26,7 +26,6 @@ class Preparing(BackgroundJob):
     """Table in preparation; completed nodes are cached when it is cancelled."""
 
     def __init__(self, robot: Robot, announce: Callable[[], None]) -> None:
-        """Begin."""
         super().__init__(__name__, {"robot": robot_text(robot)}, announce)
         self.robot = robot
 
@@ -93,7 +92,7 @@ class SimulationThread:
         ]
 
     def start(self) -> None:
-        """Begin."""
+        """Start both threads."""
         self._send_scene()
         for thread in self._threads:
             thread.start()

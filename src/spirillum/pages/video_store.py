@@ -62,12 +62,7 @@ class Uploads:
 
     @asynccontextmanager
     async def received(self, request: Request, largest: int) -> AsyncIterator[bytes]:
-        """What a request sends, counted until the block ends.
-
-        Raises:
-            TooLargeError: if it is too large, by itself or with all that others are sending.
-            InputError: if it does not state its size.
-        """
+        """What a request sends, counted until the block ends."""
         size = stated_size(request)
         if size > largest:
             raise TooLargeError(f"{size} bytes are too much; allowed: {largest} bytes")
@@ -111,12 +106,7 @@ class VideoStore:
         self._count = 0
 
     def room_for(self, kind: str, size: int) -> Path:
-        """Reserve an empty file for an upload; its declared bytes count while it exists.
-
-        Raises:
-            TooLargeError: for too large a film, too many, or a full disk.
-            InputError: for another kind of file.
-        """
+        """Reserve an empty file for an upload; its declared bytes count while it exists."""
         from spirillum.vision.video.frames import FILMS
 
         import_optional("av", "measuring a video", "video")

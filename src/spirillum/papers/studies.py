@@ -12,12 +12,7 @@ _STUDIES: dict[str, Callable[[], dict[str, Any]]] = {"biorob2012": paper_study}
 
 
 def study_of(source: str | Path | Mapping[str, Any] | None) -> str | Path | Mapping[str, Any]:
-    """Return the source of a study: a file, tables, or a paper's study.
-
-    Args:
-        source: a study file or its tables, which come back as they are; a paper's name; or None: the study of the first
-            paper.
-    """
+    """Return the source of a study: a file or tables as they are, a paper's study by name; None: the first paper's."""
     if source is None:
         return next(iter(_STUDIES.values()))()
     named = None if isinstance(source, Mapping) else _STUDIES.get(str(source))

@@ -47,11 +47,7 @@ def write_measurement_report(
     thumbnails: Mapping[str, bytes],
     on_progress: Callable[[str, int, int], None],
 ) -> list[str]:
-    """Write `figures/` (PNG and SVG) and `report.html`, each whole or not at all.
-
-    Returns:
-        Names of the files, as seen from the folder.
-    """
+    """Write `figures/` (PNG and SVG) and `report.html`, each whole or not at all; return their names in the folder."""
     from spirillum.view.figures.measurement import measurement_figures
 
     pictures = measurement_figures(measurement)

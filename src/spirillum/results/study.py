@@ -34,7 +34,7 @@ from spirillum.view.figures.comparison import ranking_picture
 from spirillum.view.figures.release import release_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
 from spirillum.view.figures.sheet import Picture
-from spirillum.worker_pool import checked_crew
+from spirillum.worker_pool import pool_of_workers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -190,7 +190,7 @@ def study(  # noqa: PLR0913 - the options of the command
     """
     from spirillum.results.study_content import StudyDataset
 
-    crew = checked_crew(1, workers) if isinstance(workers, str) else checked_crew(workers, None)
+    pool = pool_of_workers(1, workers) if isinstance(workers, str) else pool_of_workers(workers, None)
     if store is not None and output is not None:
         raise InputError(f"store = {str(store)[:80]!r} together with a folder for results; allowed: one of them")
     loaded = load_study(
@@ -207,24 +207,24 @@ def study(  # noqa: PLR0913 - the options of the command
         largest=LARGEST_STUDY if store is None else LARGEST_STORED,
     )
     observed = observed_arrays(observations, loaded) if observations is not None else None
-    crew.check()
+    pool.check()
     fingerprint = study_fingerprint(loaded, observed)
     on_progress = progress or (lambda _what, _done, _total: None)
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
         with guard_inputs(*inputs):
-            return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, on_progress))
+            return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, pool, on_progress))
     if output is None:
-        make_tables(loaded, crew, on_progress)
-        return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, on_progress, crew))
+        make_tables(loaded, pool, on_progress)
+        return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, on_progress, pool))
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     with guard_inputs(*inputs), results_folder(output, claim=claim) as folder:
-        make_tables(loaded, crew, on_progress)
+        make_tables(loaded, pool, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
-            dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, crew)
+            dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
         write_report(dataset, folder, on_progress)

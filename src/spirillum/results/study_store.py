@@ -51,7 +51,7 @@ def stored_study(
     observed: ObservedArrays | None,
     fingerprint: str,
     store: str | Path,
-    crew: WorkerPool,
+    pool: WorkerPool,
     on_progress: Tell,
 ) -> xr.Dataset:
     """Compute what a store lacks of a study, and open it."""
@@ -62,7 +62,7 @@ def stored_study(
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
     claim = {"mark": _MARK, "content": mark, "what": "study"}
     with results_folder(store_target(store), claim=claim) as folder:
-        make_tables(loaded, crew, on_progress)
+        make_tables(loaded, pool, on_progress)
         plan = plan_of(loaded, observed, layout_of(loaded))
         attributes = {**described(loaded, observed, fingerprint, []), "coordinates": " ".join(plan.others)}
         outcome = _outcome_of(folder)
@@ -70,8 +70,8 @@ def stored_study(
         if outcome is None:
             _write_headers(plan, folder, {**attributes, "finished": "no"})
         if missing:
-            estimate = estimate_of(loaded, observed, plan, len(missing), crew) if is_large(loaded) else None
-            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, on_progress, estimate)
+            estimate = estimate_of(loaded, observed, plan, len(missing), pool) if is_large(loaded) else None
+            _write_regions(_Work(loaded, observed, plan, folder), missing, pool, on_progress, estimate)
         if outcome is None:
             outcome = _summed(loaded, [_note_of(folder / plan.note(region)) for region in plan.layout.regions()])
         _write_headers(plan, folder, {**attributes, **outcome._asdict(), "finished": "yes"})
@@ -161,7 +161,7 @@ def _holds(path: Path, content: bytes) -> bool:
 
 
 def _write_regions(
-    work: _Work, missing: Sequence[RobotBlock], crew: WorkerPool, on_progress: Tell, estimate: CostEstimate | None
+    work: _Work, missing: Sequence[RobotBlock], pool: WorkerPool, on_progress: Tell, estimate: CostEstimate | None
 ) -> None:
     """Compute and write regions; the remaining time is reported once their pace is known."""
     plan, total = work.plan, work.plan.layout.count
@@ -175,7 +175,7 @@ def _write_regions(
 
     pace = None if estimate is None else Pace(sum(region.size for region in missing), estimate.workers)
     jobs = region_jobs(work.loaded, work.observed, plan, _spread(missing))
-    for job, files in map_tasks(encoded_region, jobs, crew, besides="; what was written is kept", on_progress=at_work):
+    for job, files in map_tasks(encoded_region, jobs, pool, besides="; what was written is kept", on_progress=at_work):
         write_pieces(work.folder, files)
         done += 1
         seconds = None if pace is None or done == total else pace.seconds(job.region.size)

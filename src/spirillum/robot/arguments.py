@@ -27,23 +27,14 @@ class Options(Section):
 
     @classmethod
     def of(cls, value: Self | Mapping[str, Any] | None) -> Self:
-        """Options from what a caller may give.
-
-        Args:
-            value: options, their fields by name (quantities with their unit, or floats in SI), or None: the defaults.
-                A field that is None is as if left out.
-        """
+        """Options from themselves, their fields by name (with units, or floats in SI), or None; None is left out."""
         if isinstance(value, cls):
             return value
         return cls._read(value, written=False)
 
     @classmethod
     def as_written(cls, value: Any) -> Self:
-        """Options from a table of a file or from words of the command line, where every quantity has its unit.
-
-        Args:
-            value: fields by name, or None: the defaults.
-        """
+        """Options from a table of a file or from words of the command line, where every quantity has its unit."""
         return cls._read(value, written=True)
 
     @classmethod

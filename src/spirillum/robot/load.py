@@ -201,11 +201,7 @@ def _folder_of(robot: str | Path | Mapping[str, Any]) -> Path:
 def _extended(
     table: dict[str, Any], source: str, folder: Path, above: tuple[Path, ...] = ()
 ) -> tuple[dict[str, Any], list[set[str]]]:
-    """Lay the table over the preset or the robot file that its `extends` names.
-
-    Returns:
-        The tables, and the fields that each layer has changed, from below.
-    """
+    """Merge the table over what its `extends` names; return the tables, and the fields that each layer has changed."""
     base = table.pop("extends", None)
     if base is None:
         return table, []

@@ -166,11 +166,7 @@ CALIBRATED = ("sbt", "rft", "slender")
 
 
 def known_model(name: str) -> str:
-    """The name of a model that takes factors.
-
-    Raises:
-        ValueError: for any other name.
-    """
+    """The name of a model that takes factors."""
     if name not in CALIBRATED:
         raise ValueError(f"a model that swims: {', '.join(CALIBRATED)}")
     return name

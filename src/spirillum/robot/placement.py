@@ -79,7 +79,7 @@ class Placement(Options):
         if self.flow is not None and self.ends is not None:
             problems.append(
                 f"placement.ends = '{self.ends}' is given together with placement.flow = {show(self.flow, 'mm/s')}; "
-                "allowed: one of them, for an imposed flow leaves the ends no say"
+                "allowed: one of them"
             )
         if problems:
             raise refuse(*problems)

@@ -183,12 +183,7 @@ def _closed(first: Samples, rings: Samples, last: Samples) -> Surface:
 
 
 def mass_properties(vertices: Samples, faces: Faces) -> tuple[float, Samples, float]:
-    """Volume (m^3), centroid of the volume (m, (3,)) and area (m^2) of a closed surface.
-
-    Args:
-        vertices: m, (n, 3).
-        faces: outward oriented, (m, 3).
-    """
+    """Volume (m^3), centroid of the volume (m, (3,)) and area (m^2) of a closed, outward oriented surface."""
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     a, b, c = np.moveaxis((vertices - middle)[faces], 1, 0)
     normal = np.cross(b - a, c - a)

@@ -190,11 +190,6 @@ def closest_strands(strands: Sequence[Samples], along: Samples, radius: float) -
     """Least distance between points of wires, further apart along one wire than half a tightest turn, m.
 
     Infinite where none is closer than the wire's diameter.
-
-    Args:
-        strands: points along each wire, (k, 3), m.
-        along: lengths to these points, m, (k,).
-        radius: of the wire, m.
     """
     from scipy.spatial import cKDTree
 

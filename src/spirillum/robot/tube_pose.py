@@ -161,13 +161,7 @@ class Seat:
         return nearest
 
     def _farthest(self, x: Samples, rho: Samples, drop: float = 0.0) -> tuple[Samples, Samples]:
-        """Distance of the farthest point of each ring from the tube's axis, m, and its angle theta.
-
-        Args:
-            x: of the rings, (n,).
-            rho: their radii, (n,).
-            drop: distance by which their axis is lowered, across itself.
-        """
+        """Distance of the farthest point of each ring from the tube's axis, m, and its angle theta."""
         pitch = self.pitch
         d = -(self.offset + drop * np.cos(pitch)) + x * np.sin(pitch)
         if self.yaw:
@@ -226,13 +220,7 @@ def _farthest_of_ellipses(
 
 
 def gap_of(placement: Placement, body_diameter: float, radius: float) -> float:
-    """Gap of a placement, m; by default `GAP_SHARE` of the body's radius, at most that on the axis.
-
-    Args:
-        placement: what is asked for.
-        body_diameter: D_b, m.
-        radius: R of the tube, m.
-    """
+    """Gap of a placement, m; by default `GAP_SHARE` of the body's radius, at most that on the axis."""
     room = radius - 0.5 * body_diameter
     if placement.gap is not None:
         return placement.gap
@@ -321,14 +309,7 @@ def contact_pitch(
 
 
 def last_clear(spare: Callable[[float], float], most: float, steps: int, narrowest: float) -> float:
-    """Largest angle up to which nothing touches the wall, rad; at most `most`.
-
-    Args:
-        spare: what is left of a clearance at an angle; at 0 it is there.
-        most: largest angle that is tried, rad.
-        steps: number of angles, from 0 to that, among which the first contact is bracketed.
-        narrowest: width of the bracket at the end, rad.
-    """
+    """Largest angle up to which nothing touches the wall, rad: the first contact among `steps`, bracketed further."""
     tried = np.linspace(0.0, most, steps)
     touching = next((step for step in range(1, steps) if spare(float(tried[step])) < 0), None)
     if touching is None:

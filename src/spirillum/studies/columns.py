@@ -1,6 +1,6 @@
 """Columns of a study beside its models: bands over open poses, axial motion by `tube`, trials after release.
 
-Robots of one channel that share a place come one after the other: what is solved for body and wall there serves them
+Robots of one channel that share a pose come one after the other: what is solved for body and wall there serves them
 all.
 """
 
@@ -28,13 +28,13 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.tube_pose import GAP_SHARE
 from spirillum.studies.spec import Contact
 from spirillum.studies.study_loader import LoadedStudy, ObservedArrays
-from spirillum.studies.work import OneRobot, Part, StudyTask, gathered, groups
-from spirillum.swimming.band import at_place, band_places, joined
+from spirillum.studies.work import OneModel, OneRobot, Part, gathered, groups
+from spirillum.swimming.band import at_pose, band_poses, joined
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
 
-AT_PLACES = (
+AT_POSES = (
     "forward_velocity",
     "advance_per_radian",
     "tail_rotation_rate",
@@ -48,19 +48,13 @@ AT_PLACES = (
 
 
 @dataclass(frozen=True)
-class BandTask(StudyTask):
+class BandTask(OneModel):
     """One model for the robots of one channel that share a pose of their bands."""
 
-    model: str
-    place: int
+    pose: int
     """Index of the pose in the band of each robot."""
     robots: tuple[RobotBatch, ...]
     """The robots at that pose, one by one."""
-
-    @property
-    def models(self) -> tuple[str, ...]:
-        """Models whose linear algebra is limited to one thread."""
-        return (self.model,)
 
     @property
     def words(self) -> str:
@@ -76,18 +70,14 @@ class BandTask(StudyTask):
     @property
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
-        return set(AT_PLACES)
-
-    def leading(self, readings: int) -> tuple[int, ...]:
-        """Return the sizes of the first axes of all arrays: robots, friction readings."""
-        return self.size, readings
+        return set(AT_POSES)
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Compute steady swimming at this pose, (robots, friction readings); NaN where there is none."""
         model = find_swimmer_model(self.model)
         there = [_quickly(robot, model) for robot in self.robots]
         found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
-        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
+        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_POSES}
 
 
 def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
@@ -99,40 +89,36 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
         robots = [block for _, block in batch.blocks(1)]
         for name in loaded.study.models:
             model = find_swimmer_model(name)
-            for place, sharing in _shared_places(robots, model):
+            for pose, sharing in _shared_poses(robots, model):
                 there = tuple(sharing.values())
-                yield BandTask(number, indices[list(sharing)], name, place, there)
+                yield BandTask(number, indices[list(sharing)], name, pose, there)
                 number += 1
 
 
 def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, SwimmerModel]:
     """A robot with the form of a model that answers first: from its table, or solved with the resolution of a band."""
     quick = quickest(model, robot)
-    return (at_place(robot, robot.placement), model) if quick is model else (robot, quick)
+    return (at_pose(robot, robot.placement), model) if quick is model else (robot, quick)
 
 
-def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
+def _shared_poses(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
     """Index of a pose of the band, and the robots that share it, by their index, at that pose."""
     bands = {}
     for index, single in enumerate(robots):
         if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
-            bands[index] = band_places(single, model)
-    places = max((len(band) for band in bands.values()), default=0)
-    for place in range(places):
+            bands[index] = band_poses(single, model)
+    poses = max((len(band) for band in bands.values()), default=0)
+    for pose in range(poses):
         sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
         for index, band in bands.items():
-            key = (band[place].gap, band[place].pitch)
-            sharing.setdefault(key, {})[index] = robots[index].placed(band[place])
+            key = (band[pose].gap, band[pose].pitch)
+            sharing.setdefault(key, {})[index] = robots[index].placed(band[pose])
         for there in sharing.values():
-            yield place, there
+            yield pose, there
 
 
-def reference_place(settings: Mapping[str, Any]) -> str:
-    """Poses of the robots of a study for the models that compute the walls, in words.
-
-    Args:
-        settings: the study's settings, as the attribute `settings` of its dataset holds them.
-    """
+def reference_pose(settings: Mapping[str, Any]) -> str:
+    """Poses of the robots of a study, by its `settings`, for the models that compute the walls, in words."""
     if settings.get("placements"):
         return "where the calibration places them"
     placement = settings.get("study", {}).get("placement") or {}
@@ -164,12 +150,12 @@ def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[Note]:
 def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
     """`gap_at_place` and `pitch_at_place` of every robot, (robots, poses), m and rad; NaN where it has no band."""
     tasks = [task for task, _ in answers]
-    places = max(task.place for task in tasks) + 1
+    poses = max(task.pose for task in tasks) + 1
     names = ("gap_at_place", "pitch_at_place")
-    found: dict[str, Values] = {name: np.full((count, places), np.nan) for name in names}
+    found: dict[str, Values] = {name: np.full((count, poses), np.nan) for name in names}
     for task in tasks:
-        found["gap_at_place"][task.indices, task.place] = task.robots[0].placement.gap
-        found["pitch_at_place"][task.indices, task.place] = task.robots[0].placement.pitch
+        found["gap_at_place"][task.indices, task.pose] = task.robots[0].placement.gap
+        found["pitch_at_place"][task.indices, task.pose] = task.robots[0].placement.pitch
     return found
 
 
@@ -179,8 +165,8 @@ def with_band(
     """Quantities at all poses, and the least and largest of all poses and the reference pose.
 
     Args:
-        flat: the answers at the reference place, (models, robots, friction readings).
-        answers: those at the places of the band.
+        flat: the answers at the reference pose, (models, robots, friction readings).
+        answers: those at the poses of the band.
         models: names of the models, in their order.
 
     Returns:
@@ -188,13 +174,13 @@ def with_band(
         (models, robots, friction readings); NaN for models without a band.
     """
     pairs = list(answers)
-    places = max(task.place for task, _ in pairs) + 1
+    poses = max(task.pose for task, _ in pairs) + 1
     banded = {models.index(task.model) for task, _ in pairs}
     found: dict[str, Values] = {}
-    for name in AT_PLACES:
-        there = np.full((*flat[name].shape, places), np.nan)
+    for name in AT_POSES:
+        there = np.full((*flat[name].shape, poses), np.nan)
         for task, part in pairs:
-            there[models.index(task.model), task.indices, :, task.place] = part[name]
+            there[models.index(task.model), task.indices, :, task.pose] = part[name]
         everywhere = np.concatenate([there, flat[name][..., None]], axis=-1)
         everywhere[[number for number in range(len(models)) if number not in banded]] = np.nan
         found[f"{name}_at_place"] = there
@@ -321,7 +307,7 @@ def trial_notes(answers: Sequence[tuple[TrialTask, Part]]) -> list[Note]:
     if lost:
         words = (
             f"{len(lost)} of {len(answers)} robots have no trial, the first: {lost[0].robot.with_tail}; "
-            "`spirillum predict` says why"
+            "`spirillum predict` gives the reason"
         )
         found.append(Note("without-answer", words, ("forward_velocity_trial",)))
     return found

@@ -111,11 +111,11 @@ def _effects(values: Values, robots: int) -> Values:
 
 _PAPER = "BioRob 2012"
 _PLACED = {
-    "gap_at_place": attributes("gap", source="places of the band"),
-    "pitch_at_place": attributes("pitch", source="places of the band: level, half and all that gap and tail allow"),
+    "gap_at_place": attributes("gap", source="poses of the band"),
+    "pitch_at_place": attributes("pitch", source="poses of the band: level, half and all that gap and tail allow"),
 }
 _BAND = {
-    "_at_place": ("at a pose of the band", "places of the band"),
+    "_at_place": ("at a pose of the band", "poses of the band"),
     "_interval_low": ("lower limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_interval_high": ("upper limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_low": ("least of the band over gap and pitch", "least of all poses, the reference pose among them"),
@@ -126,7 +126,7 @@ _BAND = {
 class BesideModels(NamedTuple):
     """Answers of robots one by one, beside those of the models."""
 
-    laid_down: Sequence[tuple[ReleaseTask, Part]] = ()
+    released: Sequence[tuple[ReleaseTask, Part]] = ()
     """Of robots that made the runs of a design."""
     settled: Sequence[tuple[SettledTask, Part]] = ()
     """Of those that were followed to their steady motions."""
@@ -195,9 +195,9 @@ def laid_out(
     data: dict[str, Any] = {}
     for name, values in flat.items():
         axis_last = np.moveaxis(values, 0, 1)  # (robots, models, friction[, rates or places])
-        laid = axis_last.reshape(*shape, *axis_last.shape[1:])
+        moved = axis_last.reshape(*shape, *axis_last.shape[1:])
         more = ("place" if name.endswith("_at_place") else "assumed_motor_rate",)[: axis_last.ndim - 3]
-        data[name] = ((*robots, "model", "friction", *more), laid, _attributes_of(name))
+        data[name] = ((*robots, "model", "friction", *more), moved, _attributes_of(name))
     if band:
         for name, values in placed_at(band, count).items():
             data[name] = ((*robots, "place"), values.reshape(*shape, -1), _PLACED[name])
@@ -208,8 +208,8 @@ def laid_out(
     data |= column_variables(beside.held, beside.trials, robots, shape)
     if beside.settled:
         data |= settled_variables(beside.settled, robots, shape)
-    if beside.laid_down:
-        data |= release_variables(beside.laid_down, robots, shape)
+    if beside.released:
+        data |= release_variables(beside.released, robots, shape)
         coordinates |= release_coordinates(study.laid_down)
     return xr.Dataset(data, coords=coordinates)
 

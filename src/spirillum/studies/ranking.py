@@ -3,8 +3,8 @@
 One model and one reading of the friction rank all robots: the model that computes the channel's walls where the study
 has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
 study has it. Robots that are released too (`settled`) are ordered by their speed in steady motion. Bands and intervals
-are those of the study. A band goes over places that robots may share, such as a gap: at how many of them the fastest
-robot is the fastest says more than how far the bands overlap.
+are those of the study. A band goes over poses that robots may share, such as a gap: at how many of them the fastest
+robot is the fastest is more informative than how far the bands overlap.
 """
 
 from __future__ import annotations

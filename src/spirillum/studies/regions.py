@@ -238,7 +238,7 @@ def encoded_region(job: RegionJob) -> dict[str, bytes]:
 
 
 _FEW, _MORE = 200, 2000
-"""Robots that are computed to know the memory of the rest of them."""
+"""Robots that are computed to estimate the memory of the rest."""
 _SOLVING_MEMORY = 5e8
 """Of a solve of body and walls, bytes; measured for the paper's robot."""
 
@@ -282,11 +282,7 @@ class CostEstimate(NamedTuple):
     workers: int
 
     def words(self, seconds: float) -> str:
-        """Return the estimate in a line.
-
-        Args:
-            seconds: time that the study takes, s.
-        """
+        """Return the estimate in a line."""
         return (
             f"{ESTIMATE}{self.results} results, about {_duration(seconds)} with {self.workers} "
             f"worker{'' if self.workers == 1 else 's'}, {self.memory / 1e6:.0f} MB of memory here, at most "
@@ -317,14 +313,14 @@ class _Cost(NamedTuple):
 
 
 def estimate_of(
-    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, crew: WorkerPool
+    loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, pool: WorkerPool
 ) -> CostEstimate:
     """Estimate what is missing of a study."""
     cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0)
-    workers, base = crew.size, memory_in_use()
-    alone = crew.cluster is None and (workers == 1 or missing < 2)
+    workers, base = pool.size, memory_in_use()
+    alone = pool.cluster is None and (workers == 1 or missing < 2)
     here = base + (cost.memory if alone else AHEAD * workers * cost.encoded)
-    others = 0 if alone or crew.cluster is not None else min(workers, missing)
+    others = 0 if alone or pool.cluster is not None else min(workers, missing)
     return CostEstimate(
         results=loaded.study.size,
         memory=here + others * (base + cost.memory),

@@ -9,7 +9,7 @@ the asperities, and coefficient of dry friction. Every run is one of `spirillum.
 a camera above the channel reads it, and put through the paper's inference: B_eff by (18), the factor on the body's drag
 by (15).
 
-For the steady state, each robot is released where the study's placement says, with its drive on, and followed as
+For the steady state, each robot is released at the study's placement, with its drive on, and followed as
 `spirillum.settle` does.
 """
 
@@ -63,15 +63,7 @@ def half_fraction(factors: int) -> Levels:
 
 
 def main_effects(values: Values, levels: Levels) -> Values:
-    """Mean at the high level less mean at the low one, for each factor; runs without an answer are left out.
-
-    Args:
-        values: answers of the runs, (..., runs); NaN where there is none.
-        levels: of the factors, (runs, factors).
-
-    Returns:
-        (..., factors); NaN where a level has no answer.
-    """
+    """Mean at the high level less mean at the low one, (..., factors); runs without an answer are left out."""
     known = np.isfinite(values)
     filled = np.where(known, values, 0.0)
     means = []
@@ -134,8 +126,8 @@ def release_runs(robot: Robot, ranges: LaidDown) -> list[ReleasedRobot]:
     batch, found = RobotBatch.of(robot), []
     for signs in levels():
         low_or_high = [getattr(ranges, name)[int(sign > 0)] for name, sign in zip(FACTORS, signs, strict=True)]
-        laid = ReleasedRobot(*low_or_high)
-        found.append(laid._replace(pitch=laid.pitch * steepest_pitch(batch, laid.gap)))
+        released = ReleasedRobot(*low_or_high)
+        found.append(released._replace(pitch=released.pitch * steepest_pitch(batch, released.gap)))
     return found
 
 
@@ -161,23 +153,23 @@ class ReleaseTask(OneRobot):
         NaN for a run that its robot cannot make, and over a window that it does not reach.
         """
         runs = release_runs(self.robot, self.ranges)
-        read = [self._read(laid) for laid in runs]
+        read = [self._read(released) for released in runs]
         part: Part = {
             name: np.array([[[window[name] for window in run] for run in read]], dtype=float) for name in AT_RUNS
         }
         part |= {name: values[None] for name, values in inferred(self.robot, part).items()}
-        return part | {"laid_pitch": np.array([[laid.pitch for laid in runs]])}
+        return part | {"laid_pitch": np.array([[released.pitch for released in runs]])}
 
-    def _read(self, laid: ReleasedRobot) -> list[dict[str, float]]:
+    def _read(self, released: ReleasedRobot) -> list[dict[str, float]]:
         nothing = [dict.fromkeys(AT_RUNS, float("nan")) for _ in WINDOWS]
         try:
             run = simulate(
                 self.robot,
                 model="tube",
                 timing={"duration": self.ranges.duration, "samples_per_turn": _SAMPLES_PER_TURN},
-                placement={"gap": laid.gap, "pitch": laid.pitch},
-                roughness=laid.roughness,
-                in_tube={"wait": laid.wait, "friction_coefficient": laid.friction_coefficient},
+                placement={"gap": released.gap, "pitch": released.pitch},
+                roughness=released.roughness,
+                in_tube={"wait": released.wait, "friction_coefficient": released.friction_coefficient},
             )
         except InputError:
             return nothing
@@ -277,7 +269,7 @@ SETTLED = (
     "hydrodynamic_efficiency",
 )
 """Quantities of a steady motion."""
-PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
+POSE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
 """Pose of a robot in it, and its time constant."""
 SETTLED_STATES = ("not followed", *get_args(State))
 """Outcome for a robot; the index in this list is the value in the dataset."""
@@ -300,11 +292,11 @@ class SettledTask(OneRobot):
     @property
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
-        return {*SETTLED, *PLACE, "error_estimate", "near", "state"}
+        return {*SETTLED, *POSE, "error_estimate", "near", "state"}
 
     def answer(self, _loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
-        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate", "near")}
+        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *POSE, "error_estimate", "near")}
         try:
             motion = free_motion(
                 self.robot,
@@ -321,7 +313,7 @@ class SettledTask(OneRobot):
         if lying.state == "changing":  # its means depend on when they are taken
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
-        values |= {name: float(getattr(lying, name)) for name in PLACE}
+        values |= {name: float(getattr(lying, name)) for name in POSE}
         values |= {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
         return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
 
@@ -367,7 +359,7 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
     if lost:
         words = (
             f"{len(lost)} of {len(answers)} robots have no steady motion that could be found, the first: "
-            f"{lost[0].robot.with_tail}; `spirillum settle` says why"
+            f"{lost[0].robot.with_tail}; `spirillum settle` gives the reason"
         )
         found.append(Note("without-answer", words, ("settled_forward_velocity",)))
     return found
@@ -376,13 +368,9 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[Note]:
 def settled_variables(
     answers: Sequence[tuple[SettledTask, Part]], robots: Sequence[str], shape: Sequence[int]
 ) -> dict[str, Any]:
-    """The steady motions as variables of a dataset.
-
-    Returns:
-        `<quantity>_settled` over the robots, NaN for those without a steady motion, and `settled`, what became of them.
-    """
+    """`<quantity>_settled` of the steady motions, NaN where there is none, and `settled`, what became of each."""
     found: dict[str, Any] = {}
-    for name in (*SETTLED, *PLACE):
+    for name in (*SETTLED, *POSE):
         about = attributes(
             name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
         )

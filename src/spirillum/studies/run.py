@@ -88,18 +88,9 @@ def computed_study(
     fingerprint: str,
     parts: Path | None,
     tell: Progress,
-    crew: WorkerPool | None = None,
+    pool: WorkerPool | None = None,
 ) -> xr.Dataset:
-    """The dataset of a study.
-
-    Args:
-        loaded: the study with its robots.
-        observed: observed rates and speeds of its robots, if any.
-        fingerprint: see `study_fingerprint`.
-        parts: folder where finished parts are kept and found again; None: nowhere.
-        tell: called with what is being done, steps done and steps in all.
-        crew: who computes; None: this process.
-    """
+    """The dataset of a study; finished parts are kept in and reused from the folder `parts`."""
     todo: list[ModelTask | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
     followed = loaded.study.predicted or loaded.study.settled or loaded.study.trial
@@ -108,27 +99,27 @@ def computed_study(
     settled = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
     holding = list(held_tasks(loaded, len(todo) + len(runs) + len(settled)))
     trials = list(trial_tasks(loaded, with_table, len(todo) + len(runs) + len(settled) + len(holding)))
-    asked: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
-    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in asked}
-    missing = [task for task in asked if found[task.number] is None]
-    done = len(asked) - len(missing)
+    requested: list[StudyTask] = [*todo, *runs, *settled, *holding, *trials]
+    found = {task.number: kept(task, parts, task.leading(len(loaded.study.friction))) for task in requested}
+    missing = [task for task in requested if found[task.number] is None]
+    done = len(requested) - len(missing)
     if missing:
         _announce_solved(missing, tell)
-        tell(missing[0].words, done, len(asked))
+        tell(missing[0].words, done, len(requested))
     jobs = (task.job(loaded, observed) for task in missing)
-    at_work = _worth(missing, crew or WorkerPool())
+    at_work = _worth(missing, pool or WorkerPool())
     for job, part in map_tasks(run_job, jobs, at_work, besides=_KEPT if parts else ""):
-        task = asked[job.task.number]
+        task = requested[job.task.number]
         found[task.number] = part
         keep(task, part, parts)
         done += 1
-        tell(task.words, done, len(asked))
-    tell("dataset", len(asked), len(asked))
+        tell(task.words, done, len(requested))
+    tell("dataset", len(requested), len(requested))
     parts_of = {number: part for number, part in found.items() if part is not None}
     answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, ModelTask)]
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
     beside = BesideModels(
-        laid_down=[(task, parts_of[task.number]) for task in runs],
+        released=[(task, parts_of[task.number]) for task in runs],
         settled=[(task, parts_of[task.number]) for task in settled],
         held=[(task, parts_of[task.number]) for task in holding],
         trials=[(task, parts_of[task.number]) for task in trials],
@@ -139,7 +130,7 @@ def computed_study(
     warnings += left_out(band)
     if followed:
         warnings += _without_table(loaded, with_table)
-    warnings += without_answer(part for _, part in beside.laid_down)
+    warnings += without_answer(part for _, part in beside.released)
     warnings += not_settled(beside.settled)
     warnings += trial_notes(beside.trials)
     warnings += warnings_of_calibrations(loaded)
@@ -160,14 +151,14 @@ _SHORT = 600_000
 """Robots in closed form below which other processes would start longer than they work."""
 
 
-def _worth(missing: Sequence[StudyTask], crew: WorkerPool) -> WorkerPool:
+def _worth(missing: Sequence[StudyTask], pool: WorkerPool) -> WorkerPool:
     """Who computes: this process where the others would start longer than they work."""
     quick = all(
         isinstance(task, HeldTask) or (isinstance(task, ModelTask) and find_swimmer_model(task.model).closed_form)
         for task in missing
     )
     short = quick and sum(task.size for task in missing) < _SHORT
-    return WorkerPool() if short and crew.cluster is None else crew
+    return WorkerPool() if short and pool.cluster is None else pool
 
 
 def warnings_of(loaded: LoadedStudy) -> list[Note]:
@@ -181,11 +172,11 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
         warnings.append(Note("friction-unset", words, ("friction.effective",)))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)
-    asked = [find_swimmer_model(name) for name in loaded.study.models]
-    warnings += _of_places(loaded, asked)
-    warnings += loaded.fit.idle_warnings(loaded.robots, asked)
-    warnings += loaded.fit.geometry_warnings(loaded.robots, asked)
-    warnings += loaded.fit.origin_warnings(loaded.robots, asked)
+    requested = [find_swimmer_model(name) for name in loaded.study.models]
+    warnings += _pose_notes(loaded, requested)
+    warnings += loaded.fit.idle_warnings(loaded.robots, requested)
+    warnings += loaded.fit.geometry_warnings(loaded.robots, requested)
+    warnings += loaded.fit.origin_warnings(loaded.robots, requested)
     warnings += loaded.fit.reading_warnings(loaded.study.friction)
     warnings += loaded.fit.model_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
@@ -195,7 +186,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     return warnings + uneven_models(loaded.robots, models, factors)
 
 
-def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
+def _pose_notes(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[Note]:
     """Limits of answers for robots held at a pose in their tube."""
     walled = [model.name for model in models if model.placed]
     if not walled:
@@ -228,7 +219,7 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[Note]:
     )
 
 
-def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
+def make_tables(loaded: LoadedStudy, pool: WorkerPool, tell: Progress) -> None:
     """Make the tables that robots lack in their tubes, where the study left the choice of the model to the program."""
     if not loaded.makes_tables:
         return
@@ -237,7 +228,7 @@ def make_tables(loaded: LoadedStudy, crew: WorkerPool, tell: Progress) -> None:
     if missing:
         cheaper = "model 'tube' by name solves for one pose of each, 'slender' leaves out the walls"
         tell(f"{ANNOUNCED}, of {len(missing)} robots: they are made first, stage '{stage}'; {cheaper}", 0, 0)
-        prepared_tables(list(missing), stage=stage, workers=1 if crew.cluster else crew.size, progress=tell)
+        prepared_tables(list(missing), stage=stage, workers=1 if pool.cluster else pool.size, progress=tell)
 
 
 def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
@@ -276,10 +267,10 @@ _NAMED = 3
 """Robots that a sentence names; more are counted."""
 
 
-def _of_robots(said: Iterable[tuple[str, Note]]) -> list[Note]:
+def _of_robots(named_notes: Iterable[tuple[str, Note]]) -> list[Note]:
     """Notes with the names of their robots; one that holds for more than three robots is given once."""
     found: dict[Note, list[str]] = {}
-    for name, note in said:
+    for name, note in named_notes:
         found.setdefault(note, []).append(name)
     return [
         note.prefixed(f"{whom}: ")

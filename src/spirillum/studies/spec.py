@@ -99,7 +99,7 @@ class Study(Section):
     title: _Name = "Study"
     """Title of report and figures."""
     note: Annotated[Text, Field(max_length=5000)] = ""
-    """What a reader has to know about the study, such as assumptions."""
+    """Remarks on the study, such as assumptions."""
     models: Annotated[tuple[str, ...], Field(min_length=1)] = (AUTO,)
     """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` for robots in channels (missing
     tables are made first), and `slender` for robots without."""

@@ -70,7 +70,7 @@ class LoadedStudy:
 
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
-        """B_eff of tails that a calibration knows."""
+        """B_eff of tails in a calibration."""
         return self.fit.friction
 
     @property
@@ -118,22 +118,7 @@ def load_study(
     posterior: str | Path | None = None,
     largest: int = LARGEST_STUDY,
 ) -> LoadedStudy:
-    """Load a study and its robots.
-
-    Args:
-        source: study file or the same tables as a mapping;
-        overrides: dotted robot fields, applied to every robot.
-        models: hydrodynamic models instead of the study's; None: the study's.
-        band: whether to compute bands, instead of what the study says; None: what it says.
-        predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
-        settled: whether to follow the robots to their steady motions, instead of what the study says; None: what it
-            says.
-        trial: whether to make a trial of each robot, instead of what the study says; None: what it says.
-        interval: whether to compute the intervals of trials, instead of what the study says; None: what it says.
-        calibration: calibration file, applied to every robot.
-        posterior: file of a calibration's posterior: its middle is applied to every robot.
-        largest: most results that it may ask for.
-    """
+    """Load a study and its robots; arguments as of `spirillum.study`, None: what the study states."""
     instead = {
         "models": None if models is None else list(models),
         "band": band,
@@ -169,7 +154,7 @@ def load_study(
         raise InputError(f"{name}: {error}") from error
     _check_room(study, robots, name)
     _check_contact(study, robots, name)
-    placements = _fitted_places(study, robots, fit)
+    placements = _fitted_poses(study, robots, fit)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     if fit.friction:
         question["friction"] = [item.model_dump() for item in fit.friction]
@@ -218,7 +203,7 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
 
 
 def _check_room(study: Study, robots: Sequence[Robot], name: str) -> None:
-    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, and says so."""
+    """Refuse a gap for which none of the channels has room; a robot in a narrower one has no answer, with a note."""
     rooms = [0.5 * (robot.channel.diameter - robot.body.diameter) for robot in robots if robot.channel is not None]
     gap = study.placement.gap
     if gap is not None and rooms and gap > max(rooms) * (1.0 + 1e-9):
@@ -249,14 +234,14 @@ def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]])
     every = [dict(_flat(fields)) for fields in varied]
     named = []
     for robot, fields, given in zip(robots, every, varied, strict=True):
-        told = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
-        tail = _tail_words([fields.get(path) for path in _VARIED]) if set(_VARIED) <= set(told) else ""
-        told = [path for path in told if not tail or path not in _VARIED]
-        short = [path.rpartition(".")[2] for path in told]
+        unique = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
+        tail = _tail_words([fields.get(path) for path in _VARIED]) if set(_VARIED) <= set(unique) else ""
+        unique = [path for path in unique if not tail or path not in _VARIED]
+        short = [path.rpartition(".")[2] for path in unique]
         words = [tail] if tail else []
         words += [
             f"{name if short.count(name) == 1 else path.replace('.', ' ')} {fields[path]}"
-            for name, path in zip(short, told, strict=True)
+            for name, path in zip(short, unique, strict=True)
         ]
         name = ", ".join([robot.name, *words] if several or not words else words)
         named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
@@ -307,7 +292,7 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
         )
 
 
-def _fitted_places(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
+def _fitted_poses(study: Study, robots: Sequence[Robot], fit: Fit) -> tuple[Placement, ...]:
     """Pose of each robot by a calibration, as `predict` takes it; none where the study states it, or none is needed."""
     if fit.file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
         return ()

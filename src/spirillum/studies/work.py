@@ -79,7 +79,7 @@ REASONS = (
 BLOCK = 25_000
 """Robots of a task in closed form: a fifth of a second of work."""
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
-_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
+_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one pose
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
@@ -171,16 +171,26 @@ def one_thread_each(*models: str) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class ModelTask(StudyTask):
-    """One model for one block of robots of the same kind."""
+class OneModel(StudyTask):
+    """A task of one model, for all friction readings."""
 
     model: str
-    batch: RobotBatch
 
     @property
     def models(self) -> tuple[str, ...]:
         """Models whose linear algebra is limited to one thread."""
         return (self.model,)
+
+    def leading(self, readings: int) -> tuple[int, ...]:
+        """Return the sizes of the first axes of all arrays: robots, friction readings."""
+        return self.size, readings
+
+
+@dataclass(frozen=True)
+class ModelTask(OneModel):
+    """One model for one block of robots of the same kind."""
+
+    batch: RobotBatch
 
     @property
     def words(self) -> str:
@@ -197,10 +207,6 @@ class ModelTask(StudyTask):
         """Names of the arrays that an answer may have."""
         endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
         return {"outside", "error_estimate", *(item.name + at for item in STEADY for at in endings)}
-
-    def leading(self, readings: int) -> tuple[int, ...]:
-        """Return the sizes of the first axes of all arrays: robots, friction readings."""
-        return self.size, readings
 
     def job(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> StudyJob:
         """Return the task with its observations, and its robots where their posterior draws are requested."""

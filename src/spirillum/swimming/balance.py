@@ -109,12 +109,7 @@ def with_body_factors(
 
 
 def force_free(m: AxialWhole, load: AxialLoad | None = None) -> TorqueBalance:
-    """Eliminate U from F = -R V + L with zero total force.
-
-    Args:
-        m: R of the whole robot, from `joined`.
-        load: L, the wrench of an imposed flow on both parts at rest; None: no flow is imposed.
-    """
+    """Eliminate U from F = -R V + L with zero total force; L is the wrench of an imposed flow, or None."""
     drag, body_u, rotor_u = m[..., 0, 0], m[..., 1, 0], m[..., 2, 0]
     u_b, u_r = -m[..., 0, 1] / drag, -m[..., 0, 2] / drag
     balance = TorqueBalance(

@@ -65,11 +65,7 @@ class Band:
     """Poses without an answer, a sentence each."""
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Least and largest value of a quantity over all poses; NaN where it does not apply.
-
-        Args:
-            name: an attribute of `Swimming`.
-        """
+        """Least and largest value of a quantity over all poses; NaN where it does not apply."""
         values = np.concatenate([getattr(self.swimming, name), getattr(self.reference, name)])
         known = values[np.isfinite(values)]
         return (float(known.min()), float(known.max())) if known.size else (float("nan"), float("nan"))
@@ -103,13 +99,10 @@ def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
     return tuple(name for name in ("gap", "pitch") if getattr(placement, name) is None)
 
 
-def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
+def band_poses(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     """The poses of a robot's band, from wide gaps to narrow ones and from level to steep.
 
     As many for every robot, so that the poses of several robots compare: where a robot has no room, some are the same.
-
-    Returns:
-        `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
     """
     over = left_open(batch.pose, model)
     if not over:
@@ -161,7 +154,7 @@ def steepest_pitch(batch: RobotBatch, gap: float) -> float:
     return _steepest(g._replace(wavelength=1.0, hand=1.0), radius, gap, known.tail_drop, known.yaw)
 
 
-def at_place(batch: RobotBatch, place: Placement) -> RobotBatch:
+def at_pose(batch: RobotBatch, place: Placement) -> RobotBatch:
     """Robots at a pose of the band, with the resolution of a band."""
     own: ModelOptions = batch.options
     tube = own.tube.model_copy(update={"tolerance": TOLERANCE})
@@ -181,7 +174,7 @@ def band_of(
     tell: Progress,
 ) -> Band | None:
     """The band of one robot; None where its placement leaves nothing open."""
-    places = band_places(batch, model)
+    places = band_poses(batch, model)
     if not places:
         return None
     found, left_out = [], []
@@ -190,7 +183,7 @@ def band_of(
         assert place.pitch is not None  # noqa: S101
         where = f"gap {show(place.gap, 'mm')}, pitch {show(place.pitch, 'deg')}"
         tell(f"{model.name}, {where}", done + 1, len(places) + 1)
-        there = at_place(batch, place)
+        there = at_pose(batch, place)
         found.append(answer(there))
         if not found[-1].valid[0]:
             outside = broken(requirements(there, model))

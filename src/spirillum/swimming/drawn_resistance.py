@@ -205,13 +205,7 @@ PosteriorFor = Literal["new", "measured"]
 
 
 def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -> PosteriorFor:
-    """The robot whose discrepancy is requested.
-
-    Args:
-        name: `new` or `measured`.
-        posterior: the posterior; None without one.
-        robot: the robot.
-    """
+    """The robot whose discrepancy is requested, `new` or `measured`."""
     check_choice("for", name, get_args(PosteriorFor))
     if name == "measured":
         if posterior is None:
@@ -229,7 +223,7 @@ def posterior_for_of(name: str, posterior: PosteriorFile | None, robot: Robot) -
     return cast("PosteriorFor", name)
 
 
-def drawn_discrepancy(
+def sampled_discrepancy(
     posterior: PosteriorFile, predicted: Mapping[str, Samples], rng: np.random.Generator, robot: Robot | None = None
 ) -> dict[str, Samples]:
     """Factors on advance, turning and motor rate, (draws,) each; 1 for a quantity that was not compared."""

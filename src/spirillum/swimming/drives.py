@@ -65,14 +65,7 @@ def _rows(motor: Electrics, *more: Values) -> tuple[Samples, tuple[int, ...]]:
 
 
 def torque_on_curve(curve: TorqueCurve, coasting: Values, per_torque: Values, duty: float = 1.0) -> Values:
-    """Torque of a motor with a curve, N m, in its own sense.
-
-    Args:
-        curve: torque against rate.
-        coasting: rate of the joint without a torque, rad/s.
-        per_torque: what a torque adds to it, 1/(N m s).
-        duty: 0 to 1; scales the torques.
-    """
+    """Torque of a motor with a curve, N m, in its own sense, by its rate without a torque and the rate per torque."""
     rates, slopes = np.broadcast_arrays(coasting, per_torque)
     found = np.empty(rates.size)
     curve_torques(packed_curve(curve), rates.ravel(), slopes.ravel(), duty, found)

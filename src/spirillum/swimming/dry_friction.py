@@ -72,14 +72,7 @@ class KnownResistance(SwimmerModel):
     def __init__(
         self, model: SwimmerModel, whole: Samples, load: Samples | None = None, flow: MeanFlow | None = None
     ) -> None:
-        """Answer with given resistances.
-
-        Args:
-            model: the model that they come from, which answers all else.
-            whole: R of the whole robot against U, Omega and omega, (robots, 3, 3) or (1, 3, 3).
-            load: force and torques of an imposed flow on the robot at rest, (robots, 3); None: no flow.
-            flow: mean flow through the channel, see `SwimmerModel.mean_flow`.
-        """
+        """Answer with resistances of whole robots, (robots, 3, 3); `model` answers all else."""
         self.name = model.name  # type: ignore[misc]
         self.placed = model.placed  # type: ignore[misc]
         self.model, self.whole, self._load, self._flow = model, whole, load, flow

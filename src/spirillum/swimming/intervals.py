@@ -29,7 +29,7 @@ from spirillum.swimming.drawn_resistance import (
     PosteriorFor,
     TubeResistance,
     chebyshev_points,
-    drawn_discrepancy,
+    sampled_discrepancy,
 )
 from spirillum.swimming.drives import battery_voltage, run_time, steady_current
 from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
@@ -61,17 +61,7 @@ def intervals_of(
     posterior_for: PosteriorFor = "new",
     placement: Placement | None = None,
 ) -> Intervals:
-    """Swim every draw of a posterior and take the limits of 95 % intervals.
-
-    Args:
-        robot: the robot, as `PosteriorFile.central` gives it.
-        model: the hydrodynamic model of the posterior.
-        posterior: its draws.
-        tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
-        friction: reading of the friction.
-        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
-        placement: pose in the tube, for a model that computes the walls; a gap or pitch that it states is not sampled.
-    """
+    """Swim every draw of a posterior and take the limits of 95 % intervals; a stated gap or pitch is not sampled."""
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
     size = posterior.count
@@ -101,7 +91,7 @@ def intervals_over(
         "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
         "motor_rate": swum.motor_rotation_rate,
     }
-    off = drawn_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
+    off = sampled_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
     observed = posterior_for == "measured"
     values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction, observed=observed)
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL, 0.5]
@@ -146,7 +136,7 @@ def _known(column: Samples) -> bool:
     return bool(np.ptp(known) > 1e-9 * np.max(np.abs(known)))
 
 
-def drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
+def sampled_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
     """A robot for each draw."""
     one = np.ones(size)
     columns: dict[str, np.ndarray] = {}
@@ -181,7 +171,7 @@ def _drawn(
     robot: Robot, model: SwimmerModel, posterior: PosteriorFile, draws: Mapping[str, Samples], placement: Placement
 ) -> tuple[RobotBatch, KnownResistance]:
     """A robot for each draw, and the model with their resistances."""
-    batch = drawn_batch(robot, posterior.model, draws, posterior.count)
+    batch = sampled_batch(robot, posterior.model, draws, posterior.count)
     columns = {name: values[:, None] for name, values in draws.items()}
     if not model.placed:
         return batch, KnownResistance(model, _table(robot, model, draws).whole(columns)[:, 0])

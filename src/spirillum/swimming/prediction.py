@@ -241,35 +241,7 @@ def predict(
     motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
-    """Predict the steady swimming of one robot; floats are in SI units, rates in rad/s.
-
-    Where the answer depends on the robot's pose in its channel and `placement` leaves its gap or its pitch open, the
-    answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and, where the robot has a table
-    for its tube (`spirillum.prepare`), has a band over the poses that are possible, see `spirillum.swimming.band`.
-
-    Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `sbt`, `rft`, `slender`, `tube`, or `auto`: what the posterior or the calibration was fitted with, else
-            `tube` for a robot in a channel and `slender` for one without; or a choice that was made.
-        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
-            the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
-            the effective friction from (18).
-        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        calibrated: apply the robot's calibration factors for this model.
-        fit: fitted values that replace the robot's; with a posterior these are its medians, and every quantity has a
-            95 % interval, the model discrepancy included.
-        posterior_for: whose discrepancy the intervals hold: `new`, a tail like those that were fitted, or `measured`, a
-            robot that was, of which the values are then the middle of what is known of it.
-        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
-        placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
-            `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        band: answer with the band over unknown gap and pitch, or at the reference pose alone; None: with it
-            where the robot has a table, without which it takes minutes.
-        motion: `held` (lateral motion and tilt constrained) or `free`. Free with `rft` or
-            `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
-            screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
-        progress: called with stage, number done, and total.
-    """
+    """Predict the steady swimming of one robot with fitted values `fit`; else arguments as of `spirillum.predict`."""
     scenario = resolve_scenario(
         robot,
         model=model,

@@ -47,15 +47,7 @@ def prepared(
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
-    """A loaded robot with its model and batch, at its pose and inside the model's domain.
-
-    Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: name of a hydrodynamic model.
-        fit: fitted values that replace the robot's, and its placement where none is given.
-        resolution: of the models `slender` and `tube`; None: the robot's own.
-        placement: where in the channel the robot lies, for a model that computes the walls.
-    """
+    """A loaded robot with its model and batch, at its pose and inside the model's domain."""
     ready, chosen = load(robot), find_swimmer_model(model)
     if fit.posterior is None:  # the median of a posterior stands in the robot already
         ready = fit.central(ready)

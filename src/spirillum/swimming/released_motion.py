@@ -166,13 +166,7 @@ class Screw(NamedTuple):
 
     @classmethod
     def of(cls, shared: Samples, body_rate: PerRobot, tail_rate: PerRobot) -> Screw:
-        """The screw of robots with such rates.
-
-        Args:
-            shared: U (3), Omega_y and Omega_z per rate of body and rotor, (n, 5, 2), from `balance.released`.
-            body_rate: Omega, rad/s.
-            tail_rate: omega, rad/s.
-        """
+        """The screw of robots with such rates, rad/s, from the motion per rate of `balance.released`."""
         moving = shared[..., 0] * body_rate[..., None] + shared[..., 1] * tail_rate[..., None]
         velocity = moving[..., :3]
         spin = np.concatenate([np.broadcast_to(tail_rate, moving.shape[:-1])[..., None], moving[..., 3:]], axis=-1)
@@ -196,7 +190,7 @@ def motion_of(name: str) -> Motion:
 def check_full(model: SwimmerModel) -> None:
     """Refuse a model that does not know all that a free motion needs."""
     if model.axial_only:
-        why = "knows the entries along and about the motor axis only"
+        why = "has the entries along and about the motor axis only"
     elif model.placed:
         why = "answers at one pose in the channel, which a free robot leaves"
     else:

@@ -47,13 +47,7 @@ def reynolds_limits(batch: RobotBatch, body: PerRobot, tail: PerRobot) -> list[L
 
 
 def motion_limits(batch: RobotBatch, velocity: Samples, tail_rate: Samples) -> list[Limit]:
-    """Return the limits of a motion in time, at its largest speed and tail rate; NaN does not count.
-
-    Args:
-        batch: the robot.
-        velocity: (n, 3), or along the axis (n,), m/s.
-        tail_rate: (n,), rad/s.
-    """
+    """Return the limits of a motion in time, at its largest speed and tail rate; NaN does not count."""
     speed = _largest(np.linalg.norm(velocity, axis=-1) if np.ndim(velocity) > 1 else velocity)
     rate = _largest(tail_rate)
     body = f"body diameter, at the largest speed of the run, {1e3 * speed:.4g} mm/s"
@@ -113,11 +107,7 @@ def reynolds_warnings(limits: Iterable[Limit]) -> dict[str, Note]:
 
 
 def check_stokes_flow(batch: RobotBatch, limits: Iterable[Limit]) -> dict[str, Note]:
-    """Refuse a motion far outside Stokes flow.
-
-    Returns:
-        A warning for each limit that the motion exceeds, by the limit's flag.
-    """
+    """Refuse a motion far outside Stokes flow; return a note for each limit that it exceeds, by the limit's flag."""
     listed = list(limits)
     if problem := stokes_flow_problem(batch, listed):
         raise InputError(problem)

@@ -80,13 +80,7 @@ class Annotator:
         self._first: float | None = None
 
     def draw(self, image: np.ndarray, seen: AnnotatedFrame, *, in_place: bool = False) -> np.ndarray:
-        """Return a frame with the tracking result, reduced to at most 1920 pixels.
-
-        Args:
-            image: RGB bytes, (h, w, 3).
-            seen: the tracking result.
-            in_place: draw on the image itself where it has the size, not on a copy.
-        """
+        """Return a frame with the tracking result, at most 1920 pixels wide; drawn `in_place` if its size allows."""
         picture, times = self._reduced(image, in_place=in_place)
         pose = seen.pose
         if pose is None:
@@ -133,11 +127,11 @@ class Annotator:
         """
         radius = _DIAL * _unit(picture)
         around = np.linspace(0.0, 2.0 * np.pi, 33)
-        for place, angle, colour, period in (
+        for position, angle, colour, period in (
             (3.4, seen.body_angle, _POINTER, self._period),
             (1.2, seen.tail_phase, _WIRE, 2.0 * math.pi),
         ):
-            centre = np.array([picture.shape[1] - place * radius, 1.3 * radius])
+            centre = np.array([picture.shape[1] - position * radius, 1.3 * radius])
             circle = centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1)
             self._line(picture, circle, colour, closed=True)
             if math.isfinite(angle):
@@ -188,8 +182,8 @@ class Annotator:
         ground = picture[: round((6 + 18 * len(lines)) * unit), : round(longest + 16 * unit)]
         ground //= 3  # dark behind the words
         for row, line in enumerate(lines):
-            place = (round(8 * unit), round((16 + 18 * row) * unit))
-            self._cv2.putText(picture, line, place, font, size, _INK, 1, self._cv2.LINE_AA)
+            position = (round(8 * unit), round((16 + 18 * row) * unit))
+            self._cv2.putText(picture, line, position, font, size, _INK, 1, self._cv2.LINE_AA)
 
 
 def _unit(picture: np.ndarray) -> float:
@@ -263,12 +257,12 @@ def annotated_film(
         thumbnail(_jpeg(kept[0]))
 
 
-def frame_of_film(path: Path, place: int) -> bytes:
+def frame_of_film(path: Path, index: int) -> bytes:
     """A frame of an annotated film as JPEG, by its order from 0; empty where there is none."""
     av = import_optional("av", "an annotated video", "video")
     with av.open(str(path)) as film:
         for number, frame in enumerate(film.decode(video=0)):
-            if number == place:
+            if number == index:
                 return _jpeg(frame.to_ndarray(format="rgb24"))
     return b""
 
@@ -320,7 +314,7 @@ class _Writer:
             self._encode()
         except Exception as error:
             self._error = error
-        while not self._ended:  # after an error, so that nobody waits for a place in the queue
+        while not self._ended:  # after an error, so that nobody waits for the queue
             self._next()
 
     def _next(self) -> _Frame | None:

@@ -52,12 +52,7 @@ class Degradation(Options):
 
     @classmethod
     def of(cls, value: str | Self | Mapping[str, Any] | None) -> Self:
-        """A degradation from what a caller may give.
-
-        Args:
-            value: `clean`, `degraded`, a `Degradation`, its fields by name, or None: a clean video. Among the fields
-                `preset` names the degradation whose fields the others replace.
-        """
+        """A degradation from its name, itself, its fields (over those of a `preset`), or None: a clean video."""
         given = {"preset": value} if isinstance(value, str) else value
         if isinstance(given, Mapping) and given.get("preset") is not None:
             name = str(given["preset"])
@@ -171,11 +166,7 @@ def with_troubles(
 
 
 def counted_frames(troubles: Troubles, kept: np.ndarray, fps: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Remaining frames after further ones were lost, and the numbers from which the video computes their times.
-
-    Returns:
-        Numbers as recorded, and numbers by which the film counts its times.
-    """
+    """Numbers of the remaining frames as recorded, and those from which the video computes their times."""
     lost = min(round(troubles.lost_frames * kept.size), max(kept.size - 2, 0))
     left = counted = kept
     if lost:
@@ -195,13 +186,7 @@ def stripe_edges(troubles: Troubles, count: int, seed: int) -> Samples:
 
 
 def repainted(robot: Robot, vertices: Samples, edges: Samples) -> Samples:
-    """Vertices of the body turned about its axis so that its stripes have other edges; the shape stays what it is.
-
-    Args:
-        robot: the robot, a body of revolution with stripes.
-        vertices: of the body, m, (n, 3).
-        edges: of `stripe_edges`.
-    """
+    """Vertices of a body of revolution turned about its axis so that its stripes have other edges."""
     if robot.seal is None or not robot.seal.stripes:
         return vertices
     x, y, z = vertices.T

@@ -95,13 +95,7 @@ class Disturbances:
         return self._grain_rng.integers(0, self.grain.size, rows)
 
     def disturb(self, light: Samples, time: float, position: Samples) -> None:
-        """Add shadow, bubbles and glare to a picture.
-
-        Args:
-            light: linear light, (rows, columns, 3); changed.
-            time: of the picture, s.
-            position: of the body's mid-length, m, (3,).
-        """
+        """Add shadow, bubbles and glare to linear light, (rows, columns, 3), which is changed."""
         if self._degradation.hand:
             self._shade(light, time)
         if self._degradation.bubbles:

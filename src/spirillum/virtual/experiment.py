@@ -175,9 +175,9 @@ def virtual_experiment(
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
     steady, models, warnings = {}, {}, []
     for name, robot in robots.items():
-        steady[name], source, said, reason = steady_rates(robot, motion, default_model, placement)
+        steady[name], source, notes, reason = steady_rates(robot, motion, default_model, placement)
         models[name] = source, reason
-        warnings += [note.prefixed(f"{name}: ") for note in said]
+        warnings += [note.prefixed(f"{name}: ") for note in notes]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,

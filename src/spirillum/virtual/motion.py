@@ -48,11 +48,7 @@ class TrialMotion:
 def steady_rates(
     robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
 ) -> tuple[dict[str, float], str, tuple[Note, ...], str]:
-    """Forward velocity and rates, SI; a model's where they are not prescribed.
-
-    Returns:
-        The rates by name, what they are from, warnings, and why the model was taken.
-    """
+    """Rates by name, SI, prescribed or a model's, with their source, notes, and why the model was chosen."""
     given = {
         "forward_velocity": motion.forward_velocity,
         "body_rotation_rate": motion.body_rate,
@@ -99,7 +95,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
     if trial.wobble > room:
         most = f"0 to {1e3 * room:.4g} mm, the room in the channel"
         raise InputError(f"wobble = {1e3 * trial.wobble:.4g} mm; allowed: {most}")
-    position = lab_to_camera(camera.view, leftwards=camera.leftwards) @ _resting_place(robot, trial.gap, trial.lateral)
+    position = lab_to_camera(camera.view, leftwards=camera.leftwards) @ _resting_pose(robot, trial.gap, trial.lateral)
     placement = None if trial.gap is None else Placement.of({"gap": trial.gap, "pitch": 0.0})
     rates, source, warnings, reason = steady_rates(robot, motion, placement=placement)
     trajectory = steady_trajectory(
@@ -121,15 +117,7 @@ def motion_of_trial(
     camera: CameraOptions,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> TrialMotion:
-    """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults.
-
-    Args:
-        robot: a checked robot.
-        motion: the friction model; the rates follow from the run.
-        trial: duration, and the gap at which the robot is released.
-        camera: where the camera stands.
-        progress: called with stage, number done, and total.
-    """
+    """The motion of a trial in the robot's tube, as `spirillum.simulate` has it by its defaults."""
     from spirillum.dynamics.simulation import simulate
 
     choice = choose_model(motion.model or AUTO, robot)
@@ -159,7 +147,7 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     own = robot_of(run)
     if own != robot:
         raise InputError(f"the run's robot {own.name!r} is not {robot.name!r}; allowed: the robot of the run")
-    level = float(_resting_place(robot, None, 0.0)[2])  # for a run without a gap of its own
+    level = float(_resting_pose(robot, None, 0.0)[2])  # for a run without a gap of its own
     axis = tube_height(robot, camera.view)
     trajectory = run_trajectory(run, camera.view, leftwards=camera.leftwards, axis=axis, level=level)
     model = str(run.attrs.get("model", ""))[:60]
@@ -186,12 +174,12 @@ def _clearance(robot: Robot) -> float:
     return math.inf if robot.channel is None else 0.5 * (robot.channel.diameter - robot.body.diameter)
 
 
-def _resting_place(robot: Robot, asked: float | None, lateral: float) -> Samples:
+def _resting_pose(robot: Robot, requested: float | None, lateral: float) -> Samples:
     """(3,) middle of the body in the channel's axes, low in the tube at a gap and a horizontal offset, m."""
     if robot.channel is None:
         return np.array([0.0, lateral, 0.0])
     room = _clearance(robot)
-    gap = gap_of(Placement(), robot.body.diameter, 0.5 * robot.channel.diameter) if asked is None else asked
+    gap = gap_of(Placement(), robot.body.diameter, 0.5 * robot.channel.diameter) if requested is None else requested
     if gap > room:
         raise InputError(f"gap = {1e3 * gap:.4g} mm; allowed: 0 to {1e3 * room:.4g} mm, where the body is on the axis")
     if abs(lateral) > room - gap:

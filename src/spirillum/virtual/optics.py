@@ -26,7 +26,7 @@ from spirillum.virtual.trial_options import CameraOptions
 class VirtualLens:
     """The lens of the camera, in its frame: x along the channel towards the nose, z towards the camera, y = z x x.
 
-    Lengths are in m, places in the picture in pixels.
+    Lengths are in m, positions in the picture in pixels.
     Heights z count from the reference plane (the tank's floor; for a view from the side its far wall). The lens stands
     at x = y = 0. Pixel centres are at whole numbers, u to the right, v downwards.
     """
@@ -69,36 +69,20 @@ class VirtualLens:
         return np.array([*head, *self.turn.flat])
 
     def seen(self, points: Samples) -> Samples:
-        """Pixel u, v and height z of points.
-
-        Returns:
-            (n, 3): u, v in pixels, z in m.
-        """
+        """Pixel u, v and height z (m) of points, (n, 3)."""
         points = np.ascontiguousarray(points, dtype=float)
         found = np.empty_like(points)
         project(points, self.camera, found)
         return found
 
     def sightlines(self, pixels: Samples) -> Samples:
-        """Lines of sight of pixels, (n, 2), below the surface.
-
-        Returns:
-            (n, 5): x and y where they cross it, m, and the unit vector away from the camera.
-        """
+        """Lines of sight below the surface, (n, 5): x and y at the surface, m, and the unit vector off the camera."""
         found = np.empty((len(pixels), 5))
         sightlines(pixels, self.camera, found)
         return found
 
     def points(self, pixels: Samples, height: float) -> Samples:
-        """Points that are seen at pixels, at a height below the surface.
-
-        Args:
-            pixels: (n, 2).
-            height: z, m.
-
-        Returns:
-            (n, 3), m.
-        """
+        """Points (n, 3), m, that are seen at pixels (n, 2), at a height z below the surface, m."""
         rays = self.sightlines(pixels)
         places = rays[:, :2] + rays[:, 2:4] * ((self.surface - height) / -rays[:, 4:])
         return np.column_stack([places, np.full(len(places), height)])
@@ -241,13 +225,7 @@ def backdrop(tank: Tank, lens: VirtualLens) -> Backdrop:
 
 
 def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
-    """Print the lines of grid paper on the floor, each fifth a strong one.
-
-    Args:
-        still: its light is changed.
-        spacing: from one line to the next, m.
-        paper: linear colour of the floor, (3,).
-    """
+    """Print the lines of grid paper on the floor, each fifth a strong one; the light of `still` is changed."""
     ratio = np.ones_like(still.light)
     for apart, width, colour in ((1.0, *_FINE_LINES), (5.0, *_STRONG_LINES)):
         bare = np.ones(still.light.shape[:2])

@@ -62,21 +62,12 @@ class Cover:
         self._red, self._green = (np.tile(colour, (count, 1)) for colour in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 
     def encoded(self, turn: Samples) -> Shading:
-        """Its normals as colours: x in red, y in green.
-
-        Args:
-            turn: rotation of the body, (3, 3).
-        """
+        """Its normals as colours: x in red, y in green."""
         normals = self.solid.normals @ turn.T + _ENCODED
         return Shading(self._red, self._green, normals[..., 0], normals[..., 1])
 
     def decoded(self, depth: Samples, samples: Samples) -> Glass:
-        """Cover in a window of samples with the colours of `encoded`; the samples are cleared.
-
-        Args:
-            depth: height of what each sample has met, (rows, columns, k).
-            samples: colours, (rows, columns, k, 3).
-        """
+        """Cover in a window of samples, (rows, columns, k, 3), by the colours of `encoded`; clears the samples."""
         hit = np.asarray(depth > _EMPTY)[..., None]
         count = np.asarray(hit.sum(axis=2))
         across = np.where(hit, samples[..., :2], 0.0).sum(axis=2) / np.maximum(count, 1) - _ENCODED
@@ -84,15 +75,7 @@ class Cover:
         return Glass(hit.mean(axis=(2, 3)), np.where(count > 0, across, 0.0))
 
     def refract(self, picture: Samples, glass: Glass, left: int, top: int, height: float) -> None:
-        """Replace the background of the cover by its refracted image.
-
-        Args:
-            picture: linear light, (rows, columns, 3); changed.
-            glass: the cover in its window.
-            left: column of the picture at which the window begins.
-            top: row at which it begins.
-            height: of the body's axis above the floor, m.
-        """
+        """Replace the background of the cover by its refracted image in `picture`, whose linear light is changed."""
         from scipy.ndimage import map_coordinates
 
         v, u = np.nonzero(glass.share)
@@ -205,13 +188,7 @@ class Painter:
         self._samples = np.empty(0, dtype=np.float32)
 
     def light(self, trajectory: TrialTrajectory, time: float, exposure: float) -> np.ndarray:
-        """(rows, columns, 3) linear light of an exposure about a time.
-
-        Args:
-            trajectory: of the robot.
-            time: the middle of the exposure, s.
-            exposure: its length, s.
-        """
+        """(rows, columns, 3) linear light of an exposure about a time."""
         middle = trajectory.at(time)
         solids = [(self.body, "body"), (self.rotor, "rotor")]
         if self._cover is not None:
@@ -316,11 +293,7 @@ _LARGE = 480
 
 
 def stamp(image: np.ndarray) -> None:
-    """Write the label into the lower right corner of a picture.
-
-    Args:
-        image: (height, width, 3) bytes; changed.
-    """
+    """Write the label into the lower right corner of a picture of bytes, which is changed."""
     mask = np.zeros((5, 4 * len(_TEXT) - 1), dtype=bool)
     for place, letter in enumerate(_TEXT):
         rows = [[digit == "1" for digit in row] for row in _LETTERS[letter].split()]

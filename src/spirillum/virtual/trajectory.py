@@ -161,15 +161,7 @@ def lab_to_camera(view: str, *, leftwards: bool) -> Samples:
 
 
 def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, level: float) -> TrialTrajectory:
-    """TrialTrajectory of a run.
-
-    Args:
-        dataset: what `spirillum.simulate` returns.
-        view: `top` or `side`.
-        leftwards: whether the nose points to the left in the picture.
-        axis: height of the channel's axis in the camera's frame, m.
-        level: height of the motor axis above the channel's in a run that does not hold it, m.
-    """
+    """Trajectory of a run in the frame of the camera, whose channel axis is at the height `axis`, m."""
     from spirillum.dynamics.run_file import poses_of
 
     return trajectory_of(poses_of(dataset, level), view, leftwards=leftwards, axis=axis)

@@ -97,7 +97,7 @@ def video_writer(
             tags,
             quality=_QUALITY | {"crf": str(crf)},
             threads=_THREADS,
-            encoders=("libx264",),  # others know no constant rate factor
+            encoders=("libx264",),  # others have no constant rate factor
             instead="a folder of PNG files",
             extra="video",
         ) as writer,

@@ -31,7 +31,7 @@ def _read_size(value: Any) -> tuple[int, int]:
 
 
 def _check_heading(angle: float) -> float:
-    most = 45.0  # a setup knows only right and left
+    most = 45.0  # a setup has only right and left
     if abs(angle) > math.radians(most) * (1.0 + 1e-9):
         raise refusal(f"= {math.degrees(angle):.4g} deg; allowed: {-most:g} to {most:g} deg")
     return angle
@@ -130,7 +130,7 @@ class CameraOptions(Options):
 
 
 class SetupErrors(Options):
-    """Errors planted in the setup; the video does not know them."""
+    """Errors planted in the setup; the video does not have them."""
 
     argument: ClassVar[str] = "setup_errors"
 

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.papers.registry import figures_of
-from spirillum.view.figures.style import look_of_model, save, told_apart
+from spirillum.view.figures.style import distinct_labels, look_of_model, save
 
 MM, HZ = 1e-3, 2 * np.pi
 
@@ -293,8 +293,8 @@ def test_files_come_out_the_same_every_time(paper_study: Any, tmp_path: Path) ->
 def test_cut_names_of_robots_still_differ() -> None:
     """Two tails of a study that differ in their last field are not given one label."""
     tails = [f"wavelength 20 mm, amplitude {size} mm" for size in (2, 2.5)]
-    assert told_apart(tails, 28) == tails
-    assert told_apart(["a" * 40, "b" * 40], 28) == ["a" * 27 + "…", "b" * 27 + "…"]
+    assert distinct_labels(tails, 28) == tails
+    assert distinct_labels(["a" * 40, "b" * 40], 28) == ["a" * 27 + "…", "b" * 27 + "…"]
 
 
 @pytest.mark.usefixtures("unplaced")

@@ -28,7 +28,7 @@ from spirillum.cli.tables.parts import (
     unsteady,
 )
 from spirillum.display import fitted_words, percent, rows_of, times
-from spirillum.dynamics.run_summary import told
+from spirillum.dynamics.run_summary import merged_events
 from spirillum.envelope import quantity
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.released_motion import END_STATES
@@ -272,7 +272,7 @@ _NONE: Answer = {"value": None}
 
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """What happened, a line each."""
-    for event in told([(event["time"], event["what"]) for event in events]):
+    for event in merged_events([(event["time"], event["what"]) for event in events]):
         again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
         yield f"{event.time:.4g} s: {event.what}{again}"
 

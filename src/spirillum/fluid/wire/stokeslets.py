@@ -57,11 +57,7 @@ class Wire:
         return _BLOB * self.radius
 
     def distance(self, points: Samples) -> Samples:
-        """Distance of points from the centreline, m, (k,).
-
-        Args:
-            points: (k, 3), m.
-        """
+        """Distance of points (k, 3) from the centreline, m."""
         from scipy.spatial import cKDTree
 
         _, nearest = cKDTree(self.points).query(points)
@@ -126,14 +122,7 @@ def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> 
 
 
 def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
-    """Cut a curve of valid wire geometry into stations; it may touch itself.
-
-    Args:
-        curve: (n, 3) centreline, m.
-        radius: of the wire, m.
-        spacing: of the stations, relative to the standard one.
-        closed: whether the curve ends where it starts.
-    """
+    """Cut a centreline (n, 3) into stations at a spacing relative to the standard one; it may touch itself."""
     from scipy.interpolate import CubicSpline
 
     gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
@@ -211,12 +200,7 @@ class WireSystem:
 
 
 def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
-    """Equations of wires.
-
-    Args:
-        wires: each with the part (0 body, 1 rotor) that it moves with.
-        accuracy: `standard` or `high`.
-    """
+    """Equations of wires, each with the part that it moves with, at `standard` or `high` accuracy."""
     from spirillum.kernels.stokes_flow import force_matrix
 
     none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))

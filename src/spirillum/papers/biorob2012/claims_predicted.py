@@ -154,7 +154,7 @@ def _range(values: Values, unit: str, scale: float = 1.0) -> str:
 
 
 def _of_tails(average: Callable[..., Any], values: Values) -> Values:
-    """An average over the robots that a reading knows, (readings,); NaN where it knows none."""
+    """An average over the robots of a reading, (readings,); NaN where it has none."""
     found: Values = np.ma.filled(average(np.ma.masked_invalid(values), axis=0), np.nan)
     return found
 
@@ -330,7 +330,7 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
         of_tails = factors[number][readings.known[number]]
         if of_tails.size:
             yield readings.claim(
-                f"Body drag factor that stands for the walls of the {channel} channel (Table III)",
+                f"Body drag factor that represents the walls of the {channel} channel (Table III)",
                 f"{stated:g} D_x",
                 f"{_range(of_tails, '')} by inverting (15) with SBT's tail at the speeds and rates of the readings",
                 readings.against(_of_tails(np.ma.median, of_tails), stated, "", 1.0),

@@ -26,7 +26,7 @@ _EQUAL_RATES = (
     "the paper observed equal motor rates in both channels; with them a tail's loss follows without knowing the rate"
 )
 _FITTED = "consistency rather than prediction: Table III's factors were fitted to the same data"
-_NO_WALLS = "no model of this study knows the channel's walls"
+_NO_WALLS = "no model of this study has the channel's walls"
 _PAPER_DROP = f"{100 * GLOBAL_DROP:.1f} %"
 
 

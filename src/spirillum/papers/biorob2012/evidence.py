@@ -5,7 +5,7 @@ for any rates, from the geometry, or from an observations file; else it is undec
 the computed values. Robot, motor and fluid (Tables I and II) and the calibration factors (Table III) are in the
 presets `biorob2012-wide` and `biorob2012-narrow`.
 
-Nothing is fitted and nothing is observed: a robot's readings differ by how it was laid down, how long it waited, how
+Nothing is fitted and nothing is observed: a robot's readings differ by how it was released, how long it waited, how
 rough and how slippery its wall is, and over what its run is read. A statement that holds in all readings is predicted
 to agree, one that holds in none to disagree. Otherwise it depends on the factor that moves it most.
 """
@@ -22,7 +22,7 @@ from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.studies.columns import reference_place
+from spirillum.studies.columns import reference_pose
 from spirillum.studies.released_robots import READ, WINDOWS, levels_of_readings, main_effects
 from spirillum.units import Hz, show
 
@@ -149,7 +149,7 @@ class Evidence:
     @property
     def place(self) -> str:
         """Poses of the models that compute the walls, in words."""
-        return reference_place(self._settings)
+        return reference_pose(self._settings)
 
 
 def fraction_between(values: Values) -> str:
@@ -213,12 +213,7 @@ class FrictionModelRuns:
         return found
 
     def judged(self, holds: Values, *, of_all: bool = True) -> Judgement:
-        """The verdict on a statement that holds or does not, in each reading.
-
-        Args:
-            holds: 1, 0 or NaN, (readings,).
-            of_all: whether it speaks of all robots, so that those without a table keep it open.
-        """
+        """The verdict on a statement, 1, 0 or NaN in each reading; one `of_all` stays open without a table."""
         known = np.isfinite(holds)
         count, total = int(np.nansum(holds)), int(known.sum())
         lacking = f"; {self.missing}" if of_all and self.missing else ""
@@ -237,14 +232,7 @@ class FrictionModelRuns:
         return Judgement("depends", f"{_joined(names)}: it holds in {count} of {total} readings, {shares}{lacking}")
 
     def against(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
-        """The verdict on a stated number.
-
-        Args:
-            values: in each reading, (readings,), SI.
-            stated: the number, SI.
-            unit: in which both are shown.
-            scale: SI unit over that.
-        """
+        """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
         known = values[np.isfinite(values)]
         if not known.size:
             return Judgement("depends", self._nothing)

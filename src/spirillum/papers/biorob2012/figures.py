@@ -166,11 +166,7 @@ def _basis() -> tuple[Samples, Samples, Samples]:
 
 
 def frenet_figure(robot: Robot) -> Figure:
-    """The wire in a parallel projection, t, n, b at some of its points, and the directions of the lab's frame.
-
-    Args:
-        robot: a loaded robot; its tail is drawn at phase 0, lengths in units of its amplitude.
-    """
+    """Parallel projection of the wire at phase 0 in units of its amplitude, with t, n, b and the lab's directions."""
     tail = robot.tail
     unit = tail.amplitude
     xi = np.linspace(0.0, tail.length, _POINTS)

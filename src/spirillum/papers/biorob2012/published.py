@@ -34,12 +34,7 @@ _REMARK = (
 
 
 def other_tube(found: Prediction, released: Mapping[str, Any] | None = None) -> Prediction | None:
-    """Return the same robot in the paper's other tube; None for any other request than one of which it states numbers.
-
-    Args:
-        found: the prediction, with its released motions.
-        released: arguments of `predict` for these, which the other tube takes too.
-    """
+    """Return the same robot in the paper's other tube; None for a request of which the paper states no numbers."""
     if (
         not found.released
         or found.model.name != "tube"

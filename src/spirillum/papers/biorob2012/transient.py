@@ -26,11 +26,7 @@ _MOST_STEPS = 1_000_000
 
 
 def paper_run(prediction: Prediction, timing: Timing | None = None) -> xr.Dataset:
-    """Axial swimming from rest over the paper's three periods, or another time, as `simulate` gives with motion `held`.
-
-    Raises:
-        InputError: for another drive than a `dc-motor`, an imposed flow, or a motor that explicit steps cannot follow.
-    """
+    """Axial swimming from rest over the paper's three periods or another time, as `simulate` with motion `held`."""
     return axial_run(prediction, Timing() if timing is None else timing, ADAMS)
 
 

@@ -22,12 +22,7 @@ _SAMPLES = 24
 
 
 def released_motion(robot: Robot, run: Mapping[str, Any], progress: Progress | None = None) -> dict[str, float]:
-    """Return what was published of a run, per turn of the swimmer.
-
-    Returns:
-        `growth` of the logarithm of the distance from the axis; `orbit`, turns about the axis in the sense of the own
-        rotation; mean `radius`, m; mean `tilt`, rad; `advance`, m.
-    """
+    """Published quantities per turn: growth of log distance, orbits, mean radius (m), mean tilt (rad), advance (m)."""
     found = simulate(
         robot,
         model="tube",

@@ -168,7 +168,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             heights=[1.3] * rows,
             columns=columns,
             notes=[
-                "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
+                "Dotted: limit of the 95 % interval. A profile that stays below it on a side shows that the number has "
                 f"no limit there. The model's discrepancy is held at {held}; "
                 "the table's intervals let it vary, and are wider where it may be larger."
             ],
@@ -207,8 +207,8 @@ def calibration_figures(found: Calibrated) -> dict[str, Figure]:
     from spirillum.calibration.identifiability import profiles
 
     figures = {
-        f"observed-{diameter * 1e3:g}mm": observed_figure(found, place)
-        for place, diameter in enumerate(found.experiment.channels)
+        f"observed-{diameter * 1e3:g}mm": observed_figure(found, index)
+        for index, diameter in enumerate(found.experiment.channels)
     }
     figures["residuals"] = residual_figure(found)
     if found.posterior is not None:
@@ -268,7 +268,7 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
         if found.friction:
             notes.append(f"$B_{{eff}}$ follows from (18) at the observed motor rate, friction model '{found.reading}'.")
         if len(columns) < amplitudes.size:
-            notes.append(f"Drawn are {len(columns)} of {amplitudes.size} amplitudes.")
+            notes.append(f"Shown: {len(columns)} of {amplitudes.size} amplitudes.")
         sheet = Sheet(
             f"Channel of {experiment.channels[channel] * 1e3:g} mm: fitted model against {label} means",
             _source(found),

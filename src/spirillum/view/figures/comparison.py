@@ -22,7 +22,16 @@ from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, 
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, look_of_model, new_figure, plain, styled, told_apart
+from spirillum.view.figures.style import (
+    COLOURS,
+    PAGE,
+    UnitPrefix,
+    distinct_labels,
+    look_of_model,
+    new_figure,
+    plain,
+    styled,
+)
 
 MOST = 12
 """Robots in the figure."""
@@ -65,7 +74,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
             ticks,
         )
     first = panels[0][0]
-    first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
+    first.set_yticks(range(len(robots)), distinct_labels([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
     figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
     by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}. " if ranking.walls else "")
@@ -146,7 +155,7 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
     """Four panels with a line for each model: advance, counter-rotation, torque and efficiency.
 
     A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
-    the error that a model estimates of its own speed. A model without an answer keeps its line and says so.
+    the error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
     """
     with styled():
         sheet = Sheet(
@@ -213,22 +222,22 @@ def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
     reference = values[comparison.reference] / scale.factor
     axes.axvline(reference, color="#555555", linewidth=0.8, linestyle=(0, (4, 2)), zorder=1)
     axes.axvline(0.0, color="#444444", linewidth=0.7, zorder=1)
-    for place, name in enumerate(comparison.models):
+    for row, name in enumerate(comparison.models):
         value = values.get(name, math.nan) / scale.factor
         if not math.isfinite(value):
-            axes.text(0.5, place, "no answer", transform=axes.get_yaxis_transform(), **_WORDS, ha="center")
+            axes.text(0.5, row, "no answer", transform=axes.get_yaxis_transform(), **_WORDS, ha="center")
             continue
         look = look_of_model(name)
-        axes.plot([0.0, value], [place, place], color=look.colour, linewidth=3.2, alpha=0.35, solid_capstyle="butt")
+        axes.plot([0.0, value], [row, row], color=look.colour, linewidth=3.2, alpha=0.35, solid_capstyle="butt")
         error = estimated_error(comparison.predictions[name]) if panel.estimated else None
         if error is not None:
             bar = abs(value) * error
-            axes.errorbar(value, place, xerr=bar, color="black", capsize=5, elinewidth=0.9, capthick=0.9, zorder=6)
-        axes.plot(value, place, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
+            axes.errorbar(value, row, xerr=bar, color="black", capsize=5, elinewidth=0.9, capthick=0.9, zorder=6)
+        axes.plot(value, row, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
         if name != comparison.reference and reference != 0:
             axes.annotate(
                 _signed_percent(value / reference - 1.0),
-                (value * (1 + (error or 0.0)), place),
+                (value * (1 + (error or 0.0)), row),
                 xytext=(6 if value >= 0 else -6, 0),
                 textcoords="offset points",
                 ha="left" if value >= 0 else "right",
@@ -290,9 +299,7 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes = sheet.panels[0, 0]
         scale = UnitPrefix.of(speeds, "m/s")
         _draw_waterfall(axes, speeds / scale.factor)
-        axes.set_yticks(
-            range(len(effects)), [_effect_label(place, effect.name) for place, effect in enumerate(effects)]
-        )
+        axes.set_yticks(range(len(effects)), [_effect_label(row, effect.name) for row, effect in enumerate(effects)])
         axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
@@ -301,8 +308,8 @@ def effects_figure(comparison: ModelComparison) -> Figure:
 _TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
 
 
-def _effect_label(place: int, name: str) -> str:
-    return name if place == 0 else f"+ {name}"
+def _effect_label(row: int, name: str) -> str:
+    return name if row == 0 else f"+ {name}"
 
 
 def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:
@@ -317,16 +324,16 @@ def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:
         span = float(np.ptp(speeds)) or 1.0
         axes.set_xlim(min(float(speeds.min()), 0.0) - 0.05 * span, float(speeds.max()) + 0.5 * span)
     before = np.append(speeds[0], speeds[:-1])
-    for place, (was, now) in enumerate(zip(before, speeds, strict=True)):
+    for row, (was, now) in enumerate(zip(before, speeds, strict=True)):
         colour = COLOURS["vermillion"] if now < was else COLOURS["green"] if now > was else COLOURS["blue"]
-        axes.plot([was, now], [place, place], color=colour, linewidth=9.0, alpha=0.45, solid_capstyle="butt")
-        axes.plot([now, now], [place - 0.32, place + 0.32], color=colour, linewidth=1.8)
-        if place + 1 < speeds.size:
-            axes.plot([now, now], [place, place + 1], color="#999999", linewidth=0.6, zorder=1)
-        factor = f"  × {now / was:.2f}" if place and was != 0.0 else ""
+        axes.plot([was, now], [row, row], color=colour, linewidth=9.0, alpha=0.45, solid_capstyle="butt")
+        axes.plot([now, now], [row - 0.32, row + 0.32], color=colour, linewidth=1.8)
+        if row + 1 < speeds.size:
+            axes.plot([now, now], [row, row + 1], color="#999999", linewidth=0.6, zorder=1)
+        factor = f"  × {now / was:.2f}" if row and was != 0.0 else ""
         axes.annotate(
             f"{now:.3g}{factor}",
-            (max(was, now), place),
+            (max(was, now), row),
             xytext=(6, 0),
             textcoords="offset points",
             ha="left",

@@ -71,7 +71,7 @@ def _subtitle(design: Design) -> str:
     if len(design.profiles) > 1:
         words.append("along each field the others at their best values")
     if design.uncertainty is not None:
-        words.append(f"{design.searched.drawn.number} draws of the unknown parameters")
+        words.append(f"{design.searched.samples.number} draws of the unknown parameters")
     return " · ".join([*words, "computed, no measured data"])
 
 

@@ -155,8 +155,8 @@ def _draw_solids(axes: Axes, flow: Flow, view: _View) -> None:
 
 def _inches(axes: Axes) -> tuple[float, float]:
     """Width and height of a panel, inches."""
-    place = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
-    return float(place.width), float(place.height)
+    extent = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
+    return float(extent.width), float(extent.height)
 
 
 def _draw_colours(axes: Axes, view: _View, values: Values, colours: str, norm: Normalize) -> AxesImage:

@@ -1,6 +1,6 @@
 """`spirillum.plot`: the figure of any result, by its kind.
 
-Answers are data and know no figures; this module knows both.
+Answers are data without figures; this module maps one to the other.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def plot(answer: Any) -> Plot:
     """Plot a result: the figure of its command, or the most informative one.
 
     Args:
-        answer: a robot (`sp.load`), a prediction (its robot in its place, to scale), or what `compare_models`, `study`,
+        answer: a robot (`sp.load`), a prediction (its robot in its pose, to scale), or what `compare_models`, `study`,
             `simulate`, `magnetic_sweep`, `settle`, `design`, `flow`, `control`, `measure` or `calibrate` returns.
 
     Raises:
@@ -131,5 +131,5 @@ def _of_dataset(dataset: xr.Dataset) -> Figure:
         ranking = ranking_of(dataset)
         if ranking.robots:
             return ranking_picture(ranking).figure()
-        raise InputError("answer = a study without answers; allowed: one with some (its variable `outside` says why)")
+        raise InputError("answer = a study without answers; allowed: one with some (see its variable `outside`)")
     raise InputError(f"answer = a dataset that has no figure; allowed: {_ALLOWED}")

@@ -105,7 +105,7 @@ def _advance_row(shown: StudyView) -> PanelRow:
             draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
             draw_curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
 
-    return PanelRow(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
+    return PanelRow(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.pose_words)
 
 
 def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
@@ -154,7 +154,7 @@ def bound_row(shown: StudyView) -> PanelRow:
     return PanelRow(f"forward velocity\n{shown.bound_words} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
-def drawn_amplitudes(shown: StudyView) -> list[int]:
+def plotted_amplitudes(shown: StudyView) -> list[int]:
     """Indices of the amplitudes that have a curve of their own."""
     return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
 
@@ -166,16 +166,16 @@ def _amplitude_look(number: int, count: int) -> tuple[str, str]:
 
 
 def _assumed_friction_row(shown: StudyView) -> PanelRow:
-    places = drawn_amplitudes(shown)
+    indices = plotted_amplitudes(shown)
     name = "effective_friction_at_assumed_rate"
 
     def draw(axes: Axes, part: StudyView, _x: Values) -> None:
         rates = np.asarray(part.dataset["assumed_motor_rate"].values, dtype=float)
         order = np.argsort(rates)
-        for number, place in enumerate(places):
-            colour, marker = _amplitude_look(number, len(places))
+        for number, index in enumerate(indices):
+            colour, marker = _amplitude_look(number, len(indices))
             for model in part.models:
-                friction = part.part(amplitude=place).values(name, model=model, friction="rotor")[order]
+                friction = part.part(amplitude=index).values(name, model=model, friction="rotor")[order]
                 axes.plot(
                     rates[order] / Hz,
                     np.where(friction > 0, friction, np.nan),
@@ -195,9 +195,9 @@ def _assumed_friction_row(shown: StudyView) -> PanelRow:
         "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends with the "
         "assumed rates, or where the motor could not turn faster even without friction."
     )
-    left = shown.whole.sizes["amplitude"] - len(places)
+    left = shown.whole.sizes["amplitude"] - len(indices)
     if left:
-        tells = f"{tells} Drawn are {len(places)} of {len(places) + left} amplitudes."
+        tells = f"{tells} Shown: {len(indices)} of {len(indices) + left} amplitudes."
     return PanelRow("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
@@ -317,13 +317,13 @@ def _observed_entries(shown: StudyView) -> Iterator[Line2D]:
 
 def amplitude_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
-    places = drawn_amplitudes(shown)
+    indices = plotted_amplitudes(shown)
     amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = UnitPrefix.of(amplitudes, "m")
     entries = []
-    for number, place in enumerate(places):
-        colour, marker = _amplitude_look(number, len(places))
-        label = f"$B_o$ = {amplitudes[place] / scale.factor:.3g} {scale.unit}"
+    for number, index in enumerate(indices):
+        colour, marker = _amplitude_look(number, len(indices))
+        label = f"$B_o$ = {amplitudes[index] / scale.factor:.3g} {scale.unit}"
         entries.append(Line2D([], [], color=colour, marker=marker, markersize=3.2, linestyle="-", label=label))
     for model in shown.models:
         line = look_of_model(model).line

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.run_summary import told
+from spirillum.dynamics.run_summary import merged_events
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.style import COLOURS, UnitPrefix, plain
@@ -39,7 +39,8 @@ def events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
         return []  # they are notes on a picture; a run without them can still be drawn
     inside = [event for event in found if time[0] < event[0] <= time[-1]]
     return [
-        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what) for event in told(inside)
+        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what)
+        for event in merged_events(inside)
     ]
 
 
@@ -56,9 +57,9 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
     first, span = float(time[0]), float(time[-1] - time[0])
     for when, _ in events:
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
-    places = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
-    for numbers in _close_together(places) if numbered else []:
-        left = _left_end([places[number] for number in numbers])
+    positions = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
+    for numbers in _close_together(positions) if numbered else []:
+        left = _left_end([positions[number] for number in numbers])
         axes.annotate(
             str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
             (first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0),
@@ -71,18 +72,18 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
         )
 
 
-def _left_end(places: list[float]) -> float:
+def _left_end(positions: list[float]) -> float:
     """Left end of the labels of events at these shares of the axis, right of the panel's letter."""
-    return max(float(np.mean(places)) - 0.5 * _WIDE[len(places) > 1], _LETTER)
+    return max(float(np.mean(positions)) - 0.5 * _WIDE[len(positions) > 1], _LETTER)
 
 
-def _close_together(places: list[float]) -> list[list[int]]:
+def _close_together(positions: list[float]) -> list[list[int]]:
     """Numbers of the events from 0, those together that have no room for a label each."""
     found: list[list[int]] = []
-    for number in range(len(places)):
+    for number in range(len(positions)):
         found.append([number])
         while len(found) > 1:
-            before, after = ([places[one] for one in group] for group in found[-2:])
+            before, after = ([positions[one] for one in group] for group in found[-2:])
             if _left_end(before) + _WIDE[len(before) > 1] <= _left_end(after):
                 break
             last = found.pop()
@@ -98,13 +99,7 @@ _ALONG = np.linspace(0.0, 1.0, 12)
 
 
 def silhouette(robot: Robot, position: Samples, attitude: Samples) -> Samples:
-    """Outline (n, 2) of the body as seen along the tube: y and z in the lab, m.
-
-    Args:
-        robot: the robot; its body is convex.
-        position: place of the body's mid-length (3,), m.
-        attitude: unit quaternion w, x, y, z from body axes to the lab's.
-    """
+    """Outline (n, 2) of a convex body as seen along the tube: y and z in the lab, m; `attitude` is w, x, y, z."""
     from scipy.spatial import ConvexHull
     from scipy.spatial.transform import Rotation
 

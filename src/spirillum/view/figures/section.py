@@ -1,6 +1,6 @@
 """Section of a robot by a plane: cut solids filled, solids beyond the plane outlined.
 
-Panels have their limits before anything is drawn on them. Solids are added as artists and not as patches, for which
+Panels have their limits before anything is plotted on them. Solids are added as artists and not as patches, for which
 matplotlib looks for the extent of every segment: half a second for a tube.
 """
 
@@ -30,18 +30,7 @@ _MOST_CELLS = 400_000
 def draw_section(
     axes: Axes, robot: Robot, plane: str, offset: float, *, phase: float, unit: float, points: float, drop: float = 0.0
 ) -> None:
-    """Plot the robot on the plane of the panel's axes.
-
-    Args:
-        axes: the panel, in `unit`.
-        robot: the robot.
-        plane: `xz`, `xy` or `yz`, horizontal axis first.
-        offset: place of the plane on the axis across it, m.
-        phase: phase of the tail, rad.
-        unit: length of one drawing unit, m.
-        points: typographic points in one drawing unit.
-        drop: distance by which the tail's axis is lowered, m.
-    """
+    """Plot the robot on the plane of the panel's axes; lengths in m, `points` typographic points in a drawing unit."""
     lines = [line - np.array([0.0, 0.0, drop]) for line in wire_lines(robot, phase, 1.0)]
     across = next(number for number, axis in enumerate("xyz") if axis not in plane)
     along = [number for number in range(3) if number != across]
@@ -69,15 +58,7 @@ def draw_section(
 
 
 def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
-    """Plot the section of a tube's wall above the elements beyond it.
-
-    Args:
-        axes: the panel, in `unit`, its limits set.
-        seat: the tube, and where in it the robot lies.
-        plane: `xz`, `xy` or `yz`, horizontal axis first.
-        offset: place of the plane on the axis across it, m.
-        unit: length of one drawing unit, m.
-    """
+    """Plot the section of a tube's wall above the elements beyond it, on axes whose limits are set."""
     wall = _bore(seat, plane, offset, np.array(axes.get_xlim()) * unit) / unit
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     frame = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
@@ -146,14 +127,14 @@ def _draw_wire_cut(
     depth = radius - np.minimum(distance, 3.0 * radius).reshape(first.size, second.size)
     if not depth.max() > 0:
         return
-    places = (first / unit, second / unit, depth.T)
-    axes.contourf(*places, levels=[0.0, 2.0 * radius], colors=[_FILL], zorder=6)
-    axes.contour(*places, levels=[0.0], colors=[_EDGE], linewidths=0.8, zorder=6.1)
+    coordinates = (first / unit, second / unit, depth.T)
+    axes.contourf(*coordinates, levels=[0.0, 2.0 * radius], colors=[_FILL], zorder=6)
+    axes.contour(*coordinates, levels=[0.0], colors=[_EDGE], linewidths=0.8, zorder=6.1)
 
 
 def _denser(line: Values, spacing: float) -> Values:
     """Points along a line so close that their distance and the line's are the same to the eye."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     count = int(np.clip(along[-1] / spacing, line.shape[0], _MOST_CELLS))
-    places = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(places, along, line[:, axis]) for axis in range(3)], axis=-1)
+    positions = np.linspace(0.0, along[-1], count)
+    return np.stack([np.interp(positions, along, line[:, axis]) for axis in range(3)], axis=-1)

@@ -24,7 +24,7 @@ from spirillum.view.figures.rows import (
 )
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters, width_of
 from spirillum.view.figures.study_panels import PaperFigure, StudyView, head_column, spread, tail_axis
-from spirillum.view.figures.style import UnitPrefix, plain, told_apart
+from spirillum.view.figures.style import UnitPrefix, distinct_labels, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,12 +49,7 @@ _DASHED = (0, (4.0, 2.0))
 
 
 def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> dict[str, Picture]:
-    """The figures of a study by file name (lower-case letters, digits and hyphens).
-
-    Returns:
-        For channels of a paper its figures' names, for others `channel-<name>`, with `-part1`, `-part2` where
-        wavelengths need several figures; `bound` with the speeds at the upper bound. For a list of robots `robots`.
-    """
+    """The figures of a study by file name: those of a paper's channels, `channel-<name>`, `bound`, or `robots`."""
     shown = StudyView.of(dataset, paper_figures)
     if not shown.grid:
         return {"robots": _robots_picture(shown)}
@@ -74,9 +69,9 @@ def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] 
 
 def _pages(count: int, most: int) -> list[list[int]]:
     """Indices of the wavelengths on each figure, as evenly distributed as possible."""
-    places = spread(count, most * MOST_COLUMNS)
-    pages = -(-len(places) // MOST_COLUMNS)
-    return [list(map(int, page)) for page in np.array_split(places, pages)]
+    indices = spread(count, most * MOST_COLUMNS)
+    pages = -(-len(indices) // MOST_COLUMNS)
+    return [list(map(int, page)) for page in np.array_split(indices, pages)]
 
 
 def _file_name(shown: StudyView, channel: int) -> str:
@@ -223,7 +218,7 @@ def _bound_picture(shown: StudyView) -> Picture:
         note
         for note in (
             bound_row(shown).tells if shown.settled else "",
-            shown.place_words,
+            shown.pose_words,
             part.unanswered(),
             _left_out(shown, len(wavelengths), len(channels)),
         )
@@ -305,24 +300,24 @@ def _paper_entry(shown: StudyView, channels: Sequence[int], scale: UnitPrefix) -
 
 def _robots_picture(shown: StudyView) -> Picture:
     count = shown.whole.sizes["robot"]
-    places = spread(count, MOST_ROBOTS)
+    indices = spread(count, MOST_ROBOTS)
     rows = robot_rows(shown)
     title = f"{plain(str(shown.whole.attrs.get('title', 'Robots')), 60)} · {count} robots"
     notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
     notes.append(shown.unanswered())
-    if len(places) < count:
-        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset contains all.")
+    if len(indices) < count:
+        notes.append(f"Shown: {len(indices)} of {count} robots, evenly spread; the dataset contains all.")
     notes = [note for note in notes if note]
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
-    alternative = f"{len(rows)} panels with a point for each of {len(places)} robots: {what}. {shown.source_line}"
-    draw = partial(_draw_robots, shown, places, title, rows, notes)
+    alternative = f"{len(rows)} panels with a point for each of {len(indices)} robots: {what}. {shown.source_line}"
+    draw = partial(_draw_robots, shown, indices, title, rows, notes)
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
 
 
 def _draw_robots(
-    shown: StudyView, places: list[int], title: str, rows: Sequence[PanelRow], notes: Sequence[str]
+    shown: StudyView, indices: list[int], title: str, rows: Sequence[PanelRow], notes: Sequence[str]
 ) -> Figure:
-    names = told_apart([str(name) for name in shown.whole["robot"].values[places]], 28)
+    names = distinct_labels([str(name) for name in shown.whole["robot"].values[indices]], 28)
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)
     upright = _TICK_LETTER * longest * len(names) < width
@@ -339,9 +334,9 @@ def _draw_robots(
         legend=legend,
     )
     add_letters(sheet.panels.flat)
-    x = np.asarray(places, dtype=float)
+    x = np.asarray(indices, dtype=float)
     for number, (row, axes) in enumerate(zip(rows, sheet.panels.flat, strict=True)):
-        row.draw(axes, shown.part(robot=places), x)
+        row.draw(axes, shown.part(robot=indices), x)
         axes.set_xlim(-0.6, shown.whole.sizes["robot"] - 0.4)
         last = number == len(rows) - 1
         if named:

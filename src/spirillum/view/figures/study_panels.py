@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.studies.columns import reference_place
+from spirillum.studies.columns import reference_pose
 from spirillum.units import Hz
 from spirillum.view.figures.style import UnitPrefix, plain
 
@@ -41,7 +41,7 @@ def spread(count: int, most: int) -> list[int]:
     """At most `most` indices out of `count`, evenly spread, including the first and the last."""
     if count <= most:
         return list(range(count))
-    return sorted({int(place) for place in np.linspace(0, count - 1, most).round()})
+    return sorted({int(index) for index in np.linspace(0, count - 1, most).round()})
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class StudyView:
         """All of a study; `paper_figures` by channel, if it repeats a paper's."""
         return cls(dataset, dataset, paper_figures or {})
 
-    def part(self, **places: int | Sequence[int]) -> StudyView:
+    def part(self, **indices: int | Sequence[int]) -> StudyView:
         """Select a part of the study by indices along dimensions."""
-        return replace(self, dataset=self.dataset.isel(dict(places.items())))
+        return replace(self, dataset=self.dataset.isel(dict(indices.items())))
 
     @cached_property
     def models(self) -> tuple[str, ...]:
@@ -218,12 +218,12 @@ class StudyView:
         return low, high
 
     @property
-    def place_words(self) -> str:
+    def pose_words(self) -> str:
         """Poses of the models that compute the walls, and the meaning of shades; empty without either."""
         computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
         if not computed:
             return self._interval_words()
-        where = f"{', '.join(computed)}: {reference_place(json.loads(self.whole.attrs.get('settings', '{}')))}."
+        where = f"{', '.join(computed)}: {reference_pose(json.loads(self.whole.attrs.get('settings', '{}')))}."
         return f"{where} {self._band_words()} {self._interval_words()}".strip()
 
     def _interval_words(self) -> str:
@@ -275,12 +275,12 @@ class StudyView:
             f"({', '.join(reasons)}{', …' if len(missing) > 3 else ''})."
         )
 
-    def paper_speed(self, place: int) -> tuple[float, float] | None:
+    def paper_speed(self, index: int) -> tuple[float, float] | None:
         """(Re_max, U) of the paper's caption for a channel; U = Re mu/(rho D_b), m/s."""
-        channel = str(self.whole["channel"].values[place])
-        if channel not in self.paper_figures or place >= len(self.robots):
+        channel = str(self.whole["channel"].values[index])
+        if channel not in self.paper_figures or index >= len(self.robots):
             return None
-        fluid, body = self.robots[place]["fluid"], self.robots[place]["body"]
+        fluid, body = self.robots[index]["fluid"], self.robots[index]["body"]
         reynolds = self.paper_figures[channel].largest_reynolds
         return reynolds, reynolds * fluid["viscosity"] / (fluid["density"] * body["diameter"])
 

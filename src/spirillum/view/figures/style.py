@@ -167,7 +167,7 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, inches, that no global state knows of."""
+    """An empty figure, inches, outside pyplot's global state."""
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure
@@ -188,7 +188,7 @@ def plain(text: str, longest: int = 60) -> str:
     return line.replace("$", r"\$")
 
 
-def told_apart(names: Sequence[str], longest: int) -> list[str]:
+def distinct_labels(names: Sequence[str], longest: int) -> list[str]:
     """Shorten names to lines of at most ``longest`` letters, or of at most 80 where they would be equal."""
     short = [plain(name, longest) for name in names]
     return short if len(set(short)) == len(set(names)) else [plain(name, 80) for name in names]
@@ -207,11 +207,7 @@ def _spelled(formula: str) -> str:
 
 
 def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
-    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all.
-
-    Returns:
-        Paths of PNG and SVG.
-    """
+    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all; return both paths."""
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     engine, dpi = figure.get_layout_engine(), figure.dpi

@@ -313,7 +313,7 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
 def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, beside: int, turn: int) -> None:
     """Draw lines over time in a sheet of `beside` columns; a single one has low panels.
 
-    The mean over `turn` samples is drawn too, where the panel has one; 0: none.
+    The mean over `turn` samples is plotted too, where the panel has one; 0: none.
     """
     lines = _lines(dataset, panel, time)
     values = np.concatenate([line for _, line in lines])

@@ -77,10 +77,10 @@ class CrossSection:
         draw.text((middle, 0.25 * middle), "front", anchor="mm", font=self._font, fill=FAINT)
         image[self._box] = np.asarray(square.resize((self._side,) * 2, Image.Resampling.BOX))
 
-    def _pixels(self, places: Samples) -> list[tuple[float, float]]:
+    def _pixels(self, points: Samples) -> list[tuple[float, float]]:
         """Pixels of the fine square for y and z, m, (n, 2)."""
         middle = 0.5 * self._side * _FINE
-        return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in places]
+        return [(middle + self._scale * float(y), middle - self._scale * float(z)) for y, z in points]
 
 
 CAMERAS = ("auto", "fixed", "follow")
@@ -184,7 +184,7 @@ def film(
     inset = None
     if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
         inset = CrossSection(pixels, robot, poses)
-    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset), inset=inset)
+    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
@@ -264,11 +264,11 @@ class _Shots:
 
     def _add_grid(self, scene: Scene) -> None:
         corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
-        places = self._poses.position
-        scene.add_grid(self._view, places.min(axis=0) + corners.min(axis=0), places.max(axis=0) + corners.max(axis=0))
+        path = self._poses.position
+        scene.add_grid(self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0))
 
 
-def _channel_middle(dataset: xr.Dataset) -> float | None:
+def _channel_centre(dataset: xr.Dataset) -> float | None:
     """Position of the channel's middle in the run, m."""
     try:
         middle = float(dataset.attrs.get("channel_middle", np.nan))

@@ -35,13 +35,7 @@ class Bar:
 
 
 def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Bar:
-    """Scale bar at the lower right: in the upright plane along the robot's axis, or across it in a view along the axis.
-
-    Args:
-        camera: the camera.
-        size: width and height of the picture.
-        middle: a point of the robot's axis, m; with perspective, lengths are true at its distance.
-    """
+    """Scale bar at the lower right: in the upright plane along the robot's axis, or across it in a view along it."""
     along = np.eye(3)[int(np.argmax(np.abs(camera.right)))]
     along = along * np.sign(along @ camera.right)
     normal = camera.sight if camera.parallel else np.cross(along, np.array([0.0, 0.0, 1.0]))
@@ -71,11 +65,7 @@ def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, l
 
 
 def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Text blended into pictures of one size; only the rows and columns with text change.
-
-    Returns:
-        A function that writes the words into a picture and gives it back.
-    """
+    """A function that blends text into pictures of one size; only the rows and columns with text change."""
     opaque = words[..., 3] > 0
     patches = []
     for rows in _runs(opaque.any(axis=1)):
@@ -102,13 +92,7 @@ class Stamp:
     """Time stamp in the upper right corner of a video's frames, and the ratio of its speed to the run's."""
 
     def __init__(self, size: tuple[int, int], times: Samples, speed: float) -> None:
-        """Prepare the digits.
-
-        Args:
-            size: width and height of the frames.
-            times: times of the frames, s.
-            speed: time of the run over time of the film.
-        """
+        """Prepare the digits."""
         from matplotlib import font_manager
         from PIL import ImageFont
 
@@ -193,10 +177,10 @@ def _draw_axes(axes: Axes, camera: SceneCamera, unit: float, size: tuple[int, in
                 shrinkB=0,
             )
         )
-        place = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
+        position = origin + way * (1.0 + 0.24 * reach / np.hypot(*way))
         axes.text(
-            float(place[0]),
-            float(place[1]),
+            float(position[0]),
+            float(position[1]),
             f"${name}$",
             ha="center",
             va="center",

@@ -26,13 +26,7 @@ _SOFTWARE_LIBRARIES = ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6")
 
 
 def new_plotter(size: tuple[int, int], *, live: bool = False, samples: int = 4) -> Any:
-    """An empty PyVista plotter with an OpenGL context.
-
-    Args:
-        size: width and height, pixels.
-        live: a window on the screen instead of a picture in memory.
-        samples: samples of each pixel; 0: one.
-    """
+    """An empty PyVista plotter with an OpenGL context, in a window if `live`, else in memory."""
     if live and not _has_display():
         raise InputError(f"--window: DISPLAY is not set; {_INSTEAD}")
     with _quiet_context(live=live):

@@ -1,6 +1,6 @@
 """VTK scene of a robot in its pose: rigid solids, the tube around them, light, a camera.
 
-VTK clips scenes of micrometres, so that everything is drawn in units of the robot's length.
+VTK clips scenes of micrometres, so that everything is rendered in units of the robot's length.
 """
 
 from __future__ import annotations
@@ -26,18 +26,7 @@ _REACH = 0.30
 
 
 def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
-    """Darkness, 0 to 1, of points on the inner side of a tube under a level robot.
-
-    Args:
-        robot: the robot.
-        radius: inner radius of the tube, m.
-        height: z of the motor axis in the tube's axes, m.
-        x: (n,) places along the tube, m.
-        angle: (m,) angles from the lowest line of the tube, rad.
-
-    Returns:
-        (n, m) a decay with the vertical distance to body and coupling; no computation of light.
-    """
+    """Darkness, 0 to 1, (n, m), of a tube below a level robot, by vertical distance; no computation of light."""
     from scipy.ndimage import gaussian_filter
 
     y, floor = radius * np.sin(angle), -radius * np.cos(angle)
@@ -76,7 +65,7 @@ def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: flo
     return plotter.add_mesh(mesh, scalars="shade", rgb=True, lighting=False, show_scalar_bar=False)
 
 
-_LAMPS = (  # place about the camera (right, up, towards it), strength
+_LAMPS = (  # position about the camera (right, up, towards it), strength
     ((-0.6, 0.9, 0.8), 0.9),
     ((0.9, 0.3, 0.7), 0.35),
     ((0.1, 0.9, -0.6), 0.4),
@@ -95,15 +84,9 @@ def surroundings(rows: int = 64) -> Samples:
 
 
 def add_light(plotter: Any, pyvista: Any, *, surrounded: bool = True) -> None:
-    """Light a scene.
-
-    Args:
-        plotter: the scene's plotter, without lights.
-        pyvista: the library.
-        surrounded: add bright surroundings, which surfaces with `pbr` reflect.
-    """
-    for place, strength in _LAMPS:
-        lamp = pyvista.Light(position=place, focal_point=(0, 0, 0), color="white", intensity=strength)
+    """Light a scene; `surrounded` by bright surroundings, which surfaces with `pbr` reflect."""
+    for position, strength in _LAMPS:
+        lamp = pyvista.Light(position=position, focal_point=(0, 0, 0), color="white", intensity=strength)
         lamp.positional = False
         lamp.set_camera_light()
         plotter.add_light(lamp)
@@ -247,17 +230,7 @@ class Scene:
         rows: int | None = None,
         quick: bool = False,
     ) -> None:
-        """Build the scene.
-
-        Args:
-            solids: the robot's pieces.
-            size: width and height, pixels.
-            glass: x of both ends of the channel's piece that is drawn, m; None: none of it.
-            live: a window on the screen.
-            samples: samples of each pixel.
-            rows: rows about the middle that are drawn, an even number; what lies above and below stays white.
-            quick: lamps alone, without surroundings that the solids reflect.
-        """
+        """Build the scene, with a piece of glass (x of both ends, m); `rows` about the middle are rendered."""
         self.solids = solids
         self.unit = solids.length
         self._rows = size[1] if rows is None else min(rows, size[1])
@@ -267,7 +240,7 @@ class Scene:
         self._pixels: Any = None
         self._shade: Any = None
         self.plotter.set_background("white")
-        # What is translucent is added from back to front; VTK's own sorting of it knows no samples, and takes long.
+        # What is translucent is added from back to front; VTK's own sorting ignores multisampling and is slow.
         self.plotter.renderer.UseOITOff()
         self._quick = quick
         add_light(self.plotter, self._pyvista, surrounded=not quick)

@@ -64,11 +64,7 @@ class SceneCamera:
         return np.asarray(self.focal - self.distance * self.sight)
 
     def pixels(self, points: Samples, size: tuple[int, int]) -> Samples:
-        """Pixels at which points are seen.
-
-        Returns:
-            (n, 2) pixels to the right of and below the upper left corner.
-        """
+        """Pixels at which points are seen, (n, 2), to the right of and below the upper left corner."""
         away = np.asarray(points, dtype=float) - self.focal
         nearer = 1.0 if self.parallel else self.distance / (self.distance + away @ self.sight)
         scale = 0.5 * size[1] / self.half_height * nearer
@@ -199,11 +195,11 @@ def _arc(radius: float, x: float, half_angle: float = np.pi) -> Samples:
     return np.stack([np.full(count, x), radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def _marks(pyvista: Any, radius: float, width: float, places: dict[float, float]) -> Any:
+def _marks(pyvista: Any, radius: float, width: float, positions: dict[float, float]) -> Any:
     """Marks of a ruler on the floor: half of the angle that each spans, by its x."""
     strips = [
         _sheet(pyvista, _arc(radius, x - 0.5 * width, half), _arc(radius, x + 0.5 * width, half))
-        for x, half in places.items()
+        for x, half in positions.items()
     ]
     return pyvista.merge(strips) if len(strips) > 1 else strips[0]
 
@@ -219,9 +215,9 @@ def add_glass(plotter: Any, pyvista: Any, radius: float, start: float, end: floa
     plotter.add_mesh(_tube(pyvista, outer, start, end, band), culling="front", **shell)
     step *= max(1.0, float(np.ceil((end - start) / step / _MOST_MARKS)))
     first, last = int(np.ceil(start / step)), int(np.floor(end / step))
-    places = {i * step: 0.11 if i % 5 else 0.26 for i in range(first, last + 1)}
-    if places:
-        marks = _marks(pyvista, 0.997 * radius, line, places)
+    positions = {i * step: 0.11 if i % 5 else 0.26 for i in range(first, last + 1)}
+    if positions:
+        marks = _marks(pyvista, 0.997 * radius, line, positions)
         plotter.add_mesh(marks, color=_TICK, opacity=0.7, **flat)
     for x in (start, end):
         plotter.add_mesh(_sheet(pyvista, _arc(radius, x), _arc(outer, x)), color=_RIM, opacity=0.6, **flat)

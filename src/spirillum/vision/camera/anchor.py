@@ -60,12 +60,7 @@ class Anchor:
     """High-pass filtered brightness, (h, w)."""
 
     def pose(self, flat: Samples, start: PictureRegistration) -> PictureRegistration:
-        """How a picture lies against the anchor; `start` where the anchor shows no edge.
-
-        Args:
-            flat: the picture, high-pass filtered, (h, w).
-            start: about that, to less than half of the distance of a ruler's lines.
-        """
+        """How a high-pass filtered picture lies against the anchor; `start` where the anchor shows no edge."""
         cv2 = import_optional("cv2", "measuring a video", "video")
         rows, columns, slopes, there = self._edges
         if not rows.size:

@@ -40,13 +40,7 @@ def opened(video: str | Path | Video, setup: Setup) -> Video:
 
 
 def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
-    """Frames at uneven intervals over the measured part, so that they do not alias with the rotation.
-
-    Args:
-        video: the video, or a folder of images.
-        start: beginning of that part, s.
-        end: its end, s; None: that of the video.
-    """
+    """Frames at uneven intervals over the measured part, so that they do not alias with the rotation."""
     if video.duration:
         if start >= video.duration:
             raise InputError(

@@ -137,13 +137,7 @@ class Optics:
 
 
 def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
-    """The camera of a setup, upright and without distortion.
-
-    Args:
-        setup: the setup.
-        size: width and height of the picture, pixels.
-        focal: focal length, pixels.
-    """
+    """The camera of a setup, upright and without distortion; lengths in pixels."""
     return Optics(
         size=size,
         focal=focal,

@@ -128,14 +128,7 @@ def _largest_jump(time: Samples, x: Samples) -> float:
 
 
 def something_else(time: Samples, place: Samples, marked: np.ndarray, length: float) -> np.ndarray:
-    """Frames of stretches without marks from which the place jumps to frames with marks, a mask, (n,).
-
-    Args:
-        time: time of each frame, s, (n,).
-        place: place of the body, m, (n, 2); NaN where it is unknown.
-        marked: whether stripes or tail were read, (n,).
-        length: of the body, m.
-    """
+    """Frames of stretches without marks from which the position jumps to frames with marks, a mask, (n,)."""
     found = np.zeros(time.size, dtype=bool)
     known = np.isfinite(place).all(axis=1)
     sure = np.flatnonzero(marked & known)
@@ -157,11 +150,7 @@ def something_else(time: Samples, place: Samples, marked: np.ndarray, length: fl
 
 
 def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
-    """Note on such frames.
-
-    Args:
-        found: a mask of them, (n,).
-    """
+    """Note on such frames."""
     count = int(found.sum())
     if not count:
         return ()
@@ -322,15 +311,7 @@ def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
 
 
 def _tail_size(known: Identified, stated: Optics, roll: Samples, tail: Samples, placed_on: np.ndarray) -> float:
-    """Apparent size of the tail at the stated scale; NaN where the body's marks are often off its outline.
-
-    Args:
-        known: the robot.
-        stated: the camera at the stated scale.
-        roll: angle of the body, rad, (n,); NaN where unreadable.
-        tail: phase of the tail, rad, (n,).
-        placed_on: mask of the frames on which the body was placed, (n,).
-    """
+    """Apparent size of the tail at the stated scale; NaN where the body's marks are often off its outline."""
     marks = (roll, tail) if known.stripes.stripes else (tail,)
     read = [np.isfinite(angle[placed_on]).mean() for angle in marks if placed_on.any()]
     if min(read, default=0.0) < IDENTITY.sure_share:

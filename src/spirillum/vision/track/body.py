@@ -89,15 +89,7 @@ class BodyFinder:
         *,
         colours: int = 0,
     ) -> None:
-        """Compute the apparent contour of the body.
-
-        Args:
-            robot: the robot.
-            optics: the camera.
-            bounds: part of the picture to look at: left, top, right, bottom.
-            contour: the apparent contour of this body before this camera, where it is known already.
-            colours: of the seal's stripes, by which its edges are found; 0: edges are found by brightness alone.
-        """
+        """Compute the apparent contour of the body within bounds (left, top, right, bottom), unless it is given."""
         self.robot, self.optics, self.bounds, self.colours = robot, optics, bounds, colours
         self.contour = contour_of(robot, optics) if contour is None else contour
         self._shapes: dict[int, Shape] = {}
@@ -134,16 +126,7 @@ class BodyFinder:
         self.bounds, self._shapes = bounds, {}
 
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[PoseFit]:
-        """Learn the edges' templates from frames with approximately known poses, and refine these poses.
-
-        Args:
-            images: 8-bit RGB, (h, w, 3) each.
-            poses: initial poses, good to about a pixel on most frames.
-            times: times of the frames, s, (n,).
-
-        Returns:
-            The refined poses.
-        """
+        """Learn the edges' templates from frames with poses known to about a pixel; return the refined poses."""
         poses = _smooth(list(poses), times)
         self._bias, self._scatter = np.zeros(len(self.contour.group)), self.contour.floor.copy()
         parts = [self._part(image, pose) for image, pose in zip(images, poses, strict=True)]
@@ -205,21 +188,11 @@ class BodyFinder:
         return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
     def place(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
-        """Fit the pose of the body near a guess.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-            guess: initial pose, good to about two pixels.
-        """
+        """Fit the pose of the body near a guess that is good to about two pixels."""
         return self._place(self._part(image, guess), guess)
 
     def place_by_seal(self, image: np.ndarray, guess: BodyPose) -> PoseFit:
-        """Fit the pose to the edges of the seal alone, before anything was learnt.
-
-        Args:
-            image: 8-bit RGB, (h, w, 3).
-            guess: initial pose, good to about five pixels.
-        """
+        """Fit the pose to the edges of the seal alone, near a guess good to five pixels, before anything is learnt."""
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
     def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
@@ -294,13 +267,7 @@ class BodyFinder:
         self._strength = strength
 
     def _learn_biases(self, parts: list[_Part], found: list[PoseFit], most: tuple[float, float] = SEAL.follows) -> None:
-        """Learn the bias of each edge and the scatter about it, as glare shifts edges.
-
-        Args:
-            parts: the surroundings of the body on some frames.
-            found: where it is there.
-            most: with a seal, scatter along and across the body beyond which an edge does not move with it, pixels.
-        """
+        """Learn the bias of each edge and the scatter about it, as glare shifts edges."""
         residuals = []
         for part, one in zip(parts, found, strict=True):
             if one.known:

@@ -54,12 +54,7 @@ def named_colours(names: Sequence[str]) -> Samples:
 
 
 def colours_named(samples: Samples, names: Sequence[str]) -> list[str]:
-    """Nearest of some named colours to each sample, under the lamp that suits all of them best.
-
-    Args:
-        samples: colours, 0 to 255, (n, 3).
-        names: names to choose from.
-    """
+    """Nearest of some named colours to each sample, under the lamp that suits all of them best."""
     named, lamp = named_colours(names), np.ones(3)
     for _ in range(6):
         nearest = _nearest(samples, named * lamp)
@@ -192,12 +187,7 @@ def order_seen(
 
 
 def named_rightly(palette: Samples, start: Samples) -> bool:
-    """Whether no other assignment of names to classes fits their colours clearly better.
-
-    Args:
-        palette: colours of the classes, (classes, 3).
-        start: named colours under the lamp, (classes, 3).
-    """
+    """Whether no other assignment of names to classes fits their colours clearly better."""
     from scipy.optimize import linear_sum_assignment
 
     cost = np.linalg.norm(_opponent(palette)[:, None] - _opponent(start), axis=-1)
@@ -292,13 +282,7 @@ def is_single(stripes: Sequence[str]) -> bool:
 
 
 def seen_line(profiles: Samples, facing: np.ndarray, order: Whole) -> SeenLine | None:
-    """Colours of seal and line, and what the lamp adds, to begin with; None where no line is seen to move.
-
-    Args:
-        profiles: colours along the angle about the axis, for some frames, (f, n, 3); NaN where nothing is seen.
-        facing: mask of the samples that face the camera, (f, n).
-        order: class of each stripe, (s,).
-    """
+    """Colours of seal and line, and what the lamp adds, to begin with; None where no line is seen to move."""
     seen = np.where(facing[..., None], profiles, np.nan)
     known = np.asarray(np.isfinite(seen).all(axis=2))
     often = known.sum(axis=0) >= SINGLE_LINE.frames

@@ -253,17 +253,7 @@ def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Fram
 def identified_at(
     name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float, colours: int = 0
 ) -> Identified:
-    """Find the robot at one size.
-
-    Args:
-        name: name of the video.
-        setup: the setup.
-        body: the robot's body, about as large as it looks.
-        frames: frames spread over the video.
-        still: static background of the frames, (h, w, 3).
-        size: of this body over that at the stated scale.
-        colours: number of colours of its stripes, if it is looked for by these.
-    """
+    """Find the robot at one size over that at the stated scale, by its stripes if `colours` is not 0."""
     start = detect_robot(name, body, frames, still, colours)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL

@@ -170,15 +170,7 @@ class _Found(NamedTuple):
 
 
 def detect_robot(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, colours: int = 0) -> Start:
-    """Find the robot on some frames, and learn how large it is, within a tenth, and what its edges look like.
-
-    Args:
-        name: name of the video.
-        body: the robot's body, about as large as it looks.
-        frames: frames spread over the video.
-        still: static background of the frames, (h, w, 3), reduced as far as they are to be searched.
-        colours: number of colours of its seal's stripes, by which it is looked for; 0: by its outline.
-    """
+    """Find the robot on frames spread over the video; learn its size, within a tenth, and what its edges look like."""
     focal = body.optics.focal
     found = (_found_by_seal(body, frames, colours) if colours else None) or _by_outline(name, body, frames, still)
     body, about = found.body, found.about

@@ -79,13 +79,7 @@ class Glare(NamedTuple):
 
 
 def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder) -> Glare:
-    """Look for glare that stands still where edges pass that show how far the robot has moved.
-
-    Args:
-        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
-        poses: where the robot is on each of them, to a pixel or so.
-        body: the robot's body.
-    """
+    """Look for glare that stands still where edges pass that show how far the robot has moved."""
     veil = _veil(images, poses, body)
     if veil is not None:
         return veil

@@ -130,15 +130,7 @@ def _in_multiples(time: Samples, readings: tuple[FrameSeries, ...], frame: float
 def _put_back(
     time: Samples, readings: tuple[FrameSeries, ...], frame: float, lost: np.ndarray, odd: np.ndarray
 ) -> Restored:
-    """Times with the losses that were found put back, or why nothing is given.
-
-    Args:
-        time: times, s, (n,).
-        readings: the series.
-        frame: usual time between two frames, s.
-        lost: frames lost at each step, (n - 1,).
-        odd: mask of steps that stand out without being whole frames, (n - 1,).
-    """
+    """Times with the losses that were found put back, or why nothing is given."""
     after = _all_jumps(_later(time, lost, frame), readings, frame, LOST_FRAMES.windows[-1])
     many = np.count_nonzero(lost) > LOST_FRAMES.largest_share * lost.size
     stray = int(np.sum(odd & ~(lost > 0)))
@@ -234,14 +226,7 @@ def _losses(series: list[_Jumps], wide: int, picture: PictureSteps | None) -> tu
 
 
 def _all_jumps(time: Samples, readings: tuple[FrameSeries, ...], frame: float, wide: int) -> list[_Jumps]:
-    """Jumps of the series that move enough to show lost frames.
-
-    Args:
-        time: times, s, (n,).
-        readings: the series.
-        frame: usual time between two frames, s.
-        wide: frames before and after a step whose medians are compared.
-    """
+    """Jumps of the series that move enough to show lost frames, by medians of `wide` frames."""
     found = (_jumps(time, reading, frame, wide) for reading in readings)
     return [one for one in found if one is not None]
 

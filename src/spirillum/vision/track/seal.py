@@ -59,7 +59,6 @@ class SealEdges:
     """Finds the edges of the seal near expected places; learns its colours and the bias of each of them."""
 
     def __init__(self, contour: Contour, classes: int) -> None:
-        """Begin."""
         every = np.flatnonzero(contour.seal)
         self.chosen = every[:: max(1, round(every.size / SEAL.edges))]
         groups = contour.group[self.chosen]
@@ -113,12 +112,7 @@ class SealEdges:
         return SealShifts(shifts, known, variance, found.kind)
 
     def learn_colours(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
-        """Learn the colours at the silhouette, and the profile of an edge.
-
-        Args:
-            parts: surroundings of the robot on some frames.
-            places: pixels and normals of the edges on each of them.
-        """
+        """Learn the colours at the silhouette, and the profile of an edge."""
         cv2 = import_optional("cv2", "measuring a video", "video")
         flanks = np.concatenate(self._sides[1:3])
         inside = self._offsets <= -1.0
@@ -139,12 +133,7 @@ class SealEdges:
         self._take(self._template)
 
     def learn_bias(self, residuals: Samples, kinds: np.ndarray) -> None:
-        """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently.
-
-        Args:
-            residuals: residual displacement of each edge on some frames, pixels, (f, n); NaN where unknown.
-            kinds: class of the colour at each edge, (f, n).
-        """
+        """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently."""
         for number, side in enumerate(self._sides):
             for kind in range(self._classes):
                 mine = residuals[:, side][kinds[:, side] == kind]
@@ -153,12 +142,7 @@ class SealEdges:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
     def size(self, seen: SealShifts, pixels: Samples) -> float:
-        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
-
-        Args:
-            seen: displacements of its edges at the body's pose.
-            pixels: expected places of the edges, (n, 2).
-        """
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ."""
         found, distances = [], []
         for first, last in ((0, 3), (1, 2)):
             sides = [self._sides[side] for side in (first, last)]

@@ -120,13 +120,7 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
 
 
 def _apart(scores: Samples, poses: Samples, far: float) -> list[PoseCandidate]:
-    """The best candidates without near duplicates.
-
-    Args:
-        scores: of the places that were tried, (n,).
-        poses: x, y and heading there, (n, 3).
-        far: least distance between two candidates, m.
-    """
+    """The best candidates (x, y, heading; (n, 3)) without near duplicates."""
     kept: list[PoseCandidate] = []
     left = np.argsort(-scores, kind="stable")
     left = left[scores[left] > 0.0]
@@ -150,14 +144,7 @@ def close_places(image: np.ndarray, still: Samples, body: Shape, *, turn: float 
 
 
 def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate) -> PoseCandidate:
-    """Refine a candidate to a pixel in the full picture; its score is a gradient, grey values per pixel.
-
-    Args:
-        image: 8-bit RGB, (h, w, 3).
-        still: static background of the video, (h, w, 3), or reduced by a whole factor.
-        body: the robot's body, before the camera of these pictures.
-        start: the candidate to be refined.
-    """
+    """Refine a candidate to a pixel in the full picture; its score is a gradient, grey values per pixel."""
     contour, optics, bounds = body.thin, body.optics, body.bounds
     first = body.contour.places(start.pose, optics)[0]
     if not np.isfinite(first).all():

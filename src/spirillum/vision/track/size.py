@@ -55,18 +55,7 @@ def _resemblance(found: Sequence[Sequence[PoseCandidate]]) -> float:
 def best_other_size(
     body: BodyFinder, images: Sequence[np.ndarray], still: Samples, least: float = SIZE.clearness, about: float = 1.0
 ) -> float | None:
-    """The size, from half to twice the expected one, at which an object resembles the robot most.
-
-    Args:
-        body: the robot's body at the stated scale.
-        images: some frames, 8-bit RGB, (h, w, 3) each; they and the background may be reduced by a whole factor.
-        still: static background of the frames, (h, w, 3).
-        least: clearness from which on a detection counts.
-        about: the expected size over the stated one.
-
-    Returns:
-        The size over the expected one; None if no detection is clear.
-    """
+    """The size, half to twice the expected one, at which an object resembles the robot most; None if unclear."""
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, SIZE.looked_at).round().astype(int))]
     factor = body.optics.size[0] // still.shape[1]
     expected = _magnified(body.optics, about)

@@ -239,7 +239,6 @@ class PictureChange:
     """Compares each picture with the last two."""
 
     def __init__(self, bounds: tuple[int, int, int, int]) -> None:
-        """Begin."""
         self.bounds = bounds
         self._last: list[np.ndarray] = []
 
@@ -272,14 +271,7 @@ class PictureSteps(NamedTuple):
 
 
 def picture_steps(change: Samples) -> PictureSteps | None:
-    """Evidence of the changes of the picture about missing and repeated frames.
-
-    Args:
-        change: of each picture against the last one and the one before, (n, 2).
-
-    Returns:
-        None where the motion changes the picture too little, or too unevenly, to tell.
-    """
+    """Evidence of changes, (n, 2), about lost and repeated frames; None where they are too small or uneven."""
     if len(change) < PICTURE_CHANGE.fewest:
         return None
     one, two = change[1:, 0], change[1:, 1]

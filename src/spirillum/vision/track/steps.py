@@ -88,13 +88,7 @@ class FrameTracker:
     """Follows a robot that is known from frame to frame."""
 
     def __init__(self, known: Identified, still: Samples, *, ahead: bool = True) -> None:
-        """Begin.
-
-        Args:
-            known: the robot, with readers that have learnt its appearance.
-            still: static background of the pictures, (h, w, 3), or reduced by a whole factor.
-            ahead: whether the initial detection covers the frames that come, so that its path gives the robot's pose.
-        """
+        """Begin with learnt readers; `ahead` if the initial detection covers the frames that come."""
         self.known, self.still, self.record = known, still, Record()
         self._ahead = ahead
         self._change = PictureChange(known.start.body.bounds)

@@ -81,14 +81,7 @@ def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples)
 
 
 def likeliest_rate(time: Samples, angle: Samples, period: float, usual: float) -> float:
-    """The rate below half a period a frame that fits the steps of some readings best, rad/s.
-
-    Args:
-        time: of the readings, s, (n,), two or more.
-        angle: modulo `period`, rad, (n,).
-        period: of the angle, rad.
-        usual: time from frame to frame, s.
-    """
+    """The rate below half a period a frame that fits the steps of some readings best, rad/s."""
     return _rate(time, angle, period, usual)[0]
 
 

@@ -85,12 +85,7 @@ def _apart(other: PoseCandidate, one: PoseCandidate, half: float) -> bool:
 
 
 def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
-    """Frame numbers that count dropped frames, and a flag on these.
-
-    Args:
-        time: times of the frames, s, (n,).
-        index: indices of the frames in the file, (n,).
-    """
+    """Frame numbers that count dropped frames, and a flag on these."""
     if time.size < 3:
         return index, ()
     steps = np.diff(time)

@@ -53,11 +53,7 @@ class Display(NamedTuple):
         return (1.0, share) if self.transposed else (share, 1.0)
 
     def shown(self, picture: np.ndarray) -> np.ndarray:
-        """A stored picture as it is shown.
-
-        Args:
-            picture: 8-bit, (h, w) or (h, w, channels).
-        """
+        """A stored 8-bit picture as it is shown."""
         height, stored = picture.shape[:2]
         width = max(1, round(stored * self.aspect))
         if width != stored:
@@ -100,13 +96,7 @@ def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
 
 
 def stated_aspect(name: str, stated: float | None, given: float | None) -> float:
-    """Width of a pixel over its height: as the setup gives it, else as the file states it, else 1.
-
-    Args:
-        name: of the video, for the sentence of an error.
-        stated: what the file states; None where it says nothing.
-        given: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-    """
+    """Width of a pixel over its height: as the setup gives it, else as the file states it, else 1."""
     aspect = (stated or 1.0) if given is None else given
     if not ASPECTS[0] <= aspect <= ASPECTS[1]:
         raise InputError(
@@ -119,15 +109,7 @@ def stated_aspect(name: str, stated: float | None, given: float | None) -> float
 def display_flags(
     display: Display, stored: tuple[int, int], stated: float | None, given: float | None, slant: float = 0.0
 ) -> list[Flag]:
-    """What was done to the pictures, and on whose word.
-
-    Args:
-        display: how they are shown.
-        stored: width and height of a stored picture, pixels.
-        stated: pixel aspect ratio that the file states; None where it says nothing.
-        given: `camera.pixel_aspect_ratio` of the setup; None where it is unset.
-        slant: angle by which the file's orientation is off a quarter turn, rad.
-    """
+    """What was done to the pictures, and on whose word."""
     flags, width = [], round(stored[0] * display.aspect)
     if given is not None and stated is not None and round(stored[0] * stated) != width:
         sentence = (

@@ -74,12 +74,7 @@ def reduction(size: tuple[int, int]) -> int:
 
 
 def reduced(image: np.ndarray, factor: int) -> np.ndarray:
-    """A picture whose blocks of `factor` by `factor` pixels are made one, their mean; from the upper left.
-
-    Args:
-        image: 8-bit, (h, w) or (h, w, channels).
-        factor: a whole number; 1 gives the picture itself.
-    """
+    """A picture whose blocks of `factor` by `factor` pixels are made one, their mean; from the upper left."""
     if factor == 1:
         return image
     cv2 = import_optional("cv2", "measuring a video", "video")
@@ -102,13 +97,7 @@ def eight_bit(image: np.ndarray, bits: int) -> np.ndarray:
 
 
 def read_image(path: Path, *, grey: bool = False, display: Display | None = None) -> np.ndarray | None:
-    """A picture as it is stored, 8-bit or 16-bit BGR or grey values; None if it cannot be decoded.
-
-    Args:
-        path: the file.
-        grey: grey values, (height, width), in place of colours, (height, width, 3).
-        display: of the other images of its folder; None: of any orientation.
-    """
+    """A picture as it is stored, 8-bit or 16-bit BGR or grey values; None if it cannot be decoded."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     data = read_bytes(path, _WHAT, LARGEST_PICTURE)
     header = _header(BytesIO(data), path)
