@@ -156,12 +156,14 @@ class Places:
 
     def fineness(self, t: float, seat: Seat) -> Fineness:
         """Resolution of the flow at a place."""
-        gap = t * contact_offset(self.rings, self.radius, 0.0) / (0.5 * self.geometry.body_diameter)
-        return replace(self.stage.fineness(float(gap), seat), wire=finest_wire(self.geometry))
+        gap = t * contact_offset(self.rings, self.radius, 0.0)
+        found = self.stage.fineness(gap, 0.5 * self.geometry.body_diameter, seat)
+        return replace(found, wire=finest_wire(self.geometry))
 
     def fineness_of_check(self, seat: Seat) -> Fineness:
         """Resolution of the flow at a check pose."""
-        return replace(self.stage.fineness_of_check(seat), wire=finest_wire(self.geometry))
+        found = self.stage.fineness_of_check(0.5 * self.geometry.body_diameter, seat)
+        return replace(found, wire=finest_wire(self.geometry))
 
     @cached_property
     def most_yaw(self) -> Samples:

@@ -7,7 +7,7 @@ stage can be used on its own; its nodes are read from the cache where another st
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,9 +19,13 @@ from spirillum.robot.tube_pose import Seat
 
 StageName = Literal["straight", "yaw", "fine"]
 Tilt = Literal["level", "pitched", "yawed"]
+Where = Literal["near", "far", "tight"]
+"""Near the glass, far from it, or in a tube of less than twice the body's diameter."""
 
 _NEAR = 0.12
 """Gap over the body's radius below which a node is near the glass."""
+_TIGHT = 0.5
+"""Radius of the body over the tube's from which on the fluid that it displaces along the tube multiplies errors."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class Stage:
     phases: tuple[tuple[float, int], ...]
     """Phases of the tail from which clearance on, over the radius that it sweeps; near the glass it has more harmonics
     over a turn."""
-    resolutions: dict[tuple[bool, Tilt], Fineness]
-    """Resolution of the flow for nodes (near the glass, tilt)."""
+    resolutions: dict[tuple[Where, Tilt], Fineness]
+    """Resolution of the flow at nodes."""
     seconds: tuple[float, float]
     """Time that a node takes one process of a fast and of a slow machine, s."""
     held_out: int
@@ -62,13 +66,14 @@ class Stage:
     film_intervals: int = 15
     """Intervals of its splines: with 11 it is within 0.4 %."""
 
-    def fineness(self, gap: float, seat: Seat) -> Fineness:
-        """Return the resolution of a node whose level gap over the body's radius is given."""
-        return self.resolutions[gap < _NEAR, _tilt_of(seat)]
+    def fineness(self, level_gap: float, body_radius: float, seat: Seat) -> Fineness:
+        """Return the resolution of a node whose level gap is given."""
+        near: Where = "near" if level_gap < _NEAR * body_radius else "far"
+        return self.resolutions["tight" if body_radius > _TIGHT * seat.radius else near, _tilt_of(seat)]
 
-    def fineness_of_check(self, seat: Seat) -> Fineness:
+    def fineness_of_check(self, body_radius: float, seat: Seat) -> Fineness:
         """Return the resolution of a check pose."""
-        return self.checks[_tilt_of(seat)]
+        return (_FINEST if body_radius > _TIGHT * seat.radius else self.checks)[_tilt_of(seat)]
 
     def phases_at(self, clearance: float) -> int:
         """Number of phases of a tail with that clearance over the radius that it sweeps."""
@@ -77,16 +82,20 @@ class Stage:
 
 _LOOSE = Fineness("standard", 0.1, 4, wires=4e-3, slack=1.0, crowd=1.25)
 _FINER = replace(_LOOSE, tolerance=0.01, order=6, panel=3.5)
-_COARSE: dict[tuple[bool, Tilt], Fineness] = {
-    (True, "level"): replace(_LOOSE, tolerance=0.005, wires=1e-3, slack=SLACK),
-    (True, "pitched"): _FINER,
-    (True, "yawed"): replace(_LOOSE, tolerance=0.03, slack=2.0),
-    (False, "level"): replace(_LOOSE, tolerance=0.03, wires=1e-3, slack=SLACK),
-    (False, "pitched"): _LOOSE,
-    (False, "yawed"): _LOOSE,
+_COARSE: dict[tuple[Where, Tilt], Fineness] = {
+    ("near", "level"): replace(_LOOSE, tolerance=0.005, wires=1e-3, slack=SLACK),
+    ("near", "pitched"): _FINER,
+    ("near", "yawed"): replace(_LOOSE, tolerance=0.03, slack=2.0),
+    ("far", "level"): replace(_LOOSE, tolerance=0.03, wires=1e-3, slack=SLACK),
+    ("far", "pitched"): _LOOSE,
+    ("far", "yawed"): _LOOSE,
+    ("tight", "level"): Fineness("standard", 0.005, 6),
+    ("tight", "pitched"): Fineness("standard", 0.03, 6),
+    ("tight", "yawed"): Fineness("standard", 0.03, 6),
 }
-"""Near the glass within 0.3 % of the forward velocity, 1 % of forces, torques and the normal resistance."""
-_CHECKS: dict[Tilt, Fineness] = {"level": _COARSE[True, "level"], "pitched": _FINER, "yawed": _FINER}
+"""Near the glass within 0.3 % of the forward velocity, 1 % of forces, torques and normal resistance; within 0.2 % of
+the velocity in a tight tube, where `_LOOSE` errs by 5 %."""
+_CHECKS: dict[Tilt, Fineness] = {"level": _COARSE["near", "level"], "pitched": _FINER, "yawed": _FINER}
 
 YAW = Stage(
     "yaw",
@@ -116,7 +125,7 @@ FINE = Stage(
     down=(0.0, 0.28, 0.55, 0.8, 1.0),
     upper=(0.55, 0.78, 1.0),
     phases=((0.0, 9), (1.0, 5)),
-    resolutions={(near, tilt): fineness for near in (True, False) for tilt, fineness in _FINEST.items()},
+    resolutions={(where, tilt): fineness for where in get_args(Where) for tilt, fineness in _FINEST.items()},
     seconds=(6.0, 14.0),
     held_out=6,
     checks=dict.fromkeys(_FINEST, replace(_FINEST["yawed"], order=8)),
