@@ -220,7 +220,7 @@ class AxialBatch:
         numbers, viscosity = sampled_numbers(self.axial, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
-            own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
+            own = [index for index, item in enumerate(PARAMETERS) if item.name in self._ranges]
             rows[:, own] = numbers[:, own]
             numbers = rows
         self.numbers[chosen], self._viscosity[chosen] = numbers, viscosity

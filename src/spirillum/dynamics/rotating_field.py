@@ -123,8 +123,8 @@ def in_tilted_field(links: _A, requested: Field) -> _A:
         raise InputError(f"field.{next(iter(given))} without a field; allowed: with drive.kind = 'magnetic'")
     for name in ("rotation_rate", "strength"):
         if name in given:
-            place = "magnetic.field" if name == "strength" else f"magnetic.{name}"
-            raise InputError(f"field.{name} of a run; allowed: {place} of the robot")
+            field = "magnetic.field" if name == "strength" else f"magnetic.{name}"
+            raise InputError(f"field.{name} of a run; allowed: {field} of the robot")
     return own.changed(requested, 0.0).on(links)
 
 

@@ -119,13 +119,13 @@ class Evidence:
 
     def tail(self, wavelength_mm: float, amplitude_mm: float) -> tuple[int, int] | None:
         """Indices of a tail in the grid, if it is there."""
-        places = []
+        indices = []
         for name, value in (("wavelength", wavelength_mm), ("amplitude", amplitude_mm)):
             near = np.flatnonzero(np.isclose(self.dataset[name].values, value * 1e-3, rtol=1e-6))
             if not near.size:
                 return None
-            places.append(int(near[0]))
-        return places[0], places[1]
+            indices.append(int(near[0]))
+        return indices[0], indices[1]
 
     def speed_of(self, reynolds: float) -> float:
         """U = Re mu/(rho D_b), m/s: the speed behind a Reynolds number if its length is the body's diameter."""
@@ -147,7 +147,7 @@ class Evidence:
         )
 
     @property
-    def place(self) -> str:
+    def pose(self) -> str:
         """Poses of the models that compute the walls, in words."""
         return reference_pose(self._settings)
 
