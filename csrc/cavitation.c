@@ -20,21 +20,22 @@
 enum { MOMENTS = 5, ROUNDS = 100, GUESSED = 8 };
 static const double FAR = 1e8; /* in s: no cavity is as wide */
 
+/* Of xi^(n - 5 - 2 m) in K_n far out: binomial coefficients of (1 + xi^-2)^-3, integrated. */
+#define TERM(n, m) ((m % 2 ? -0.5 : 0.5) * (m + 1) * (m + 2) / (n - 5 - 2 * m))
+#define ROW(m) {TERM(0, m), TERM(1, m), TERM(2, m), TERM(3, m), TERM(4, m)}
+enum { TERMS = 14 };
+static const double SERIES[TERMS][MOMENTS] = {ROW(0), ROW(1), ROW(2), ROW(3),  ROW(4),  ROW(5),  ROW(6),
+                                              ROW(7), ROW(8), ROW(9), ROW(10), ROW(11), ROW(12), ROW(13)};
+
 /* Integrals K_n of xi^n/(1 + xi^2)^3 from -infinity up to a place, n = 0 to 4. */
 static void set_moments(double xi, double k[MOMENTS]) {
     if (xi < -6.0) { /* a series in 1/xi^2, where the closed forms cancel */
         const double inverse = 1.0 / (xi * xi);
         double power = inverse * inverse * inverse * xi;
-        for (int n = 0; n < MOMENTS; n++) {
-            double term = power, binomial = 1.0;
-            k[n] = 0.0;
-            for (int m = 0; m < 14; m++) {
-                k[n] += binomial * term / (double)(n - 5 - 2 * m);
-                binomial *= -(double)(m + 3) / (double)(m + 1);
-                term *= inverse;
-            }
-            power *= xi;
-        }
+        for (int n = 0; n < MOMENTS; n++) k[n] = 0.0;
+        for (int m = TERMS - 1; m >= 0; m--)
+            for (int n = 0; n < MOMENTS; n++) k[n] = k[n] * inverse + SERIES[m][n];
+        for (int n = 0; n < MOMENTS; n++, power *= xi) k[n] *= power;
         return;
     }
     const double once = 1.0 / (1.0 + xi * xi), twice = once * once, angle = atan(xi) + 0.5 * PI;
@@ -105,8 +106,10 @@ static Side side_of(double a, double b, double *guess) {
     };
 }
 
-/* Whether the pressure of the linear film falls below the bound: 3 (1 + xi^2)^2 < a xi + 3 b/4 somewhere. */
-static bool cavitates(double a, double b) {
+/* 3 (1 + xi^2)^2 < a xi + 3 b/4 somewhere. */
+bool cavitates(double a, double b) {
+    if (!is_near_cavitation(a, b)) return false;
+    if (b > 4.0 || fabs(a) + 1.5 * b > 9.375 || fabs(a) + 0.75 * b > 12.0) return true; /* at |xi| = 0, 1/2 and 1 */
     const double root3 = sqrt(3.0);
     const double xi
         = 2.0 / root3 * sinh(asinh(0.125 * root3 * a) / 3.0); /* of the least difference: xi^3 + xi = a/12 */
@@ -114,33 +117,12 @@ static bool cavitates(double a, double b) {
     return wide * wide < a * xi / 3.0 + 0.25 * b;
 }
 
-/* The film in units of the bound: a and b of the pressure, their units per velocity, and s. */
-typedef struct {
-    double s, per_u, per_v, a, b;
-} Scaled;
-
-static Scaled scaled(const LineContact *c, double viscosity, double bound) {
-    const double s = sqrt(2.0 * c->bend * c->gap), unit = 12.0 * viscosity / (bound * c->gap * c->gap);
-    const double per_u = s * unit, per_v = 2.0 * c->bend * unit;
-    return (Scaled){s, per_u, per_v, per_u * c->entrainment, per_v * c->opening};
-}
-
-/* Most films are far from it: xi/(1 + xi^2)^2 is at most 3 sqrt(3)/16. */
-static bool is_near(double a, double b) { return !(fabs(a) < 9.2 - 2.3 * larger(b, 0.0)); }
-
-/* Whether a film may cavitate; one with larger gaps and smaller velocities then does not, if this one does not. */
-bool is_near_cavitation(const LineContact *c, double viscosity, double bound) {
-    const Scaled film = scaled(c, viscosity, bound);
-    return is_near(film.a, film.b);
-}
-
-Lift cavitation_lift(const LineContact *c, double viscosity, double bound, double edges[2]) {
-    const Scaled film = scaled(c, viscosity, bound);
-    const double s = film.s, per_u = film.per_u, per_v = film.per_v, a = film.a, b = film.b;
-    if (!is_near(a, b) || !cavitates(a, b)) return (Lift){0};
+Lift cavitation_lift(const FilmScale *film, double gap, double bound, double a, double b, double edges[2]) {
+    if (!cavitates(a, b)) return (Lift){0};
+    const double s = film->s, per_u = film->per_u, per_v = film->per_v;
     /* less the linear film, whose integrals are -pi b/8 and -pi a/6 */
     const Side before = side_of(a, b, edges), behind = side_of(-a, b, edges + 1);
-    const double normal = bound * s, along = 2.0 * bound * c->gap; /* s^2/R' = 2 h0 */
+    const double normal = bound * s, along = 2.0 * bound * gap; /* s^2/R' = 2 h0 */
     return (Lift){
         .normal = normal * (before.normal + behind.normal + 0.125 * PI * b),
         .along = along * (before.along - behind.along + PI * a / 6.0),
@@ -154,9 +136,10 @@ Lift cavitation_lift(const LineContact *c, double viscosity, double bound, doubl
 EXPORT void lift_of_cavitation(const double *gap, const double *bend, const double *opening, const double *entrainment,
                                double viscosity, double bound, double *out, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        const LineContact contact = {gap[n], bend[n], opening[n], entrainment[n]};
+        const FilmScale film = film_scale(gap[n], bend[n], viscosity, bound);
+        const double a = film.per_u * entrainment[n], b = film.per_v * opening[n];
         double edges[2] = {NAN, NAN};
-        const Lift lift = cavitation_lift(&contact, viscosity, bound, edges);
+        const Lift lift = cavitation_lift(&film, gap[n], bound, a, b, edges);
         const double row[6]
             = {lift.normal,           lift.along, lift.of_opening[0], lift.of_opening[1], lift.of_entrainment[0],
                lift.of_entrainment[1]};

@@ -43,22 +43,17 @@ static void set_normal(Nearest *at, const double rotation[3][3], double y, doubl
 Nearest site_nearest(const Site *site, const State *y, const double rotation[3][3], double radius) {
     const double x = site->x, ring = site->ring, flat = squared(site->half) - squared(ring);
     const double side = y->position[1] + rotation[1][0] * x, up = y->position[2] + rotation[2][0] * x;
-    double angle = hypot(side, up) > 1e-9 * radius ? atan2(up, side) : -0.5 * PI;
-    double n_y = 0.0, n_z = 0.0, n_1 = 0.0, reach = 0.0;
-    for (int round = 0; round < 12; round++) {
-        n_y = cos(angle);
-        n_z = sin(angle);
-        n_1 = n_y * rotation[1][0] + n_z * rotation[2][0];
-        const double turned = n_y * rotation[2][0] - n_z * rotation[1][0];
-        reach = copysign(sqrt(larger(squared(ring) + flat * n_1 * n_1, 1e-36 * squared(radius))), ring);
-        const double slope = flat * n_1 * turned / reach;
-        const double first = n_y * up - n_z * side + slope;
-        const double second = -n_y * side - n_z * up + (flat * (turned * turned - n_1 * n_1) - slope * slope) / reach;
-        if (second >= 0.0 || fabs(first) < 1e-15 * radius) break;
-        angle -= clamped(first / second, -0.5, 0.5);
+    const double e_y = rotation[1][0], e_z = rotation[2][0];
+    double n_y, n_z, turn = INFINITY;
+    first_normal(side, up, radius, &n_y, &n_z);
+    Reach reach = reach_at(e_y, e_z, ring, flat, radius, n_y, n_z);
+    for (int round = 0; round < NORMAL_ROUNDS && fabs(turn) > NORMAL_FOUND; round++) {
+        turn = turn_to_nearest(&reach, e_y, e_z, side, up, flat, n_y, n_z);
+        turn_normal(turn, &n_y, &n_z);
+        reach = reach_at(e_y, e_z, ring, flat, radius, n_y, n_z);
     }
-    const double arm = x + flat * n_1 / reach, ball = ring * ring / reach + site->ball;
-    Nearest at = {.gap = radius - n_y * side - n_z * up - reach - site->ball};
+    const double arm = x + flat * reach.n_1 / reach.size, ball = ring * ring / reach.size + site->ball;
+    Nearest at = {.gap = radius - n_y * side - n_z * up - reach.size - site->ball};
     set_normal(&at, rotation, n_y, n_z);
     for (int i = 0; i < 3; i++) at.point[i] = ball * at.normal[i];
     at.point[0] += arm;
@@ -84,9 +79,10 @@ static void helix_at(const Wire *wire, double phase, double xi, double at[3][3])
     const double r = wire->amplitude * (1.0 - shrink), r_1 = wire->amplitude * wire->taper * shrink;
     const double r_2 = -wire->taper * r_1, x = wire->root - xi, k = wire->hand_k;
     const double angle = k * x + phase, c = cos(angle), s = sin(angle);
-    const double found[3][3] = {{x, r * c, r * s},
-                                {-1.0, r_1 * c + k * r * s, r_1 * s - k * r * c},
-                                {0.0, (r_2 - k * k * r) * c + 2.0 * k * r_1 * s, (r_2 - k * k * r) * s - 2.0 * k * r_1 * c}};
+    const double found[3][3]
+        = {{x, r * c, r * s},
+           {-1.0, r_1 * c + k * r * s, r_1 * s - k * r * c},
+           {0.0, (r_2 - k * k * r) * c + 2.0 * k * r_1 * s, (r_2 - k * k * r) * s - 2.0 * k * r_1 * c}};
     for (int n = 0; n < 3; n++)
         for (int i = 0; i < 3; i++) at[n][i] = found[n][i];
 }
@@ -94,10 +90,10 @@ static void helix_at(const Wire *wire, double phase, double xi, double at[3][3])
 /* The same on any other wire: a cubic between the stations about xi, with their points and tangents. */
 static void line_at(const Station *s, double phase, double xi, double at[3][3]) {
     const double h = s[1].xi - s[0].xi, t = (xi - s[0].xi) / h, c = cos(phase), sine = sin(phase);
-    const double weights[3][4]
-        = {{1.0 - t * t * (3.0 - 2.0 * t), t * (1.0 - t) * (1.0 - t) * h, t * t * (3.0 - 2.0 * t), t * t * (t - 1.0) * h},
-           {6.0 * t * (t - 1.0) / h, (1.0 - t) * (1.0 - 3.0 * t), 6.0 * t * (1.0 - t) / h, t * (3.0 * t - 2.0)},
-           {(12.0 * t - 6.0) / (h * h), (6.0 * t - 4.0) / h, (6.0 - 12.0 * t) / (h * h), (6.0 * t - 2.0) / h}};
+    const double weights[3][4] = {
+        {1.0 - t * t * (3.0 - 2.0 * t), t * (1.0 - t) * (1.0 - t) * h, t * t * (3.0 - 2.0 * t), t * t * (t - 1.0) * h},
+        {6.0 * t * (t - 1.0) / h, (1.0 - t) * (1.0 - 3.0 * t), 6.0 * t * (1.0 - t) / h, t * (3.0 * t - 2.0)},
+        {(12.0 * t - 6.0) / (h * h), (6.0 * t - 4.0) / h, (6.0 - 12.0 * t) / (h * h), (6.0 * t - 2.0) / h}};
     for (int n = 0; n < 3; n++) {
         const double *w = weights[n];
         double p[3];

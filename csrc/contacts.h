@@ -3,6 +3,7 @@
 #define SPIRILLUM_CONTACTS_H
 
 #include "cavitation.h"
+#include "lanes.h"
 #include "links.h"
 
 /* A site on body or coupling: a ring about the motor axis that carries a ball; the columns of kernels/contacts.py. */
@@ -37,6 +38,46 @@ typedef struct {
 
 enum { MOST_CONTACTS = 32 }; /* at once */
 
+/* How far a site reaches from its ring's centre along a unit vector n = (y, z) across the tube: n_1 = n.e_1, and S. */
+typedef struct {
+    double n_1, size;
+} Reach;
+
+enum { NORMAL_ROUNDS = 12 };
+static const double NORMAL_FOUND = 1e-8; /* rad: the next turn of the normal is the square of one as small */
+
+/* First guess of the normal at a ring's centre (side, up): away from the tube's axis. */
+static inline void first_normal(double side, double up, double radius, double *y, double *z) {
+    const double size = sqrt(side * side + up * up), far = size > 1e-9 * radius ? 1.0 : 0.0;
+    const double over = 1.0 / (far > 0.0 ? size : 1.0);
+    *y = far * side * over;
+    *z = far * up * over - (1.0 - far);
+}
+
+/* (e_y, e_z): the motor axis across the tube; `flat` is b^2 - rho^2. */
+static inline Reach reach_at(double e_y, double e_z, double ring, double flat, double radius, double y, double z) {
+    const double n_1 = y * e_y + z * e_z;
+    const double square = larger(ring * ring + flat * n_1 * n_1, 1e-36 * radius * radius);
+    return (Reach){n_1, copysign(sqrt(square), ring)};
+}
+
+/* Newton's step for the angle of n at which H is largest; 0 where it is none. */
+static inline double turn_to_nearest(const Reach *reach, double e_y, double e_z, double side, double up, double flat,
+                                     double y, double z) {
+    const double turned = y * e_z - z * e_y, slope = flat * reach->n_1 * turned / reach->size;
+    const double first = y * up - z * side + slope;
+    const double second
+        = -y * side - z * up + (flat * (turned * turned - reach->n_1 * reach->n_1) - slope * slope) / reach->size;
+    return second < 0.0 ? clamped(-first / second, -0.5, 0.5) : 0.0;
+}
+
+/* Turn a unit vector by the arc tangent of a turn. */
+static inline void turn_normal(double turn, double *y, double *z) {
+    const double over = 1.0 / sqrt(1.0 + turn * turn), here = *y;
+    *y = (here - turn * *z) * over;
+    *z = (*z + turn * here) * over;
+}
+
 double asperity_load(double gap, double height, double load);
 double asperity_energy(double gap, double height, double load);
 Nearest site_nearest(const Site *site, const State *y, const double rotation[3][3], double radius);
@@ -49,32 +90,46 @@ typedef struct {
     double u, v, drag; /* sliding velocity, m/s, and dry friction over it, N s/m */
 } Sliding;
 
-/* A slice of the lubrication film under the body's straight side: its velocities per rate. */
-typedef struct {
-    double gap, bend;                          /* h0, R', m */
-    double length;                             /* along the body, m */
-    double share;                              /* of its pressure that the ends of the film leave */
-    double opening[RATES], entrainment[RATES]; /* V and u per rate */
-    double edges[2];                           /* of its cavity where it was last looked for, over s; NaN: nowhere */
-    Lift lift;                                 /* at the rates that were last tried */
-} Slice;
+enum { MOST_SLICES = 3 * LANES };
 
-enum { MOST_SLICES = 24 };
+/* Slices of the lubrication film under the body's straight side: h0, m; V and u per rate. */
+typedef struct {
+    double gap[LANES], opening[RATES][LANES], entrainment[RATES][LANES];
+} SliceLanes;
+
+typedef struct {
+    SliceLanes lanes[MOST_SLICES / LANES];
+    double length[MOST_SLICES]; /* along the body, m */
+    double share[MOST_SLICES];  /* of their pressure that the ends of the film leave */
+    FilmScale scale[MOST_SLICES];
+    double edges[MOST_SLICES][2]; /* of their cavities where they were last looked for, over s; NaN: nowhere */
+    Lift lift[MOST_SLICES];       /* at the rates that were last tried */
+} Slices;
 
 /* Forces that balance: A q + sum of dry friction - lift of cavitation = f; see dry_friction.c. */
 typedef struct {
     double a[RATES][RATES], force[RATES];
     Contact contacts[MOST_CONTACTS];
     int64_t count;
-    Slice slices[MOST_SLICES]; /* of a film that may cavitate */
-    int64_t slice_count;
-    double viscosity, bound; /* of the slices, Pa s; their pressure is not below -p_c, Pa */
-    double slow;             /* v_r, below which dry friction is smooth, m/s */
-    int along;               /* the rate along which a torque keeps a prescribed spin */
-    bool prescribed;         /* whether the spin q_3 + q_6 is */
+    Slices *slices;  /* of a film that may cavitate, or NULL */
+    double bound;    /* their pressure is not below -p_c, Pa */
+    double slow;     /* v_r, below which dry friction is smooth, m/s */
+    int along;       /* the rate along which a torque keeps a prescribed spin */
+    bool prescribed; /* whether the spin q_3 + q_6 is */
+    bool once;       /* whether one step of Newton's method is enough: the first guess is close */
 } Balance;
 
-void set_lift(const Balance *balance, Slice *slice, const double q[RATES]);
+/* a and b of the slices' pressure in lanes from `first`; see cavitation.c. */
+void set_pressures(const Slices *slices, int first, const double q[RATES], double a[LANES], double b[LANES]);
+
+/* Force of a slice's lift on a rate, N or N m. */
+static inline double slice_force(const Slices *slices, int n, int i) {
+    const SliceLanes *lanes = slices->lanes + n / LANES;
+    const Lift *lift = slices->lift + n;
+    const int l = n % LANES;
+    return slices->length[n] * (lift->normal * lanes->opening[i][l] + lift->along * lanes->entrainment[i][l]);
+}
+
 Sliding sliding_at(const Contact *contact, const double q[RATES], double slow);
 double balance_rates(Balance *balance, double q[RATES], double left[RATES]);
 

@@ -24,14 +24,37 @@ Sliding sliding_at(const Contact *contact, const double q[RATES], double slow) {
     return (Sliding){u, v, contact->load / sqrt(u * u + v * v + slow * slow)};
 }
 
-/* Set the lift of a slice at rates. */
-void set_lift(const Balance *balance, Slice *slice, const double q[RATES]) {
-    LineContact contact = {.gap = slice->gap, .bend = slice->bend};
+void set_pressures(const Slices *slices, int first, const double q[RATES], double a[LANES], double b[LANES]) {
+    const SliceLanes *lanes = slices->lanes + first / LANES;
+    EACH_LANE a[l] = b[l] = 0.0;
     for (int i = 0; i < RATES; i++) {
-        contact.opening += slice->opening[i] * q[i];
-        contact.entrainment += slice->entrainment[i] * q[i];
+        EACH_LANE {
+            a[l] += lanes->entrainment[i][l] * q[i];
+            b[l] += lanes->opening[i][l] * q[i];
+        }
     }
-    slice->lift = cavitation_lift(&contact, slice->share * balance->viscosity, balance->bound, slice->edges);
+    for (int l = 0; l < LANES; l++) {
+        a[l] *= slices->scale[first + l].per_u;
+        b[l] *= slices->scale[first + l].per_v;
+    }
+}
+
+/* Set the lifts of slices at rates. */
+static void set_lifts(Slices *slices, double bound, const double q[RATES]) {
+    for (int first = 0; first < MOST_SLICES; first += LANES) {
+        double a[LANES], b[LANES];
+        set_pressures(slices, first, q, a, b);
+        for (int l = 0; l < LANES; l++) {
+            const int n = first + l;
+            double *edges = slices->edges[n];
+            if (n > 0 && isnan(edges[0])) { /* its neighbour's are near */
+                edges[0] = slices->edges[n - 1][0];
+                edges[1] = slices->edges[n - 1][1];
+            }
+            const double gap = slices->lanes[first / LANES].gap[l];
+            slices->lift[n] = cavitation_lift(slices->scale + n, gap, bound, a[l], b[l], edges);
+        }
+    }
 }
 
 static int skipped_row(const Balance *b) { return b->prescribed ? b->along : -1; }
@@ -47,15 +70,10 @@ static double residual(Balance *b, const double q[RATES], double left[RATES]) {
         const Sliding s = sliding_at(c, q, b->slow);
         for (int i = 0; i < RATES; i++) left[i] += s.drag * (c->rows[0][i] * s.u + c->rows[1][i] * s.v);
     }
-    for (int64_t n = 0; n < b->slice_count; n++) {
-        Slice *s = b->slices + n;
-        if (n > 0 && isnan(s->edges[0])) { /* its neighbour's are near */
-            s->edges[0] = s[-1].edges[0];
-            s->edges[1] = s[-1].edges[1];
-        }
-        set_lift(b, s, q);
-        for (int i = 0; i < RATES; i++)
-            left[i] -= s->length * (s->lift.normal * s->opening[i] + s->lift.along * s->entrainment[i]);
+    if (b->slices) {
+        set_lifts(b->slices, b->bound, q);
+        for (int n = 0; n < MOST_SLICES; n++)
+            for (int i = 0; i < RATES && b->slices->lift[n].normal != 0.0; i++) left[i] -= slice_force(b->slices, n, i);
     }
     double size = 0.0;
     for (int i = 0; i < RATES; i++)
@@ -77,13 +95,17 @@ static double scale_of(const Balance *b, const double q[RATES]) {
 }
 
 /* Take the derivative of a slice's lift from the derivative of the balance. */
-static void add_slice(const Slice *s, double h[RATES][RATES]) {
-    const Lift lift = s->lift;
+static void add_slice(const Slices *s, int n, double h[RATES][RATES]) {
+    const Lift lift = s->lift[n];
+    double opening[RATES], entrainment[RATES];
     for (int i = 0; i < RATES; i++) {
-        const double v = s->length * (s->opening[i] * lift.of_opening[0] + s->entrainment[i] * lift.of_opening[1]);
-        const double u
-            = s->length * (s->opening[i] * lift.of_entrainment[0] + s->entrainment[i] * lift.of_entrainment[1]);
-        for (int j = 0; j < RATES; j++) h[i][j] -= v * s->opening[j] + u * s->entrainment[j];
+        opening[i] = s->lanes[n / LANES].opening[i][n % LANES];
+        entrainment[i] = s->lanes[n / LANES].entrainment[i][n % LANES];
+    }
+    for (int i = 0; i < RATES; i++) {
+        const double v = s->length[n] * (opening[i] * lift.of_opening[0] + entrainment[i] * lift.of_opening[1]);
+        const double u = s->length[n] * (opening[i] * lift.of_entrainment[0] + entrainment[i] * lift.of_entrainment[1]);
+        for (int j = 0; j < RATES; j++) h[i][j] -= v * opening[j] + u * entrainment[j];
     }
 }
 
@@ -105,7 +127,8 @@ static void set_tangent(const Balance *b, const Duals duals, const double q[RATE
             for (int j = 0; j < RATES; j++) h[i][j] += x * c->rows[0][j] + z * c->rows[1][j];
         }
     }
-    for (int64_t n = 0; n < b->slice_count; n++) add_slice(b->slices + n, h);
+    for (int n = 0; b->slices && n < MOST_SLICES; n++)
+        if (b->slices->lift[n].normal != 0.0) add_slice(b->slices, n, h);
 }
 
 /* Largest share of a step from w that stays in the unit circle. */
@@ -175,6 +198,21 @@ static void find_step(const Balance *b, double h[RATES][RATES], const double lef
     for (int i = 0; i < RATES; i++) step[i] = b->prescribed ? x[i][0] + torque * x[i][1] : x[i][0];
 }
 
+/* Take the lifts on along a step. */
+static void follow_lifts(Slices *slices, const double step[RATES]) {
+    for (int n = 0; n < MOST_SLICES; n++) {
+        const SliceLanes *lanes = slices->lanes + n / LANES;
+        Lift *lift = slices->lift + n;
+        double v = 0.0, u = 0.0;
+        for (int i = 0; i < RATES && lift->normal != 0.0; i++) {
+            v += lanes->opening[i][n % LANES] * step[i];
+            u += lanes->entrainment[i][n % LANES] * step[i];
+        }
+        lift->normal += lift->of_opening[0] * v + lift->of_entrainment[0] * u;
+        lift->along += lift->of_opening[1] * v + lift->of_entrainment[1] * u;
+    }
+}
+
 /* Find the rates; what is left of the forces, over them.
  *
  * Newton's method for rates and duals, the directions of sliding (T. F. Chan, G. H. Golub, P. Mulet, SIAM J. Sci.
@@ -190,6 +228,16 @@ double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
         const double speed = sqrt(s.u * s.u + s.v * s.v + b->slow * b->slow);
         duals[n][0] = s.u / speed;
         duals[n][1] = s.v / speed;
+    }
+    if (b->once) {
+        set_tangent(b, duals, q, h);
+        find_step(b, h, left, step);
+        for (int i = 0; i < RATES; i++) q[i] += step[i];
+        if (b->prescribed)
+            size = residual(b, q, left); /* for the torque */
+        else if (b->slices)
+            follow_lifts(b->slices, step);
+        return size / scale;
     }
     for (int round = 0; round < ROUNDS && !(size <= BALANCED * scale); round++) {
         set_tangent(b, duals, q, h);

@@ -231,18 +231,18 @@ static void multiply_factors(const double sums[FILM_ENTRIES], double a, double a
     }
 }
 
-double film_resistance(const Film *f, double e, double pitch, double yaw, double out[6][6]) {
+void film_resistance(const Film *f, double e, double pitch, double yaw, double out[6][6]) {
     double sums[FILM_ENTRIES];
     const Coordinates c = coordinates_of(f, e, pitch, yaw);
     interpolate(f, &c, sums);
     sums[0] += c.known;
     multiply_factors(sums, f->body, c.turn, out);
-    return film_smallest_gap(f, e, pitch, yaw);
 }
 
 EXPORT double film_at(const double *packed, double e, double pitch, double yaw, double *out) {
     const Film film = film_opened(packed);
-    return film_resistance(&film, e, pitch, yaw, (double (*)[6])out);
+    film_resistance(&film, e, pitch, yaw, (double (*)[6])out);
+    return film_smallest_gap(&film, e, pitch, yaw);
 }
 
 EXPORT double smallest_gap(const double *head, double e, double pitch, double yaw) {

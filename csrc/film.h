@@ -23,6 +23,6 @@ enum { FILM_HEAD = 15, FILM_ENTRIES = 21, FILM_MOST_YAWS = 99 };
 
 Film film_opened(const double *packed);
 double film_smallest_gap(const Film *film, double e, double pitch, double yaw);
-double film_resistance(const Film *film, double e, double pitch, double yaw, double out[6][6]);
+void film_resistance(const Film *film, double e, double pitch, double yaw, double out[6][6]);
 
 #endif

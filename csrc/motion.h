@@ -2,7 +2,7 @@
 #ifndef SPIRILLUM_MOTION_H
 #define SPIRILLUM_MOTION_H
 
-#include "contacts.h"
+#include "slices.h"
 #include "table.h"
 
 /* The channel's wall of a robot without a tube; the columns of kernels/two_links.py. */
@@ -37,6 +37,15 @@ typedef struct {
     double sites, stations;         /* their numbers */
 } Tube;
 
+/* What rates at one place of the robot share, and what those nearby begin with; see `tube_robot_rates`. */
+typedef struct {
+    double place[6]; /* position across the tube, attitude; NaN: none */
+    TablePlace table, near_table;
+    TableSlopes slopes;
+    SlicedFilm sliced, near_sliced;
+    bool has_slopes;
+} PlaceMemory;
+
 /* A robot in its tube, opened from `packed` of tube_motion.py. */
 typedef struct {
     const Links *links;
@@ -47,6 +56,7 @@ typedef struct {
     const double (*flow)[2]; /* times, s, and imposed mean velocities, m/s */
     int64_t site_count, station_count, flow_count;
     Table table;
+    PlaceMemory *memory;
 } TubeRobot;
 
 /* How `advance` ended: the time was reached; the steps are used up; something watched has changed its sign in the last
@@ -70,8 +80,10 @@ TwoLinks two_links_opened(const double *packed, int64_t size);
 void two_links_rates(const TwoLinks *robot, const State *y, double time, Seen *seen, State *dy);
 double two_links_film(const TwoLinks *robot, const State *y);
 
-TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table);
-void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy);
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table, PlaceMemory *memory);
+/* Write what is observed in a state, and its time derivative; `nearby`: to first order in the distance from the last
+ * state whose rates were asked for otherwise and are in `seen`. */
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, bool nearby, Seen *seen, State *dy);
 void tube_robot_gaps(const TubeRobot *robot, const State *y, double *gaps);
 
 #endif

@@ -84,10 +84,10 @@ typedef struct {
     Seen *seen;
 } Robot;
 
-static Robot robot_opened(double *data, const double *table, int64_t size, int64_t table_size) {
+static Robot robot_opened(double *data, const double *table, int64_t size, int64_t table_size, PlaceMemory *memory) {
     Robot robot = {.in_tube = table_size > 0, .seen = (Seen *)data};
     if (robot.in_tube)
-        robot.tube = tube_robot_opened(data + SEEN, size - SEEN, table);
+        robot.tube = tube_robot_opened(data + SEEN, size - SEEN, table, memory);
     else
         robot.links = two_links_opened(data + SEEN, size - SEEN);
     return robot;
@@ -95,9 +95,18 @@ static Robot robot_opened(double *data, const double *table, int64_t size, int64
 
 static void find_rates(const Robot *robot, double time, const double *y, double *dy) {
     if (robot->in_tube)
-        tube_robot_rates(&robot->tube, (const State *)y, time, robot->seen, (State *)dy);
+        tube_robot_rates(&robot->tube, (const State *)y, time, false, robot->seen, (State *)dy);
     else
         two_links_rates(&robot->links, (const State *)y, time, robot->seen, (State *)dy);
+}
+
+/* Rates close to the last state, whose rates are `base`, for differences. */
+static void find_rates_near(const Robot *robot, const double base[RATES], double time, const double *y, double *dy) {
+    for (int i = 0; i < RATES; i++) robot->seen->rates[i] = base[i];
+    if (robot->in_tube)
+        tube_robot_rates(&robot->tube, (const State *)y, time, true, robot->seen, (State *)dy);
+    else
+        find_rates(robot, time, y, dy);
 }
 
 static void find_gaps(const Robot *robot, const double *y, double *gaps) {
@@ -147,11 +156,12 @@ static void copy(const double *from, double *to) {
 
 /* Derivatives of the rates at the beginning of a step. */
 static void set_jacobian(const Robot *robot, const Sizes *sizes, double near, Step *s) {
-    double trial[STATES], other[STATES], back[STATES];
+    double trial[STATES], other[STATES], back[STATES], base[RATES];
     /* central differences where the rates cost little and are smooth, and where asperities under the wire bend them */
     const bool touches = robot->in_tube && robot->seen->tail_gap < robot->tube.tube->roughness;
     const bool central = touches || (!robot->in_tube && near < 1.0);
     copy(s->y, trial);
+    for (int i = 0; i < RATES; i++) base[i] = robot->seen->rates[i];
     for (int column = 0; column < ACTING; column++) {
         const int at = ACTS[column];
         double step = sizes->state[at] * (at == COLUMN(current) ? 1e-6 : 3e-7 * near);
@@ -159,14 +169,15 @@ static void set_jacobian(const Robot *robot, const Sizes *sizes, double near, St
         if (central) {
             step *= touches ? 1.0 : WIDER;
             first = trial[at] = s->y[at] - step;
-            find_rates(robot, s->time, trial, back);
+            find_rates_near(robot, base, s->time, trial, back);
         }
         trial[at] = s->y[at] + step;
         step = trial[at] - first;
-        find_rates(robot, s->time, trial, other);
+        find_rates_near(robot, base, s->time, trial, other);
         for (int i = 0; i < STATES; i++) s->jacobian[i][column] = (other[i] - (central ? back : s->f)[i]) / step;
         trial[at] = s->y[at];
     }
+    for (int i = 0; i < RATES; i++) robot->seen->rates[i] = base[i];
     if (sizes->later > 0.0) find_rates(robot, s->time + sizes->later, s->y, other);
     for (int i = 0; i < STATES; i++) s->later[i] = sizes->later > 0.0 ? (other[i] - s->f[i]) / sizes->later : 0.0;
 }
@@ -286,13 +297,15 @@ static bool has_crossed(double *gaps, const double *now, int64_t count) {
 
 EXPORT void rates(double *dy, double time, const double *y, double *data, const double *table, int64_t size,
                   int64_t table_size) {
-    const Robot robot = robot_opened(data, table, size, table_size);
+    PlaceMemory place;
+    const Robot robot = robot_opened(data, table, size, table_size, &place);
     find_rates(&robot, time, y, dy);
 }
 
 EXPORT void observe(const double *time, const double *states, double *data, const double *table, double *out,
                     int64_t count, int64_t size, int64_t table_size, int64_t columns) {
-    const Robot robot = robot_opened(data, table, size, table_size);
+    PlaceMemory place;
+    const Robot robot = robot_opened(data, table, size, table_size, &place);
     double dy[STATES];
     for (int64_t n = 0; n < count; n++) {
         find_rates(&robot, time[n], states + n * STATES, dy);
@@ -302,14 +315,16 @@ EXPORT void observe(const double *time, const double *states, double *data, cons
 
 EXPORT void gaps_of(const double *y, double *data, const double *table, double *gaps, int64_t size, int64_t table_size,
                     int64_t count) {
-    const Robot robot = robot_opened(data, table, size, table_size);
+    PlaceMemory place;
+    const Robot robot = robot_opened(data, table, size, table_size, &place);
     (void)count;
     find_gaps(&robot, y, gaps);
 }
 
 EXPORT double watched(const double *y, double outside, double *data, const double *table, const double *limits,
                       double rough, double *gaps, int64_t size, int64_t table_size, int64_t count) {
-    const Robot robot = robot_opened(data, table, size, table_size);
+    PlaceMemory place;
+    const Robot robot = robot_opened(data, table, size, table_size, &place);
     return watch(&robot, y, outside, (const Limits *)limits, rough, gaps, count);
 }
 
@@ -365,8 +380,9 @@ EXPORT int64_t advance(double stop, int64_t clip, int64_t steps, double toleranc
                        double *before, double *increments, double *jacobian, double *gaps, const double *samples,
                        double *states, const double *sizes, const double *limits, double rough, double *data,
                        const double *table, int64_t count, int64_t sample_count, int64_t size, int64_t table_size) {
+    PlaceMemory place;
     Run run = {
-        .robot = robot_opened(data, table, size, table_size),
+        .robot = robot_opened(data, table, size, table_size, &place),
         .sizes = (const Sizes *)sizes,
         .limits = (const Limits *)limits,
         .rough = rough,

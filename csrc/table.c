@@ -19,7 +19,7 @@
  */
 #include "table.h"
 
-enum { HEADER = 8, YAW_LIMIT = 7, YAW_ORDERS = 6, MOST_NODES = 12, MOST_PHASES = 99 };
+enum { HEADER = 8, YAW_LIMIT = 7, YAW_ORDERS = 6, MOST_NODES = 12 };
 
 static const double STEEPEST[2]
     = {12.0 * PI / 180.0, 8.0 * PI / 180.0}; /* largest pitch of a table nose up, down, rad */
@@ -30,6 +30,7 @@ static const double BEYOND = 1.3;       /* the largest pitch, so that the logari
 static const double BEYOND_YAWED = 2.5; /* of what a yaw adds: its largest one is less at such pitches */
 static const double BEYOND_YAW = 1.2;   /* the largest yaw, so that the inverse tangent stays finite at contact */
 static const double LAST_YAW = 0.95;    /* yaw of the last nodes, over the largest one */
+static const double SLOPE_STEP = 1e-7;  /* radii and rad, of differences over which the table is smooth */
 static const double LEAST_YAW = 1e-3;   /* rad, where the tail nearly touches the glass without a yaw */
 
 Table table_opened(const double *packed) {
@@ -231,13 +232,12 @@ static int fill_coefficients(const Table *table, const Position *p, Pose pose, d
     return left;
 }
 
-/* Fill the matrix with a share of the film's resistance, and the film with it. */
-static void set_film(const Table *table, Pose pose, double share, double film[6][6], double out[MOTIONS][MOTIONS]) {
+/* Set the share of the film's resistance. */
+static void set_film(const Table *table, Pose pose, double t, double film[6][6]) {
+    const double share = cut_of_film(t);
     film_resistance(&table->film, pose.offset, pose.pitch, pose.yaw, film);
-    for (int i = 0; i < MOTIONS; i++)
-        for (int j = 0; j <= i; j++) out[i][j] = out[j][i] = i < 6 ? share * film[i][j] : 0.0;
     for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++) film[i][j] = out[i][j];
+        for (int j = 0; j < 6; j++) film[i][j] *= share;
 }
 
 /* Add a share of the outer part at a phase, from the Fourier coefficients of its factor. */
@@ -245,10 +245,14 @@ static void add_outer(const double *coefficients, int64_t phases, double phase, 
                       double out[MOTIONS][MOTIONS]) {
     double factor[FACTOR];
     for (int k = 0; k < FACTOR; k++) factor[k] = coefficients[k];
+    const double c = cos(phase), s = sin(phase);
+    double cosine = c, sine = s; /* of multiples of the phase */
     for (int64_t m = 1; m < phases; m++) {
-        const double angle = (double)((m + 1) / 2) * phase;
-        const double weight = m % 2 == 1 ? cos(angle) : sin(angle);
+        const double weight = m % 2 == 1 ? cosine : sine, last = cosine;
         for (int k = 0; k < FACTOR; k++) factor[k] += weight * coefficients[m * FACTOR + k];
+        if (m % 2 == 1) continue;
+        cosine = c * last - s * sine;
+        sine = s * last + c * sine;
     }
     for (int i = 0; i < MOTIONS; i++) {
         double *row = factor + i * (i + 1) / 2;
@@ -263,23 +267,55 @@ static void add_outer(const double *coefficients, int64_t phases, double phase, 
     }
 }
 
-int table_resistance(const Table *table, Pose pose, double phase, double film[6][6], double out[MOTIONS][MOTIONS]) {
-    double coefficients[MOST_PHASES * FACTOR];
+void table_place_at(const Table *table, Pose pose, TablePlace *out) {
     const Position p = position_of(table, pose);
-    const int left = fill_coefficients(table, &p, pose, coefficients);
-    set_film(table, pose, cut_of_film(p.t), film, out);
-    add_outer(coefficients, table->phases, phase, 1.0, out);
-    return left;
+    out->pose = pose;
+    out->left = fill_coefficients(table, &p, pose, out->coefficients);
+    set_film(table, pose, p.t, out->film);
+}
+
+void table_slopes_at(const Table *table, const TablePlace *at, TableSlopes *out) {
+    const double steps[3] = {SLOPE_STEP * table->radius, SLOPE_STEP, SLOPE_STEP};
+    for (int k = 0; k < 3; k++) {
+        Pose pose = at->pose;
+        double *moved = k == 0 ? &pose.offset : k == 1 ? &pose.pitch : &pose.yaw, *slope = out->of[k];
+        const double begin = *moved;
+        *moved += steps[k];
+        const double over = 1.0 / (*moved - begin);
+        const Position p = position_of(table, pose);
+        fill_coefficients(table, &p, pose, slope);
+        for (int64_t n = 0; n < table->phases * FACTOR; n++) slope[n] = (slope[n] - at->coefficients[n]) * over;
+    }
+}
+
+void table_place_near(const Table *table, const TablePlace *at, const TableSlopes *slopes, Pose pose, TablePlace *out) {
+    const double contact = contact_offset_at(table->outline, table->rings, table->radius, pose.pitch);
+    const double *of_offset = slopes->of[0], *of_pitch = slopes->of[1], *of_yaw = slopes->of[2];
+    const double e = pose.offset - at->pose.offset, p = pose.pitch - at->pose.pitch, psi = pose.yaw - at->pose.yaw;
+    out->pose = pose;
+    out->left = at->left;
+    for (int64_t n = 0; n < table->phases * FACTOR; n++)
+        out->coefficients[n] = at->coefficients[n] + of_offset[n] * e + of_pitch[n] * p + of_yaw[n] * psi;
+    set_film(table, pose, clamped(1.0 - pose.offset / contact, 0.0, 1.0), out->film);
+}
+
+static void begin_with_film(const TablePlace *place, double out[MOTIONS][MOTIONS]) {
+    for (int i = 0; i < MOTIONS; i++)
+        for (int j = 0; j <= i; j++) out[i][j] = out[j][i] = i < 6 ? place->film[i][j] : 0.0;
+}
+
+void table_resistance(const Table *table, const TablePlace *place, double phase, double out[MOTIONS][MOTIONS]) {
+    begin_with_film(place, out);
+    add_outer(place->coefficients, table->phases, phase, 1.0, out);
 }
 
 int table_mean_resistance(const Table *table, Pose pose, int64_t phases, double out[MOTIONS][MOTIONS]) {
-    double coefficients[MOST_PHASES * FACTOR], film[6][6];
-    const Position p = position_of(table, pose);
-    const int left = fill_coefficients(table, &p, pose, coefficients);
-    set_film(table, pose, cut_of_film(p.t), film, out);
+    TablePlace place;
+    table_place_at(table, pose, &place);
+    begin_with_film(&place, out);
     for (int64_t n = 0; n < phases; n++)
-        add_outer(coefficients, table->phases, 2.0 * PI * (double)n / (double)phases, 1.0 / (double)phases, out);
-    return left;
+        add_outer(place.coefficients, table->phases, 2.0 * PI * (double)n / (double)phases, 1.0 / (double)phases, out);
+    return place.left;
 }
 
 /* Offset e at which the smallest distance between body and wall is `gap`, m, by secants; NaN where none is. */
@@ -325,8 +361,10 @@ EXPORT void outer_coefficients(const double *packed, double e, double pitch, dou
 
 EXPORT int64_t resistance_at(const double *packed, double e, double pitch, double yaw, double phase, double *out) {
     const Table table = table_opened(packed);
-    double film[6][6];
-    return table_resistance(&table, (Pose){e, pitch, yaw}, phase, film, (double (*)[MOTIONS])out);
+    TablePlace place;
+    table_place_at(&table, (Pose){e, pitch, yaw}, &place);
+    table_resistance(&table, &place, phase, (double (*)[MOTIONS])out);
+    return place.left;
 }
 
 EXPORT int64_t mean_resistance_at(const double *packed, double e, double pitch, double yaw, int64_t phases,

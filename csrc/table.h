@@ -29,8 +29,28 @@ typedef struct {
 } Pose;
 
 Table table_opened(const double *packed);
-/* Both return how the table's range was left; `film` is the lubrication film's share of `out`. */
-int table_resistance(const Table *table, Pose pose, double phase, double film[6][6], double out[MOTIONS][MOTIONS]);
+
+enum { MOST_PHASES = 99 };
+
+/* What the resistance at a pose is made of, but for the phase: Fourier coefficients of the outer part's factor, (phases,
+ * FACTOR), and the share of the film's resistance. */
+typedef struct {
+    Pose pose;
+    int left; /* how the table's range was left */
+    double coefficients[MOST_PHASES * FACTOR], film[6][6];
+} TablePlace;
+
+/* Derivatives of these coefficients in offset, pitch and yaw. */
+typedef struct {
+    double of[3][MOST_PHASES * FACTOR];
+} TableSlopes;
+
+void table_place_at(const Table *table, Pose pose, TablePlace *out);
+void table_slopes_at(const Table *table, const TablePlace *at, TableSlopes *out);
+/* The outer part is linear from `at` on, and `left` that of `at`. */
+void table_place_near(const Table *table, const TablePlace *at, const TableSlopes *slopes, Pose pose, TablePlace *out);
+void table_resistance(const Table *table, const TablePlace *place, double phase, double out[MOTIONS][MOTIONS]);
+/* Returns how the table's range was left. */
 int table_mean_resistance(const Table *table, Pose pose, int64_t phases, double out[MOTIONS][MOTIONS]);
 
 #endif

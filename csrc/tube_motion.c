@@ -4,7 +4,7 @@
  *
  *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n + L(q),
  *
- * where L is the lift of a film that cavitates, over the rates; see set_slices and cavitation.c.
+ * where L is the lift of a film that cavitates, over the rates; see slices.c and cavitation.c.
  * M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint;
  * N_c the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of
  * dry friction, made smooth below the sliding speed v_r. See contacts.c and dry_friction.c.
@@ -15,12 +15,14 @@
  */
 #include "motion.h"
 
-TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table) {
+TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *table, PlaceMemory *memory) {
     const Tube *tube = (const Tube *)(packed + sizeof(Links) / sizeof(double));
     const Wire *wire = (const Wire *)(tube + 1);
     const Site *sites = (const Site *)(wire + 1);
     const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
     const double *flow = (const double *)(stations + (int64_t)tube->stations);
+    memory->place[0] = NAN;
+    forget_cavities(&memory->sliced);
     return (TubeRobot){
         .links = (const Links *)packed,
         .tube = tube,
@@ -32,6 +34,7 @@ TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *ta
         .station_count = (int64_t)tube->stations,
         .flow_count = (packed + size - flow) / 2,
         .table = table_opened(table),
+        .memory = memory,
     };
 }
 
@@ -80,14 +83,44 @@ typedef struct {
 
 static const double FOLLOWED = 20.0 * PI / 180.0; /* tilt up to which a run goes on outside the table's range */
 
-static void set_fluid(const TubeRobot *robot, double phase, double time, Seen *seen, Fluid *fluid) {
+/* Table and slices at the pose, as far as they are known. */
+typedef struct {
+    TablePlace *table;
+    SlicedFilm *sliced;
+} Place;
+
+/* What is known of the place of a state, or of one near the last. */
+static Place find_place(const TubeRobot *robot, const State *y, const Seen *seen, bool nearby) {
+    PlaceMemory *memory = robot->memory;
+    const double *q = y->attitude, place[6] = {y->position[1], y->position[2], q[0], q[1], q[2], q[3]};
+    const Pose pose = {seen->offset, seen->pitch, seen->yaw};
+    bool same = true;
+    for (int i = 0; i < 6; i++) same = same && place[i] == memory->place[i];
+    if (!same && nearby) {
+        if (!memory->has_slopes) table_slopes_at(&robot->table, &memory->table, &memory->slopes);
+        memory->has_slopes = true;
+        table_place_near(&robot->table, &memory->table, &memory->slopes, pose, &memory->near_table);
+        begin_slices(&memory->near_sliced, &memory->sliced);
+        return (Place){&memory->near_table, &memory->near_sliced};
+    }
+    if (!same) {
+        for (int i = 0; i < 6; i++) memory->place[i] = place[i];
+        table_place_at(&robot->table, pose, &memory->table);
+        begin_slices(&memory->sliced, &memory->sliced);
+        memory->has_slopes = false;
+    }
+    return (Place){&memory->table, &memory->sliced};
+}
+
+static void set_fluid(const TubeRobot *robot, const Place *place, double phase, double time, Seen *seen, Fluid *fluid) {
     const Tube *tube = robot->tube;
     const Pose pose = {seen->offset, seen->pitch, seen->yaw};
-    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS], film[6][6];
-    seen->outside = table_resistance(&robot->table, pose, seen->turn + phase, film, free_of_roll);
+    double free_of_roll[MOTIONS][MOTIONS], m[MOTIONS][MOTIONS];
+    seen->outside = place->table->left;
+    table_resistance(&robot->table, place->table, seen->turn + phase, free_of_roll);
     if (fabs(pose.pitch) < FOLLOWED && fabs(pose.yaw) < FOLLOWED) seen->outside = 0.0;
     turn_about_axis(&free_of_roll[0][0], -seen->turn, &m[0][0], MOTIONS);
-    turn_about_axis(&film[0][0], -seen->turn, &fluid->film[0][0], 6);
+    turn_about_axis(&place->table->film[0][0], -seen->turn, &fluid->film[0][0], 6);
     const double opened = tube->ends == OPEN ? 1.0 / (8.0 * PI * tube->length + m[7][7]) : 0.0;
     seen->mean_flow = tube->ends == IMPOSED ? imposed_flow(robot, time) : 0.0;
     for (int i = 0; i < RATES; i++) {
@@ -104,6 +137,7 @@ typedef struct {
     double rotation[3][3];
     Balance *balance; /* forces and contacts that are added to */
     Seen *seen;
+    SlicedFilm *sliced;
     double *gaps; /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
 } Touch;
 
@@ -120,9 +154,8 @@ static void add_contact(Touch *t, const Nearest *at, double rotor) {
     sliding_rows(at, t->rotation, rotor, contact->rows);
 }
 
-/* Squared distance of a station of the wire from the tube's axis, m^2. */
-static double station_square(const Touch *t, const Station *station) {
-    const double c = cos(t->y->phase), s = sin(t->y->phase);
+/* Squared distance of a station of the wire from the tube's axis, m^2; cosine and sine of the phase. */
+static double station_square(const Touch *t, const Station *station, double c, double s) {
     const double *p = station->point, at[3] = {p[0], c * p[1] - s * p[2], s * p[1] + c * p[2]};
     double d[2];
     for (int n = 0; n < 2; n++) {
@@ -138,11 +171,12 @@ static void touch_wire(Touch *t) {
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
     if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
-    double before = 0.0, here = station_square(t, robot->stations);
+    const double c = cos(t->y->phase), s = sin(t->y->phase);
+    double before = 0.0, here = station_square(t, robot->stations, c, s);
     bool first = true;
     for (int64_t k = 0; k <= last; k++) {
         const Station *at = robot->stations + k;
-        const double next = k < last ? station_square(t, at + 1) : 0.0;
+        const double next = k < last ? station_square(t, at + 1, c, s) : 0.0;
         const bool tip = k == last || at[1].turn != at->turn;
         if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
             const double bracket[3] = {at[first ? 0 : -1].xi, at->xi, at[tip ? 0 : 1].xi};
@@ -173,170 +207,10 @@ static void touch(Touch *t) {
     if (t->gaps) t->gaps[robot->site_count] = t->seen->tail_gap;
 }
 
-static const double THIN = 0.05;       /* of the body's radius: gaps in which films may cavitate */
-static const double DEEP = 1e-3;       /* likewise: a trial deeper in the wall is refused without its film */
-static const double LEAST_GAP = 1e-12; /* likewise, where a trial is inside the wall */
-static const double STRAIGHT = 1.1;    /* velocities between the ends of the side are less than those there times this */
-static const double END_LOSS = 1.85;   /* the pressure at d from a flat end is 1 - exp(-1.85 d/s) of that far from it, */
-static const double ROUND_END = 0.76;  /* and a rounded end of radius r is like 0.76 s sqrt(r/R') more of the side */
-
-/* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
- * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. */
-static double largest_share(const double f[6][6], const double s[6][6]) {
-    double l[6][6] = {{0.0}}, m[6][6], next[6][6];
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j <= i; j++) {
-            double left = f[i][j];
-            for (int k = 0; k < j; k++) left -= l[i][k] * l[j][k];
-            l[i][j] = i == j ? sqrt(left) : left / l[j][j];
-        }
-    for (int pass = 0; pass < 2; pass++) { /* L^-1 S, and then of its transpose */
-        for (int j = 0; j < 6; j++)
-            for (int i = 0; i < 6; i++) {
-                double left = pass ? next[j][i] : s[i][j];
-                for (int k = 0; k < i; k++) left -= l[i][k] * m[k][j];
-                m[i][j] = left / l[i][i];
-            }
-        for (int n = 0; n < 36; n++) next[n / 6][n % 6] = m[n / 6][n % 6];
-    }
-    double logarithm = 0.0;
-    for (int power = 1; power <= 64; power *= 2) {
-        double trace = 0.0;
-        for (int i = 0; i < 6; i++) trace += m[i][i];
-        logarithm += log(trace) / power;
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++) {
-                next[i][j] = 0.0;
-                for (int k = 0; k < 6; k++) next[i][j] += m[i][k] * m[k][j] / (trace * trace);
-            }
-        for (int n = 0; n < 36; n++) m[n / 6][n % 6] = next[n / 6][n % 6];
-    }
-    return exp(logarithm);
-}
-
-/* Share of its pressure that a film has at a distance from an end, width s = sqrt(2 R' h0).
- *
- * Finite differences of Reynolds' equation at the end of a long level film: both numbers hold within 3 % for squeezing and
- * rolling, and for radii r from 0 to 2 R' within 6 % of the pressure. */
-static double share_at(double distance, double rounding, double width, double bend) {
-    return 1.0 - exp(-END_LOSS * (distance / width + ROUND_END * sqrt(rounding / bend)));
-}
-
-/* A slice at a place along the straight side.
- *
- * Its velocities are those of the nearest points: V of the gap, and u = (v - 2 c)/2 along the tube's circumference, with
- * v of the body's surface and c = R/(R - a) times that of its axis, with which the contact line moves. */
-static Slice slice_at(const TubeRobot *robot, const State *y, const double rotation[3][3], double x, double length) {
-    const Film *film = &robot->table.film;
-    const double a = film->body, radius = robot->tube->radius;
-    const Site site = {.x = x, .ring = a};
-    const Nearest at = site_nearest(&site, y, rotation, radius);
-    Slice s = {.gap = larger(at.gap, LEAST_GAP * a), .bend = a * radius / (radius - a), .length = length};
-    s.edges[0] = s.edges[1] = NAN;
-    const double width = sqrt(2.0 * s.bend * s.gap);
-    s.share = share_at(x - film->rear, film->rear_round, width, s.bend)
-            * share_at(film->front - x, film->front_round, width, s.bend);
-    double rows[2][RATES];
-    sliding_rows(&at, rotation, 0.0, rows);
-    const double *t = rows[1], axis[RATES] = {t[0], t[1], t[2], 0.0, -x * t[2], x * t[1], 0.0};
-    for (int i = 0; i < RATES; i++) {
-        s.opening[i] = -at.j[i];
-        s.entrainment[i] = 0.5 * t[i] - radius / (radius - a) * axis[i];
-    }
-    return s;
-}
-
-/* Slices of the film under the body's straight side, closer towards its ends. */
-static void set_slices(const Touch *t) {
-    const Film *film = &t->robot->table.film;
-    const double side = film->front - film->rear;
-    Balance *b = t->balance;
-    b->slice_count = MOST_SLICES;
-    for (int n = 0; n < MOST_SLICES; n++) {
-        const double from = (n + 0.5) / MOST_SLICES, to = 1.0 - from;
-        const double sum = from * from * from + to * to * to;
-        const double x = film->rear + side * from * from * from / sum;
-        const double length = 3.0 * side * squared(from * to / sum) / MOST_SLICES;
-        b->slices[n] = slice_at(t->robot, t->y, t->rotation, x, length);
-    }
-}
-
-/* Slices at both ends of the straight side; whether the film between them can be thin. */
-static bool set_ends(const Touch *t, Slice ends[2]) {
-    const Film *film = &t->robot->table.film;
-    const bool thin = isfinite(t->balance->bound) && film->front > film->rear && film->half == 0.0
-                   && t->seen->film < THIN * film->body && t->seen->film > -DEEP * film->body;
-    for (int n = 0; n < 2 && thin; n++) ends[n] = slice_at(t->robot, t->y, t->rotation, n ? film->front : film->rear, 0.0);
-    return thin;
-}
-
-/* Whether any slice may cavitate at the rates: velocities are nearly straight between the ends, one of which is nearest. */
-static bool may_cavitate(const Balance *b, const Slice ends[2], const double q[RATES]) {
-    LineContact worst = {.gap = smaller(ends[0].gap, ends[1].gap), .bend = ends[0].bend};
-    for (int n = 0; n < 2; n++) {
-        double opening = 0.0, entrainment = 0.0;
-        for (int i = 0; i < RATES; i++) {
-            opening += ends[n].opening[i] * q[i];
-            entrainment += ends[n].entrainment[i] * q[i];
-        }
-        worst.opening = larger(worst.opening, STRAIGHT * opening);
-        worst.entrainment = larger(worst.entrainment, STRAIGHT * fabs(entrainment));
-    }
-    return is_near_cavitation(&worst, b->viscosity, b->bound);
-}
-
-/* Scale the slices' pressure by what leaves the rest of the table's film positive: forces are then a convex function's.
- *
- * The least pressure, which decides on cavities, loses less at the ends than the film's torque does, which is of larger
- * distances from the line. */
-static void scale_slices(const double film[6][6], Balance *b) {
-    double sliced[6][6] = {{0.0}};
-    for (const Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
-        const double width = sqrt(2.0 * s->bend * s->gap), part = s->share * PI * width / squared(s->gap);
-        const double squeeze = 3.0 * s->bend * part, roll = 2.0 * squared(width) / s->bend * part;
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++)
-                sliced[i][j] += s->length
-                              * (squeeze * s->opening[i] * s->opening[j] + roll * s->entrainment[i] * s->entrainment[j]);
-    }
-    b->viscosity /= larger(largest_share(film, sliced), 1.0);
-}
-
-/* Whether any slice cavitates at the rates; scaled, its pressure is less. */
-static bool cavitates_at(Balance *b, const double q[RATES]) {
-    for (Slice *s = b->slices; s < b->slices + b->slice_count; s++) {
-        set_lift(b, s, q);
-        if (s->lift.normal != 0.0) return true;
-    }
-    return false;
-}
-
-/* Rates in balance; what is left of it. Where no slice cavitates at those without slices, they are the rates. */
-static double balance_film(const Touch *t, const double film[6][6], double q[RATES], double left[RATES]) {
-    Balance *b = t->balance;
-    Slice ends[2];
-    b->slice_count = 0;
-    b->viscosity = t->robot->tube->viscosity;
-    if (!set_ends(t, ends)) return balance_rates(b, q, left);
-    bool before = may_cavitate(b, ends, q);
-    if (before) {
-        set_slices(t);
-        before = cavitates_at(b, q);
-    }
-    if (!before) {
-        const int64_t slices = b->slice_count;
-        b->slice_count = 0;
-        const double size = balance_rates(b, q, left);
-        if (!may_cavitate(b, ends, q)) return size;
-        if (slices == 0) set_slices(t);
-        b->slice_count = MOST_SLICES;
-        if (!cavitates_at(b, q)) {
-            b->slice_count = 0;
-            return size;
-        }
-    }
-    scale_slices(film, b);
-    return balance_rates(b, q, left);
+/* Rates in balance; what is left of it. */
+static double balance(const Touch *t, const double film[6][6], double q[RATES], double left[RATES]) {
+    const FilmPlace place = {&t->robot->table.film, t->y, t->rotation, film, t->seen->film, t->robot->tube->viscosity};
+    return balance_film(&place, t->sliced, t->balance, q, left);
 }
 
 /* The same under a curve: a straight piece of it is a friction of the joint, and the next one is tried where it ends. */
@@ -353,7 +227,7 @@ static double solve_on_curve(const Touch *t, const double film[6][6]) {
         piece = piece_of(&drive->curve, before = number, drive->duty);
         b->a[JOINT][JOINT] = own - piece.slope;
         b->force[JOINT] = force + sense * piece.torque;
-        seen->balance = balance_film(t, film, q, left);
+        seen->balance = balance(t, film, q, left);
         number = next_piece(&drive->curve, before, sense * q[JOINT]);
     }
     return sense * piece.torque + piece.slope * q[JOINT];
@@ -379,7 +253,7 @@ static double solve_rates(const Touch *t, const double film[6][6]) {
         for (int64_t n = 0; n < b->count; n++) b->contacts[n].rows[0][JOINT] = b->contacts[n].rows[1][JOINT] = 0.0;
     }
     if (b->prescribed) q[b->along] += drive->given - q[SPIN] - q[JOINT];
-    seen->balance = balance_film(t, film, q, left);
+    seen->balance = balance(t, film, q, left);
     return b->prescribed ? left[b->along] : torque;
 }
 
@@ -418,10 +292,9 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
         for (int i = 0; i < 3; i++)
             contact[i] -= s.drag * (b->contacts[n].rows[0][i] * s.u + b->contacts[n].rows[1][i] * s.v);
     }
-    for (int64_t n = 0; n < b->slice_count; n++) {
-        const Slice *s = b->slices + n;
-        for (int i = 0; i < RATES; i++) {
-            const double force = s->length * (s->lift.normal * s->opening[i] + s->lift.along * s->entrainment[i]);
+    for (int n = 0; b->slices && n < MOST_SLICES; n++) {
+        for (int i = 0; i < RATES && b->slices->lift[n].normal != 0.0; i++) {
+            const double force = slice_force(b->slices, n, i);
             if (i < 3) lift[i] += force;
             seen->dissipated_power -= force * q[i];
         }
@@ -433,16 +306,17 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
     seen->film_load = towards_wall(film, rotation, seen->azimuth) - seen->lift;
 }
 
-/* Write what is observed in a state, and its time derivative. */
-void tube_robot_rates(const TubeRobot *robot, const State *y, double time, Seen *seen, State *dy) {
+void tube_robot_rates(const TubeRobot *robot, const State *y, double time, bool nearby, Seen *seen, State *dy) {
     const Links *links = robot->links;
-    Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation};
+    Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation, .once = nearby};
     Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
     Fluid fluid;
     double field[RATES], weight[RATES], asperities[RATES];
     axes_of(y, t.rotation);
     note_place(y, t.rotation, robot->tube->radius, seen);
-    set_fluid(robot, y->phase, time, seen, &fluid);
+    const Place place = find_place(robot, y, seen, nearby);
+    t.sliced = place.sliced;
+    set_fluid(robot, &place, y->phase, time, seen, &fluid);
     weight_loads(&links->weight, y->phase, t.rotation, weight);
     for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);

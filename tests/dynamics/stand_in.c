@@ -41,24 +41,45 @@ static void add_station(const StandIn *s, const double station[2], const double 
             for (int j = 0; j < 6; j++) out[i][j] += station[1] * weights[row] * rows[row][i] * rows[row][j];
 }
 
-static int stand_in_resistance(const Table *table, Pose pose, double phase, double film[6][6],
-                               double out[MOTIONS][MOTIONS]) {
+static void stand_in_place_at(const Table *table, Pose pose, TablePlace *out) {
     const StandIn *s = (const StandIn *)table->outline;
-    const double p = pose.pitch, psi = pose.yaw;
+    out->pose = pose;
+    out->left = fabs(pose.pitch) > s->largest;
+    for (int i = 0; i < 36; i++) out->film[i / 6][i % 6] = 0.0;
+}
+
+static void stand_in_slopes_at(const Table *table, const TablePlace *at, TableSlopes *out) {
+    (void)table;
+    out->of[0][0] = at->pose.offset;
+}
+
+static void stand_in_place_near(const Table *table, const TablePlace *at, const TableSlopes *slopes, Pose pose,
+                                TablePlace *out) {
+    (void)at;
+    (void)slopes;
+    stand_in_place_at(table, pose, out);
+}
+
+static void stand_in_resistance(const Table *table, const TablePlace *place, double phase,
+                                double out[MOTIONS][MOTIONS]) {
+    const StandIn *s = (const StandIn *)table->outline;
+    const double p = place->pose.pitch, psi = place->pose.yaw;
     double f[3][3] = {{cos(p) * cos(psi), cos(p) * sin(psi), sin(p)}, {-sin(psi), cos(psi), 0.0}};
     cross(f[0], f[1], f[2]);
-    for (int i = 0; i < 36; i++) film[i / 6][i % 6] = 0.0;
     turn_about_axis(&s->rest[0][0], phase, &out[0][0], MOTIONS);
-    for (int n = 0; n < 5; n++) add_station(s, s->stations[n], f, pose.offset, out);
-    return fabs(p) > s->largest;
+    for (int n = 0; n < 5; n++) add_station(s, s->stations[n], f, place->pose.offset, out);
 }
 
 #define table_opened stand_in_opened
+#define table_place_at stand_in_place_at
+#define table_slopes_at stand_in_slopes_at
+#define table_place_near stand_in_place_near
 #define table_resistance stand_in_resistance
 #include "tube_motion.inc"
 
 EXPORT void stand_in_at(const double *table, double offset, double *out) {
     const Table opened = stand_in_opened(table);
-    double film[6][6];
-    stand_in_resistance(&opened, (Pose){offset, 0.0, 0.0}, 0.0, film, (double (*)[MOTIONS])out);
+    TablePlace place;
+    stand_in_place_at(&opened, (Pose){offset, 0.0, 0.0}, &place);
+    stand_in_resistance(&opened, &place, 0.0, (double (*)[MOTIONS])out);
 }

@@ -73,7 +73,7 @@ def test_sliding_films(pitch: float, yaw: float, most: float) -> None:
 def test_lift_of_a_rotating_cylinder(
     gap: float, pitch: float, yaw: float, turning: float, bound: float, most: float
 ) -> None:
-    """Slices with less pressure near both ends, as csrc/tube_motion.c has them."""
+    """Slices with less pressure near both ends, as csrc/slices.c has them."""
     pose = (np.radians(pitch), np.radians(yaw))
     found = cylinder(gap, *pose)
     linear, lifted = (found.solve({ROLL: turning}, OIL, p)[0][Z] for p in (np.inf, bound))

@@ -303,7 +303,7 @@ def end_state(run: xr.Dataset, notes: Iterable[Note], slow: float) -> str:
         return "reaches-end"
     if RANGE_LEFT in events:
         return "left-table"
-    late = run.isel(time=slice(run.sizes["time"] // 3, None))
+    late = run[["position", "azimuth"]].isel(time=slice(run.sizes["time"] // 3, None))
     moved = np.abs(late["position"].values[-1] - late["position"].values[0]).max()
     is_slow = moved < slow * float(late["time"][-1] - late["time"][0]) and not float(run["duty"][-1]) > 0.0
     if is_slow or is_held(notes):

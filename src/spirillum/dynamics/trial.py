@@ -108,8 +108,9 @@ def trial_means(run: xr.Dataset) -> ReleasedMotion:
     """Return the means of a run in a tube over the time with its drive on, and its mean pose."""
     names = [item.name for item in STEADY if item.name in run and run[item.name].dims == ("time",)]
     columns = {name: name for name in names} | _POSE | {"contact_force": "contact_force"}
-    length = float(run["time"][-1] - run["time"][0])
-    values = {name: float(run[of].integrate("time")) / length for name, of in columns.items()}
+    time = run["time"].values
+    length = float(time[-1] - time[0])
+    values = {name: float(np.trapezoid(run[of].values, time)) / length for name, of in columns.items()}
     exact = {name: f"mean_{name}_on" for name in names}
     values |= {name: float(run[of]) for name, of in exact.items() if of in run}
     notes = notes_in(run.attrs)

@@ -104,7 +104,8 @@ def tube_run(
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
-    return dataset.isel(time=np.isin(run.time, times.time) | (run.time == ended))
+    kept = np.isin(run.time, times.time) | (run.time == ended)
+    return dataset if kept.all() else dataset.isel(time=kept)
 
 
 def _waited(

@@ -73,11 +73,22 @@ _MOTION = (
     "links",
     "contacts",
     "dry_friction",
+    "slices",
     "table",
     "film",
     "cavitation",
 )
-_MOTION_HEADERS = ("stiff_steps.h", "motion.h", "contacts.h", "table.h", "links.h", "film.h", "cavitation.h")
+_MOTION_HEADERS = (
+    "stiff_steps.h",
+    "motion.h",
+    "contacts.h",
+    "slices.h",
+    "table.h",
+    "links.h",
+    "film.h",
+    "cavitation.h",
+    "lanes.h",
+)
 _REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
 """Value references, which the C source knows too."""
 

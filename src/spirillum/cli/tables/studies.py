@@ -59,6 +59,12 @@ def _empty_results(answer: Answer) -> Iterator[str]:
         yield f"{answer['unanswered']} of {answer['results']} results are empty: notes and variable `outside` say why"
 
 
+_MANY = 5
+"""Quantities from which on a ranking has units below their names, to fit into a terminal."""
+_WHOLE = 24
+"""Length of names that are not wrapped."""
+
+
 def _ranking(ranking: Answer, rows: int) -> Blocks:
     """The robots, the fastest first, and which of them is the best by what."""
     robots = ranking["robots"]
@@ -67,8 +73,10 @@ def _ranking(ranking: Answer, rows: int) -> Blocks:
         return
     columns = [column for name in robots[0] if name != "robot" for column in _columns(robots, name)]
     found = grid(_basis(ranking), "", "robot")
+    found.columns[1].no_wrap = all(len(item["robot"]) <= _WHOLE for item in robots)
+    split = len(columns) >= _MANY
     for title, _ in columns:
-        found.add_column(title, justify="right", no_wrap=True)
+        found.add_column(title.replace(", ", "\n") if split else title, justify="right", no_wrap=True)
     for rank, item in enumerate(robots[:rows]):
         found.add_row(str(rank + 1), escape(item["robot"]), *(cells[rank] for _, cells in columns))
     yield found

@@ -105,10 +105,11 @@ YAW = Stage(
 )
 STRAIGHT = replace(YAW, name="straight", upper=(0.65, 1.0), seconds=(2.0, 4.5), held_out=4, yawed=False, film_yaws=1)
 _FINEST: dict[Tilt, Fineness] = {
-    "level": Fineness("standard", 0.002),
-    "pitched": Fineness("standard", 0.01),
-    "yawed": Fineness("standard", 0.01),
+    "level": Fineness("standard", 0.002, 6),
+    "pitched": Fineness("standard", 0.01, 6),
+    "yawed": Fineness("standard", 0.01, 6),
 }
+"""With 8 Gauss nodes a panel no response changes by more than 0.1 %."""
 FINE = Stage(
     "fine",
     up=(0.0, 0.28, 0.55, 0.78, 0.92, 1.0),
@@ -116,9 +117,9 @@ FINE = Stage(
     upper=(0.55, 0.78, 1.0),
     phases=((0.0, 9), (1.0, 5)),
     resolutions={(near, tilt): fineness for near in (True, False) for tilt, fineness in _FINEST.items()},
-    seconds=(8.5, 17.0),
+    seconds=(6.0, 14.0),
     held_out=6,
-    checks=dict.fromkeys(_FINEST, _FINEST["yawed"]),
+    checks=dict.fromkeys(_FINEST, replace(_FINEST["yawed"], order=8)),
     accuracy=1.0,
 )
 STAGES: dict[StageName, Stage] = {stage.name: stage for stage in (STRAIGHT, YAW, FINE)}
