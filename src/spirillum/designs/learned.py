@@ -286,7 +286,7 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 def learned_best(
     blank: Evaluation, unknowns: Unknowns, name: str, seed: int, on_progress: Progress, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
-    """Designs with the learned model, all that the last search has swum, the best, and how well it is known."""
+    """Designs with the learned model, all that the last search has evaluated, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
     empty = replace(blank, model=corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))

@@ -212,7 +212,7 @@ class FrictionModelRuns:
         found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
         return found
 
-    def judged(self, holds: Values, *, of_all: bool = True) -> Judgement:
+    def verdict_on(self, holds: Values, *, of_all: bool = True) -> Judgement:
         """The verdict on a statement, 1, 0 or NaN in each reading; one `of_all` stays open without a table."""
         known = np.isfinite(holds)
         count, total = int(np.nansum(holds)), int(known.sum())
@@ -231,7 +231,7 @@ class FrictionModelRuns:
         shares = "; ".join(self._share(holds, name) for name in names)
         return Judgement("depends", f"{_joined(names)}: it holds in {count} of {total} readings, {shares}{lacking}")
 
-    def against(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
+    def compare(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
         """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
         known = values[np.isfinite(values)]
         if not known.size:
