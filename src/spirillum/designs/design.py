@@ -89,7 +89,7 @@ def design(
         progress: called with stage, number done, and total.
 
     Raises:
-        InputError: for wrong input, or where no design can be wound and keeps all conditions.
+        InputError: for wrong input, or where no design can be built and keeps all conditions.
     """
     given, options = load(robot), Judged.of(judged)
     unknowns = unknowns_of(given, unknown, posterior, model)

@@ -41,7 +41,7 @@ class Alternative:
     beaten_high: float
     """Upper end."""
     keeps: bool
-    """Whether it can be wound and keeps all conditions."""
+    """Whether it can be built and keeps all conditions."""
 
 
 @dataclass(frozen=True)

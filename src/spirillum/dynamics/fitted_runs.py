@@ -1,7 +1,7 @@
 """Runs with a calibration: model and motion that go with it, and intervals over the draws of a posterior.
 
 Every draw is a robot of its own, with its own roughness and dry friction. Its steady motion is looked for from where
-that of the posterior's middle lies, by Newton's method over a turn of the tail.
+that of the posterior's median lies, by Newton's method over a turn of the tail.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def intervals_of_free_motion(
             f"posterior with motion 'free': its median reaches no steady motion ({lying.statement}); allowed: motion "
             "'held', or `simulate` with the posterior"
         )
-    unbound = without_reynolds_bound(robot)  # the middle was refused, or allowed, for all
+    unbound = without_reynolds_bound(robot)  # the median was refused, or allowed, for all
     rng, indices = np.random.default_rng(1), posterior.places(DRAWS)
     swum: list[Swimming] = []
     steady = []
@@ -186,7 +186,7 @@ def intervals_of_free_motion(
     if lost > (1.0 - _LEAST_SHARE) * len(indices):
         raise InputError(
             f"posterior with motion 'free': {lost} of {len(indices)} draws reach no steady motion near that "
-            "of the middle; allowed: motion 'held', or `simulate` with the posterior"
+            "of the median; allowed: motion 'held', or `simulate` with the posterior"
         )
     names = [item.name for item in fields(Swimming)]
     whole = Swimming(**{name: np.concatenate([getattr(one, name) for one in swum]) for name in names})

@@ -125,7 +125,7 @@ class ReturnMap:
         return Turn(end, time, steps[steps[:, 0] <= time], tangent)
 
     def _ended(self, status: int, y: Samples, time: float, gaps: Samples) -> str:
-        """Why a turn ends after a step, before the tail has turned; empty where it goes on."""
+        """Why a turn ends after a step, before the tail has turned; empty where it continues."""
         if status == stiff_steps.STUCK:
             return "no step is small enough to follow the motion; allowed: a larger roughness"
         if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:

@@ -184,7 +184,7 @@ def rotation_matrix(quaternion: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class Poses:
-    """A robot's way through time."""
+    """A robot's trajectory."""
 
     time: Samples
     """(n,) increasing, s."""
