@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from pathlib import Path
+from typing import Annotated, get_origin
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -53,7 +54,8 @@ default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": False, "exclude-members": "model_config"}
 autodoc_typehints_format = "short"
-autodoc_type_aliases = {name: name for name in (*arrays.__all__, *robot_fields.__all__, "Switch", "Taper")}
+_FIELD_TYPES = [name for name, value in vars(robot_fields).items() if get_origin(value) is Annotated]
+autodoc_type_aliases = {name: name for name in (*arrays.__annotations__, *_FIELD_TYPES, "Switch", "Taper")}
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True

@@ -23,23 +23,6 @@ if TYPE_CHECKING:
 else:
     _Floats = _Complexes = _Truths = _Integers = np.ndarray
 
-__all__ = [
-    "Amplitudes",
-    "Axial",
-    "AxialLoad",
-    "AxialWhole",
-    "Flags",
-    "Matrix6",
-    "Matrix12",
-    "MeanFlow",
-    "PerRobot",
-    "Samples",
-    "Tensors",
-    "Values",
-    "Vectors",
-    "Whole",
-]
-
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
 Samples: TypeAlias = Float[_Floats, "..."]

@@ -75,9 +75,9 @@ def best_angle(model: ConstantCoefficients, quantity: str) -> tuple[float, float
     evaluation = Evaluation(space, model, (objective,), (), Manufacturability(mandrel=0.0), drawn, 0.95)
     found = best_design(evaluation, Archive(), seed=1)
     wavelength = float(space.values(found.shares[None])[0, 0])
-    swum = evaluation.swum(found.shares[None])
+    motion = evaluation.motion(found.shares[None])
     angle = np.arctan(2 * np.pi * robot.tail.amplitude / wavelength)
-    return float(angle), float(swum.advance_per_radian[0] / robot.tail.amplitude), float(getattr(swum, quantity)[0])
+    return float(angle), float(motion.advance_per_radian[0] / robot.tail.amplitude), float(getattr(motion, quantity)[0])
 
 
 @pytest.mark.parametrize(("g", "a0"), [(2.0, 0.6), (1.6, 0.0), (1.9, 3.0)])
@@ -145,7 +145,7 @@ def _shares(design: sp.Design) -> list[float]:
 def test_designs_under_draws_swim_as_single_robots_do(unsure: sp.Design) -> None:
     searched = unsure.searched
     shares = np.array([[0.3, 0.2], [0.8, 0.25]])
-    together = searched.quantity(searched.swum(shares), "forward_velocity")
+    together = searched.quantity(searched.motion(shares), "forward_velocity")
     wavelength, amplitude = searched.space.values(shares)[1].tolist()
     friction = float(searched.samples.values["friction.effective"][5])
     robot = sp.load(

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.legend import Legend
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import evaluated
+from spirillum.papers.biorob2012.claims import claims_of_study
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.registry import figures_of
 from spirillum.studies.columns import AT_POSES, BandTask
@@ -125,7 +125,7 @@ def test_drop_is_judged_over_the_band_and_nothing_is_called_fitted(
     leaning: Any, question: dict[str, object], banded: Any
 ) -> None:
     def by_walled(dataset: Any) -> Any:
-        (claim,) = [c for c in evaluated(dataset) if c.claim.endswith("wide to narrow, by walled")]
+        (claim,) = [c for c in claims_of_study(dataset) if c.claim.endswith("wide to narrow, by walled")]
         return claim
 
     alone = by_walled(sp.study(question))
@@ -145,7 +145,7 @@ def test_drop_is_judged_over_the_band_and_nothing_is_called_fitted(
 
 def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, object]) -> None:
     grid: Any = {**question["grid"], "wavelengths": ["25 mm"], "amplitudes": ["2.5 mm"]}  # type: ignore[dict-item]
-    claims = evaluated(sp.study({**question, "models": ["slender"], "grid": grid}))
+    claims = claims_of_study(sp.study({**question, "models": ["slender"], "grid": grid}))
     (slower,) = [claim for claim in claims if claim.claim == "Robots travel slower in the narrow channel"]
     assert slower.verdict == "undecidable"
     assert "no model of this study has the channel's walls" in slower.reason

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import evaluated
+from spirillum.papers.biorob2012.claims import claims_of_study
 from spirillum.papers.claim import Claim
 from spirillum.papers.registry import claims_of
 
@@ -16,7 +16,7 @@ from spirillum.papers.registry import claims_of
 @pytest.fixture(scope="module")
 def unobserved() -> list[Claim]:
     """Claims of the paper's study without observations."""
-    return evaluated(sp.study())
+    return claims_of_study(sp.study())
 
 
 @pytest.fixture(scope="module")
@@ -77,13 +77,13 @@ def test_every_claim_is_complete(unobserved: list[Claim]) -> None:
 
 def test_synthetic_observations_decide(planted, brief: dict[str, Any]) -> None:
     """Speeds made by SBT: SBT then explains them best, and statements about them are decided."""
-    claims = evaluated(sp.study(brief, observations=planted(brief, "sbt", "rotor", 1e-5)))
+    claims = claims_of_study(sp.study(brief, observations=planted(brief, "sbt", "rotor", 1e-5)))
     assert by_words(claims, "SBT predicts forward velocities better").verdict == "agrees"
     assert by_words(claims, "Reynolds number, wide").verdict == "disagrees"
     assert by_words(claims, "largest velocity decrease").verdict == "disagrees"
     assert by_words(claims, "B_eff depends mostly on the amplitude").verdict in ("agrees", "disagrees")
     assert by_words(claims, "body rotation rates within 1 to 50 %").verdict in ("agrees", "disagrees")
-    swapped = evaluated(sp.study(brief, observations=planted(brief, "rft", "rotor", 1e-5)))
+    swapped = claims_of_study(sp.study(brief, observations=planted(brief, "rft", "rotor", 1e-5)))
     assert by_words(swapped, "SBT predicts forward velocities better").verdict == "disagrees"
 
 
@@ -96,7 +96,7 @@ def test_a_few_tails_decide_nothing_about_all_of_them(
     values = "1.0,1.2,-0.1"[: 3 if "," not in columns else None]
     rows = [f"40,25,{amplitude},{values}" for amplitude in ("2.5", "3.5")]
     path.write_text("\n".join([f"channel_diameter_mm,wavelength_mm,amplitude_mm,{columns}", *rows]) + "\n")
-    claims = evaluated(sp.study(brief, observations=path))
+    claims = claims_of_study(sp.study(brief, observations=path))
     assert [claim.claim for claim in claims] == [claim.claim for claim in unobserved]
     for few, none in zip(claims, unobserved, strict=True):
         assert "nan" not in few.computed
@@ -110,5 +110,5 @@ def test_other_studies_make_no_claims(small: dict[str, object]) -> None:
 
 
 def test_paper_study_without_a_named_tail_leaves_its_claim_open(small: dict[str, object]) -> None:
-    claims = evaluated(sp.study({**small, "claims": "biorob2012"}))
+    claims = claims_of_study(sp.study({**small, "claims": "biorob2012"}))
     assert by_words(claims, "lowest velocity decrease").computed == "this study has no such tail"

@@ -128,21 +128,21 @@ def test_verdicts_of_the_third_kind_never_mix_with_the_others(short) -> None:
 
 def test_a_verdict_names_the_factor_that_decides(readings: FrictionModelRuns) -> None:
     column = levels_of_readings()[:, READ.index("wait")]
-    found = readings.judged((column > 0).astype(float), of_all=False)
+    found = readings.verdict_on((column > 0).astype(float), of_all=False)
     assert found.verdict == "depends"
     assert found.reason.startswith("waiting time: it holds in 16 of 32 readings, 0 of 16 at a waiting time of 0 s")
-    assert readings.judged(np.ones(32), of_all=False).verdict == "predicted-agrees"
-    assert readings.judged(np.zeros(32)).verdict == "predicted-disagrees"
-    assert readings.judged(np.ones(32)).verdict == "depends"  # robots without a table keep it open
+    assert readings.verdict_on(np.ones(32), of_all=False).verdict == "predicted-agrees"
+    assert readings.verdict_on(np.zeros(32)).verdict == "predicted-disagrees"
+    assert readings.verdict_on(np.ones(32)).verdict == "depends"  # robots without a table keep it open
 
 
 def test_a_stated_number_is_met_missed_or_straddled(readings: FrictionModelRuns) -> None:
     column = levels_of_readings()[:, READ.index("gap")]
     values = 2.0 + 0.5 * column
-    assert readings.against(values, 2.0, "mm", 1.0).verdict == "depends"
-    assert readings.against(values, 2.0, "mm", 1.0).reason.startswith("gap: ")
-    assert readings.against(values, 4.0, "mm", 1.0).verdict == "predicted-disagrees"
-    assert readings.against(0.01 * column + 2.0, 2.0, "mm", 1.0).verdict == "predicted-agrees"
+    assert readings.compare(values, 2.0, "mm", 1.0).verdict == "depends"
+    assert readings.compare(values, 2.0, "mm", 1.0).reason.startswith("gap: ")
+    assert readings.compare(values, 4.0, "mm", 1.0).verdict == "predicted-disagrees"
+    assert readings.compare(0.01 * column + 2.0, 2.0, "mm", 1.0).verdict == "predicted-agrees"
 
 
 @pytest.mark.parametrize(

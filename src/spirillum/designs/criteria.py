@@ -163,7 +163,7 @@ class Manufacturability(Options):
     """Least distance between the tail on the tube's axis and the glass; None: one wire diameter."""
 
     def check(self, designs: RobotBatch) -> None:
-        """Refuse a clearance that no design leaves, before any of them is swum."""
+        """Refuse a clearance that no design leaves, before any of them is evaluated."""
         room = 0.5 * float(designs.channel_diameter.max() - designs.wire_diameter.min())
         amplitude = float(designs.amplitude.min())
         most = room - amplitude

@@ -59,9 +59,9 @@ def design(
 ) -> Design:
     """Find the best values of some numeric fields of a robot.
 
-    What a bench can wind, what fits into the tube and what the model describes is always a condition. Under unknowns
-    every design is swum under the same draws. The best one is then stated from new draws: it owes part of its lead to
-    those by which it was chosen.
+    What can be manufactured, what fits into the tube and what the model describes is always a condition. Under unknowns
+    every design is evaluated under the same draws. The best one is then stated from new draws: it owes part of its lead
+    to those by which it was chosen.
 
     The search holds robots at their pose. By `tube` and its own drive the best three designs that differ by a tenth
     of a range are confirmed by trials, where their tubes have tables (`confirmed`).
@@ -89,7 +89,7 @@ def design(
         progress: called with stage, number done, and total.
 
     Raises:
-        InputError: for wrong input, or where no design can be wound and keeps all conditions.
+        InputError: for wrong input, or where no design can be built and keeps all conditions.
     """
     given, options = load(robot), Judged.of(judged)
     unknowns = unknowns_of(given, unknown, posterior, model)
@@ -107,11 +107,11 @@ def design(
         raise InputError(f"{given.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     objectives = _objectives(maximise, minimise, options)
     conditions = tuple(condition_of(text) for text in ([subject_to] if isinstance(subject_to, str) else subject_to))
-    wound = Manufacturability.of(bench)
-    wound.check(space.batch(np.array([[0.0], [1.0]]) * np.ones(space.size)))
+    manufacturability = Manufacturability.of(bench)
+    manufacturability.check(space.batch(np.array([[0.0], [1.0]]) * np.ones(space.size)))
 
     def under(samples: SampledRobots) -> Evaluation:
-        return Evaluation(space, chosen, objectives, conditions, wound, samples, options.confidence, rate)
+        return Evaluation(space, chosen, objectives, conditions, manufacturability, samples, options.confidence, rate)
 
     searched = under(unknowns.draws(options.draws, options.seed))
     archive, on_progress = Archive(), progress or (lambda _what, _done, _total: None)
@@ -165,24 +165,24 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
     if outside:
         why = outside[0].sentence()
     else:
-        swum = searched.swum(shares[None])
+        motion = searched.motion(shares[None])
         requested = [goal.quantity.name for goal in searched.objectives]
         requested += [condition.quantity.name for condition in searched.conditions]
-        undefined = [name for name in requested if np.isnan(searched.quantity(swum, name)).all()]
-        if undefined and swum.valid.all():
+        undefined = [name for name in requested if np.isnan(searched.quantity(motion, name)).all()]
+        if undefined and motion.valid.all():
             return (
                 f"{undefined[0]} has no value for {searched.space.robot.name}, as its drive, joint and placement are, "
                 f"by model '{searched.model.name}'; allowed: a quantity that `predict --all` gives"
             )
-        worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
+        worst = {item.words: float(searched.excess(item, motion)[0]) for item in searched.conditions}
         kept = [words for words, excess in worst.items() if excess > 0]
-        limits = reynolds_limits(searched.samples.batch, swum.reynolds_number, swum.tail_reynolds_number)
+        limits = reynolds_limits(searched.samples.batch, motion.reynolds_number, motion.tail_reynolds_number)
         inertia = stokes_flow_problem(searched.samples.batch, limits)
         why = inertia.replace("; ", ", ") or (f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion")
     words = ", ".join(f"{path} = {with_unit(value, _unit(searched.space, path))}" for path, value in values.items())
     return (
-        f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or swum, "
-        f"{archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
+        f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or have no steady "
+        f"motion, {archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
         "conditions"
     )
 
@@ -206,12 +206,12 @@ def _answer(
     front: Samples | None,
 ) -> Design:
     space, objective = searched.space, searched.objectives[0]
-    swum = stated.swum(best[None])
-    own = stated.quantity(swum, objective.quantity.name)
+    motion = stated.motion(best[None])
+    own = stated.quantity(motion, objective.quantity.name)
     quantities, low, high = {}, {}, {}
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
     for item in STEADY:
-        column = stated.quantity(swum, item.name)[0]
+        column = stated.quantity(motion, item.name)[0]
         quantities[item.name] = float(np.mean(column))
         if not unknowns.known and np.all(np.isfinite(column)):
             low[item.name], high[item.name] = (float(end) for end in np.quantile(column, ends))
@@ -249,7 +249,7 @@ def _answer(
         swum=archive.count,
         refused=archive.refused,
         breaking=archive.breaking,
-        warnings=_warnings(given, unknowns, stated, best, swum, bound_by),
+        warnings=_warnings(given, unknowns, stated, best, motion, bound_by),
         leading=tuple(leading),
     )
 
@@ -300,8 +300,8 @@ def _alternative(
 ) -> Alternative:
     """Compare a design, or the robot as it is, with the best one draw by draw."""
     objective, space = stated.objectives[0], stated.space
-    swum = stated.swum(None if shares is None else shares[None])
-    values = stated.quantity(swum, objective.quantity.name)[0]
+    motion = stated.motion(None if shares is None else shares[None])
+    values = stated.quantity(motion, objective.quantity.name)[0]
     if objective.target is None:
         better = objective.sign * (best - values) > 0
     else:
@@ -313,7 +313,7 @@ def _alternative(
         _named(space, shares) if shares is not None else space.today,
         float(objective.of(values[None])[0]),
         *share,
-        keeps=bool(np.all(buildable)) and float(stated.broken(swum)[0]) <= 0,
+        keeps=bool(np.all(buildable)) and float(stated.broken(motion)[0]) <= 0,
     )
 
 
@@ -331,7 +331,7 @@ def _built(given: Robot, space: Space, best: Samples) -> Robot:
 
 
 def _warnings(
-    given: Robot, unknowns: Unknowns, stated: Evaluation, best: Samples, swum: Swimming, bound_by: Sequence[str]
+    given: Robot, unknowns: Unknowns, stated: Evaluation, best: Samples, motion: Swimming, bound_by: Sequence[str]
 ) -> tuple[Note, ...]:
     """What to be careful about."""
     found = list(given.warnings)
@@ -356,10 +356,10 @@ def _warnings(
         found += calibration_warnings(built, stated.model.name)
     reading = friction_reading(given.friction.reading)
     if not {"friction.effective", "friction", "shared_friction"} & set(stated.samples.values):
-        found += drive_warnings(known, stated.model, reading, swum, stated.tail_rate)
+        found += drive_warnings(known, stated.model, reading, motion, stated.tail_rate)
     found += unknowns.fit.answer_warnings(known, stated.model, reading, stated.tail_rate)
-    found += _near_step_out(built, swum)
-    limits = reynolds_limits(stated.samples.batch, swum.reynolds_number, swum.tail_reynolds_number)
+    found += _near_step_out(built, motion)
+    limits = reynolds_limits(stated.samples.batch, motion.reynolds_number, motion.tail_reynolds_number)
     found += [limit.caution() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     found += reynolds_warnings(limits).values()
     if any("end of its range" in words for words in bound_by):
@@ -368,11 +368,11 @@ def _warnings(
     return tuple(dict.fromkeys(found))
 
 
-def _near_step_out(robot: Robot, swum: Swimming) -> list[Note]:
+def _near_step_out(robot: Robot, motion: Swimming) -> list[Note]:
     """That the best design hardly follows its field: it is the fastest just before it slips."""
     if robot.magnetic is None:
         return []
-    share = abs(robot.magnetic.rotation_rate) / float(np.min(np.abs(swum.step_out_rate)))
+    share = abs(robot.magnetic.rotation_rate) / float(np.min(np.abs(motion.step_out_rate)))
     if not share > _MOST_OF_STEP_OUT:
         return []
     room = show(1.2 * abs(robot.magnetic.rotation_rate), "Hz")

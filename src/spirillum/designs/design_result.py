@@ -41,7 +41,7 @@ class Alternative:
     beaten_high: float
     """Upper end."""
     keeps: bool
-    """Whether it can be wound and keeps all conditions."""
+    """Whether it can be built and keeps all conditions."""
 
 
 @dataclass(frozen=True)
@@ -304,8 +304,8 @@ def _binds(searched: Evaluation, shares: Samples, found: Samples, own: int) -> s
             if outside:
                 words.append(outside[0].why)
                 continue
-            swum = searched.swum(shares[side][None])
-            words += [item.words for item in searched.conditions if searched.excess(item, swum)[0] > 0]
+            motion = searched.motion(shares[side][None])
+            words += [item.words for item in searched.conditions if searched.excess(item, motion)[0] > 0]
     return "; ".join(dict.fromkeys(words))
 
 

@@ -182,14 +182,14 @@ class Evaluation:
     model: SwimmerModel
     objectives: tuple[Objective, ...]
     conditions: tuple[Condition, ...]
-    bench: Manufacturability
+    manufacturability: Manufacturability
     samples: SampledRobots
     confidence: float
     """Share of the draws that must satisfy a condition."""
     tail_rate: float | None = None
     """Prescribed rate of the tail, rad/s; None: the robot's own drive."""
 
-    def swum(self, shares: Samples | None) -> Swimming:
+    def motion(self, shares: Samples | None) -> Swimming:
         """Every design under every draw, the draws of one design one after the other; None: the robot as it is."""
         if shares is None:
             return self._swim(self.samples.batch)
@@ -201,13 +201,13 @@ class Evaluation:
     def _swim(self, batch: RobotBatch) -> Swimming:
         return swim(batch, self.model, tail_rate=None if self.tail_rate is None else np.full(1, self.tail_rate))
 
-    def quantity(self, swum: Swimming, name: str) -> Samples:
-        """A quantity of what `swum` gives, (designs, draws)."""
-        found: Samples = np.asarray(getattr(swum, name)).reshape(-1, self.samples.number)
+    def quantity(self, motion: Swimming, name: str) -> Samples:
+        """A quantity of what `motion` returns, (designs, draws)."""
+        found: Samples = np.asarray(getattr(motion, name)).reshape(-1, self.samples.number)
         return found
 
     def scores(self, shares: Samples) -> DesignScores:
-        """What designs are worth, by shares of the ranges, (designs, variables); impossible ones are not swum."""
+        """What designs are worth, by shares of the ranges, (designs, variables); impossible ones are not evaluated."""
         count = len(shares)
         excess = self.unbuildable(shares)
         cost = np.tile(REFUSED + excess, (len(self.objectives), 1))
@@ -216,11 +216,11 @@ class Evaluation:
         refused = excess > 0
         if able.size == 0:
             return DesignScores(cost, values, refused)
-        swum = self.swum(shares[able])
-        answered = np.all(np.isfinite(self.quantity(swum, "forward_velocity")), axis=-1)
-        broken = self.broken(swum)
+        motion = self.motion(shares[able])
+        answered = np.all(np.isfinite(self.quantity(motion, "forward_velocity")), axis=-1)
+        broken = self.broken(motion)
         for row, objective in enumerate(self.objectives):
-            drawn = self.quantity(swum, objective.quantity.name)
+            drawn = self.quantity(motion, objective.quantity.name)
             known = answered & np.all(np.isfinite(drawn), axis=-1)
             good = known & (broken <= 0)
             own = np.where(good, np.nan_to_num(objective.cost(drawn)), BROKEN + np.nan_to_num(broken))
@@ -240,19 +240,19 @@ class Evaluation:
         """Limits of manufacture, tube and model for designs; None: of the robot as it is."""
         batch = RobotBatch.of(self.space.robot) if shares is None else self.space.batch(shares)
         with np.errstate(all="ignore"):  # what is out of all proportion is refused by a limit
-            return [*requirements(batch, self.model), *self.bench.limits(batch)]
+            return [*requirements(batch, self.model), *self.manufacturability.limits(batch)]
 
-    def excess(self, condition: Condition, swum: Swimming) -> Samples:
+    def excess(self, condition: Condition, motion: Swimming) -> Samples:
         """By how much designs break a condition in the draws that have to keep it, (designs,)."""
-        values = condition.excess(self.quantity(swum, condition.quantity.name))
+        values = condition.excess(self.quantity(motion, condition.quantity.name))
         found = np.quantile(values, self.confidence, axis=-1, method="higher")
         return np.clip(np.where(np.isnan(found), _MOST, found), -_MOST, _MOST)
 
-    def broken(self, swum: Swimming) -> Samples:
+    def broken(self, motion: Swimming) -> Samples:
         """Largest excess over all conditions, (designs,); 0 or less where all are kept."""
-        found = np.full(swum.valid.size // self.samples.number, -_MOST)
+        found = np.full(motion.valid.size // self.samples.number, -_MOST)
         for condition in self.conditions:
-            found = np.maximum(found, self.excess(condition, swum))
+            found = np.maximum(found, self.excess(condition, motion))
         return found
 
 

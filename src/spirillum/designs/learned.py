@@ -112,8 +112,8 @@ class Corrected(SwimmerModel):
         """Limits of the model and of the fast model; evaluated once for each tail."""
         features = features_of(batch, self.points.variables)
         _, first, inverse = np.unique(features, axis=0, return_index=True, return_inverse=True)
-        few, place = batch.taken(first), np.ravel(inverse)
-        return [_spread(item, place, batch.size) for item in (*self._own_domain(few), *Sbt().domain(few))]
+        few, index = batch.taken(first), np.ravel(inverse)
+        return [_spread(item, index, batch.size) for item in (*self._own_domain(few), *Sbt().domain(few))]
 
     @abstractmethod
     def _own_domain(self, batch: RobotBatch) -> list[Limit]:
@@ -163,13 +163,13 @@ def corrected(name: str, points: Points) -> Corrected:
     return {"tube": LearnedTube, "slender": LearnedSlender}[name](points)
 
 
-def _spread(limit: Limit, place: np.ndarray[Any, Any], size: int) -> Limit:
+def _spread(limit: Limit, index: np.ndarray[Any, Any], size: int) -> Limit:
     """A limit of a few tails for all robots that have one of them."""
-    few = int(place.max()) + 1
+    few = int(index.max()) + 1
 
     def all_of(column: Any) -> Any:
         values = np.asarray(column)
-        return values[place] if values.size == few and size > 1 else column
+        return values[index] if values.size == few and size > 1 else column
 
     return replace(limit, value=all_of(limit.value), bound=all_of(limit.bound), holds=all_of(limit.holds))
 
@@ -188,7 +188,7 @@ def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:
 
 
 def _of_no_body(batch: RobotBatch) -> Samples:
-    """What takes the place of the drag on the rotation of a body, (3, 3), of a bare tail, that A may be definite."""
+    """What replaces the drag on the rotation of a body, (3, 3), of a bare tail, that A may be definite."""
     return np.diag([0.0, float(batch.shape == "none"), 0.0])
 
 
@@ -286,7 +286,7 @@ Solve = Callable[[RobotBatch, tuple[Variable, ...]], Points]
 def learned_best(
     blank: Evaluation, unknowns: Unknowns, name: str, seed: int, on_progress: Progress, solve: Solve | None = None
 ) -> tuple[Evaluation, Archive, Found, Learned]:
-    """Designs with the learned model, all that the last search has swum, the best, and how well it is known."""
+    """Designs with the learned model, all that the last search has evaluated, the best, and how well it is known."""
     own = check_learnable(name, blank.space, unknowns)
     solving = solve or (lambda batch, variables: solved_at(name, batch, variables))
     empty = replace(blank, model=corrected(name, Points(own, np.zeros((0, len(own))), np.zeros((0, 6)))))

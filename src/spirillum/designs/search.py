@@ -37,7 +37,7 @@ _STEPS, _STEPS_ON_FRONT = 400, 80
 
 @dataclass
 class Archive:
-    """All designs that a search has swum."""
+    """All designs that a search has evaluated."""
 
     shares: list[Samples] = field(default_factory=list)
     values: list[Samples] = field(default_factory=list)

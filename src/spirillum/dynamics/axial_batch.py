@@ -181,7 +181,7 @@ class AxialBatch:
         self.states: Samples = np.zeros((count, kernel.STATES))
         """States in the order of `axial_robot.STATES`, then integrals of I^2, A^2 s, and of R I^2, J; (n, 7).
 
-        Of a motor with a curve the torque, N m, stands in place of the current."""
+        Of a motor with a curve the torque, N m, replaces the current."""
         self.numbers: Samples = np.tile(np.array(self.axial.values), (count, 1))
         """Numbers of each robot in the order of `axial_robot.PARAMETERS`."""
         self.warnings: tuple[Note, ...] = self.axial.prediction.warnings
@@ -220,7 +220,7 @@ class AxialBatch:
         numbers, viscosity = sampled_numbers(self.axial, len(chosen), rng, self._ranges)
         if self._pool is not None:
             rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
-            own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
+            own = [index for index, item in enumerate(PARAMETERS) if item.name in self._ranges]
             rows[:, own] = numbers[:, own]
             numbers = rows
         self.numbers[chosen], self._viscosity[chosen] = numbers, viscosity
@@ -248,7 +248,7 @@ class AxialBatch:
         remote: np.ndarray | bool | None = None,
         flow: Samples | float | None = None,
     ) -> None:
-        """All go on for a time; what is not given stays as it was.
+        """Advance all by a time; what is not given stays as it was.
 
         Args:
             dt: s, positive.

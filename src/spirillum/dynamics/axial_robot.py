@@ -179,9 +179,9 @@ class AxialRobot:
     def outputs(self) -> dict[str, int]:
         """Its outputs, quantities of the registry, and their indices in `OUTPUTS`."""
         if self.curve is None:
-            return {name: place for place, name in enumerate(OUTPUTS)}
+            return {name: index for index, name in enumerate(OUTPUTS)}
         other = {"motor_torque": "drive_torque"}
-        return {other.get(name, name): place for place, name in enumerate(OUTPUTS) if name not in _ELECTRIC}
+        return {other.get(name, name): index for index, name in enumerate(OUTPUTS) if name not in _ELECTRIC}
 
     def advance(
         self, numbers: Samples, states: Samples, dt: float, duty: Samples, flow: Samples, fineness: float = 1.0
@@ -236,8 +236,8 @@ def axial_robot(
 
 def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
     """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6); the latter 0 without a flow."""
-    place = steady.batch.placement
-    batch = batch.placed(place if place.flow is None else place.model_copy(update={"flow": 1.0}))
+    pose = steady.batch.placement
+    batch = batch.placed(pose if pose.flow is None else pose.model_copy(update={"flow": 1.0}))
     s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
     if viscosity is not None:
         s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
@@ -374,7 +374,7 @@ def _dataset(robot: AxialRobot, time: Samples, duty: Samples, states: Samples) -
 
     steady, p = robot.prediction, robot.numbers
     found = outputs(p, states.T, duty, 0.0)
-    series = {name: found[place] for name, place in robot.outputs.items()}
+    series = {name: found[index] for name, index in robot.outputs.items()}
     motor = steady.batch.electrics if robot.curve is None else None
     series |= {"duty": duty, **_electrics(motor, p, duty, states)}
     # Without inertia torques are in proportion to the current, and powers to its square.

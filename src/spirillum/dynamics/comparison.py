@@ -294,15 +294,15 @@ def compare_models(
     fit = read_fit(calibration)
     ready = fit.central(own)
     reading = friction_reading(ready.friction.reading if friction is None else friction)
-    place = Placement.of(placement)
-    check_placement(place, *(find_swimmer_model(name) for name in names))
+    pose = Placement.of(placement)
+    check_placement(pose, *(find_swimmer_model(name) for name in names))
     trial = TrialRequest(
         own,
         friction=reading,
         calibrated=factors,
         fit=fit,
         resolution=None,
-        placement=place,
+        placement=pose,
         roughness=None,
         in_tube=InTube(),
         duration=None,
@@ -314,7 +314,7 @@ def compare_models(
     for done, name in enumerate(names):
         if progress is not None:
             progress(f"model {name}", done, len(names))
-        placed = place if find_swimmer_model(name).placed and place != Placement() else None
+        placed = pose if find_swimmer_model(name).placed and pose != Placement() else None
         try:
             held = predict(
                 own,

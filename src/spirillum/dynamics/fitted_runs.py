@@ -1,7 +1,7 @@
 """Runs with a calibration: model and motion that go with it, and intervals over the draws of a posterior.
 
 Every draw is a robot of its own, with its own roughness and dry friction. Its steady motion is looked for from where
-that of the posterior's middle lies, by Newton's method over a turn of the tail.
+that of the posterior's median lies, by Newton's method over a turn of the tail.
 """
 
 from __future__ import annotations
@@ -169,24 +169,24 @@ def intervals_of_free_motion(
             f"posterior with motion 'free': its median reaches no steady motion ({lying.statement}); allowed: motion "
             "'held', or `simulate` with the posterior"
         )
-    unbound = without_reynolds_bound(robot)  # the middle was refused, or allowed, for all
-    rng, places = np.random.default_rng(1), posterior.places(DRAWS)
+    unbound = without_reynolds_bound(robot)  # the median was refused, or allowed, for all
+    rng, indices = np.random.default_rng(1), posterior.places(DRAWS)
     swum: list[Swimming] = []
     steady = []
-    for number, (place, one) in enumerate(zip(places, posterior.drawn(unbound, DRAWS, rng), strict=True)):
+    for number, (index, one) in enumerate(zip(indices, posterior.drawn(unbound, DRAWS, rng), strict=True)):
         if progress is not None:
-            progress("draws of the posterior", number, len(places))
-        held, links, _ = prepare_release(one, found.release._replace(contact=posterior.contact(place)))
+            progress("draws of the posterior", number, len(indices))
+        held, links, _ = prepare_release(one, found.release._replace(contact=posterior.contact(index)))
         fixed = fixed_place(ReturnMap(links, float(np.sign(held.tail_rotation_rate))), found.run.start, heavy=True)
         if fixed is None or abs(fixed.multiplier) > STABLE:
             continue
         swum.append(means_over(held, links, fixed.state, fixed.turn.time, 1))
-        steady.append(place)
-    lost = len(places) - len(steady)
-    if lost > (1.0 - _LEAST_SHARE) * len(places):
+        steady.append(index)
+    lost = len(indices) - len(steady)
+    if lost > (1.0 - _LEAST_SHARE) * len(indices):
         raise InputError(
-            f"posterior with motion 'free': {lost} of {len(places)} draws reach no steady motion near that "
-            "of the middle; allowed: motion 'held', or `simulate` with the posterior"
+            f"posterior with motion 'free': {lost} of {len(indices)} draws reach no steady motion near that "
+            "of the median; allowed: motion 'held', or `simulate` with the posterior"
         )
     names = [item.name for item in fields(Swimming)]
     whole = Swimming(**{name: np.concatenate([getattr(one, name) for one in swum]) for name in names})

@@ -96,7 +96,7 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
         shape = FilmBody.of(profile_outline(body.points))
         middle, half, front, rear = shape.rear[0], shape.half, shape.front[0], shape.rear[0]
         rounds = {-1.0: shape.rear[1], 1.0: shape.front[1]}
-        ends = {place: radius if ball > 0.5 * radius else 0.0 for place, ball in rounds.items()}
+        ends = {end: radius if ball > 0.5 * radius else 0.0 for end, ball in rounds.items()}
     else:
         ends = {-1.0: body.rounding(body.rear_end), 1.0: body.rounding(body.front_end)}
         middle, half = 0.0, half if body.shape in ("sphere", "spheroid") else 0.0
@@ -108,9 +108,9 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
         return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius]]
     line = 3.0 * np.sqrt(2.0) * np.pi * viscosity * across**1.5 * length
     rings = []
-    for place, share in _SIDE:
-        reach = radius if ends.get(place, 0.0) >= radius else 0.0
-        x = 0.5 * (front + rear) + 0.5 * length * place
+    for side, share in _SIDE:
+        reach = radius if ends.get(side, 0.0) >= radius else 0.0
+        x = 0.5 * (front + rear) + 0.5 * length * side
         rings.append([x, radius, reach, line * share, 1.5, radius])
     return rings
 
@@ -124,12 +124,12 @@ def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
     wire, root = 0.5 * tail.wire_diameter, 0.5 * robot.body.length + robot.coupling.length
     coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
     settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
-    places = [(-root - settled, tail.amplitude), (-root - tail.length, tail.amplitude)]
+    rings = [(-root - settled, tail.amplitude), (-root - tail.length, tail.amplitude)]
     if not tail.form.is_helix:
         points = centreline_of(robot, np.linspace(0.0, tail.length, 2001)).position
         reach = np.hypot(points[:, 1], points[:, 2])
-        places = [(float(points[n, 0]), float(reach[n])) for n in dict.fromkeys((int(np.argmax(reach)), 2000))]
-    return [[x, reach + wire, 0.0, coefficient, 1.0, reach + wire] for x, reach in places]
+        rings = [(float(points[n, 0]), float(reach[n])) for n in dict.fromkeys((int(np.argmax(reach)), 2000))]
+    return [[x, reach + wire, 0.0, coefficient, 1.0, reach + wire] for x, reach in rings]
 
 
 _KINDS = {
@@ -183,7 +183,7 @@ class FreeRobot(ABC):
         """Height of the asperities, m."""
 
     @abstractmethod
-    def contact_event(self, place: int, *, touches: bool) -> str:
+    def contact_event(self, site: int, *, touches: bool) -> str:
         """What happens where a gap becomes as thin as the roughness, or opens again."""
 
     @classmethod
@@ -339,7 +339,7 @@ class TwoLinks(FreeRobot):
         """Whether there are films at a wall."""
         return bool(np.isfinite(self.wall[kernel.RADIUS]))
 
-    def contact_event(self, place: int, *, touches: bool) -> str:  # noqa: ARG002 - of a tube
+    def contact_event(self, site: int, *, touches: bool) -> str:  # noqa: ARG002 - of a tube
         """The roughness carries, or no longer does."""
         return "film as thin as the roughness"
 

@@ -250,29 +250,29 @@ def _crossed(
     new, inner, gaps = run.state.copy(), np.empty(rigid_links.STATES), np.empty_like(run.gaps)
     dy = np.empty(rigid_links.STATES)
 
-    def at(place: int, share: float) -> float:
+    def at(index: int, share: float) -> float:
         stiff_steps.interpolate(share, run.before, new, run.increments, inner)
         outside = 0.0
-        if place == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
+        if index == gaps.size - stiff_steps.WATCHED + stiff_steps.INSIDE:
             stiff_steps.rates(dy, begin + share * length, inner, data, robot.table)
             outside = float(data[rigid_links.OUTSIDE])
         stiff_steps.watched(inner, outside, data, robot.table, limits, robot.roughness, gaps)
-        return float(gaps[place])
+        return float(gaps[index])
 
     crossed = np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist()
-    found = [(_crossing(partial(at, place)), place) for place in crossed]
+    found = [(_crossing(partial(at, index)), index) for index in crossed]
     sites = robot.gap_count
-    for share, place in sorted(found):
+    for share, index in sorted(found):
         moment = begin + share * length
         if moment > end:
             break
-        if place < sites:
-            events.append(Event(moment, robot.contact_event(place, touches=bool(watched[place] > 0))))
+        if index < sites:
+            events.append(Event(moment, robot.contact_event(index, touches=bool(watched[index] > 0))))
             continue
-        at(place, share)
-        if place == sites + stiff_steps.CHARGE_LEFT:
+        at(index, share)
+        if index == sites + stiff_steps.CHARGE_LEFT:
             what = BATTERY_EMPTY
-        elif place == sites + stiff_steps.ROOM:
+        elif index == sites + stiff_steps.ROOM:
             what = END_OF_CHANNEL
         else:
             what = robot.range_left(inner, moment)

@@ -118,7 +118,7 @@ def uninterrupted(moment: Snapshot) -> Snapshot:
 
 
 class Plant:
-    """A free robot on its way, from rest, one step at a time; for one thread."""
+    """A free robot in motion from rest, one step at a time; for one thread."""
 
     @validate_arguments
     def __init__(
@@ -274,7 +274,7 @@ class Plant:
         flow: str | float | None = None,
         field: Field | Mapping[str, Any] | None = None,
     ) -> Snapshot:
-        """Go on for a time; what is not given stays as it was, and at first the drive is on.
+        """Advance by a time; what is not given stays as it was, and at first the drive is on.
 
         Args:
             dt: s, positive. The run ends earlier at the end of the channel, or of the table's range.

@@ -1,7 +1,7 @@
 """Return map of a robot's pose in its tube over one turn of the tail, and its fixed point.
 
-The state is seen whenever the tail stands at the same angle against the wall: a turn then maps place and attitude to
-place and attitude. A steady motion is a fixed point of that map, whatever happens within a turn, and the eigenvalues
+The state is seen whenever the tail stands at the same angle against the wall: a turn then maps position and attitude to
+position and attitude. A steady motion is a fixed point of that map, whatever happens within a turn, and the eigenvalues
 of the map's derivative give how a small distance from it grows or shrinks in a turn. Steps and equations are those of a
 run.
 """
@@ -125,7 +125,7 @@ class ReturnMap:
         return Turn(end, time, steps[steps[:, 0] <= time], tangent)
 
     def _ended(self, status: int, y: Samples, time: float, gaps: Samples) -> str:
-        """Why a turn ends after a step, before the tail has turned; empty where it goes on."""
+        """Why a turn ends after a step, before the tail has turned; empty where it continues."""
         if status == stiff_steps.STUCK:
             return "no step is small enough to follow the motion; allowed: a larger roughness"
         if gaps[-stiff_steps.WATCHED + stiff_steps.INSIDE] < 0:
@@ -182,7 +182,7 @@ def _noted(time: float, y: Samples, data: Samples) -> tuple[float, ...]:
         time,
         float(y[rigid_links.POSITION]),
         float(y[rigid_links.ROLL]),
-        *(float(data[place]) for place in (rigid_links.FILM, kernel.AZIMUTH, kernel.WALL_PITCH, kernel.WALL_YAW)),
+        *(float(data[index]) for index in (rigid_links.FILM, kernel.AZIMUTH, kernel.WALL_PITCH, kernel.WALL_YAW)),
         float(data[kernel.CONTACT_FORCE]),
         float(data[kernel.OFFSET]),
     )
@@ -205,18 +205,18 @@ def fixed_place(turns: ReturnMap, state: Samples, *, heavy: bool) -> FixedPoint 
     It is looked for with longer steps in time than those of a run, and settled with these.
     """
     free = np.arange(0 if heavy else 1, 4)
-    place = _Place(replace(turns, tolerance=SEARCHING), state)
-    near = _continued(place, place.coordinates(state), free, _FIRST_TURNS)
+    chart = _Chart(replace(turns, tolerance=SEARCHING), state)
+    near = _continued(chart, chart.coordinates(state), free, _FIRST_TURNS)
     if near is None:
         return None
-    place = _Place(turns, place.state(near.x))
-    found = _continued(place, near.x, free, np.inf)
+    chart = _Chart(turns, chart.state(near.x))
+    found = _continued(chart, near.x, free, np.inf)
     if found is None:
         return None
-    return FixedPoint(found.turn, place.state(found.x), _multiplier(place, found, free))
+    return FixedPoint(found.turn, chart.state(found.x), _multiplier(chart, found, free))
 
 
-def _multiplier(place: _Place, found: _Change, free: np.ndarray) -> complex:
+def _multiplier(chart: _Chart, found: _Change, free: np.ndarray) -> complex:
     """The leading eigenvalue of the derivative, which may be close to 1: by turns from both sides of the point."""
     values, right = np.linalg.eig(found.derivative[np.ix_(free, free)])
     number = int(np.argmax(np.abs(values)))
@@ -226,7 +226,7 @@ def _multiplier(place: _Place, found: _Change, free: np.ndarray) -> complex:
     for unit, part in ((1.0, along.real), (1.0j, along.imag)):
         if part.any():
             length = float(np.min(_APART / np.maximum(np.abs(part), 1e-300)))
-            ahead, behind = place.change(found.x + length * part), place.change(found.x - length * part)
+            ahead, behind = chart.change(found.x + length * part), chart.change(found.x - length * part)
             if ahead is None or behind is None:
                 return complex(values[number])
             moved = part + (ahead.change - behind.change) / (2.0 * length)
@@ -247,14 +247,14 @@ class _Change(NamedTuple):
     """Derivative of the coordinates after it by those at its start, (4, 4)."""
 
 
-def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Change | None:
+def _continued(chart: _Chart, x: Samples, free: np.ndarray, turns: float) -> _Change | None:
     """The fixed point of the return map to which coordinates, (4,), lead; None where the search fails.
 
     Pseudo-transient continuation: implicit Euler steps over turns of the tail, more of them as the change of a turn
     falls, and at last Newton's method (C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35:508, 1998). What dies out
     within a turn, such as gaps in contact, does so in one turn after each step.
     """
-    here = place.change(x)
+    here = chart.change(x)
     for _ in range(_ROUNDS):
         if here is None:
             return None
@@ -265,12 +265,12 @@ def _continued(place: _Place, x: Samples, free: np.ndarray, turns: float) -> _Ch
         if size < _STILL:  # where many fixed points are close, a step would go to another
             return here
         if _size(newton[free]) < _SMALLEST:
-            return place.change(here.x + newton) or here
+            return chart.change(here.x + newton) or here
         step[free] = np.linalg.lstsq(slope + np.eye(free.size) / turns, here.change[free], rcond=None)[0]
         share = min(1.0, float(np.min(_LONGEST / np.maximum(np.abs(step), 1e-300))))
-        new = place.change(here.x + share * step)
+        new = chart.change(here.x + share * step)
         if new is not None and _size(step[free]) > _SMALL:
-            new = place.change(new.x + new.change)
+            new = chart.change(new.x + new.change)
         if new is None:
             turns *= 0.1
             if turns < 1.0:  # not even the next turns can be followed from a pose nearby
@@ -292,7 +292,7 @@ def _wrapped(change: Samples) -> Samples:
     return found
 
 
-class _Place:
+class _Chart:
     """Azimuth, mean logarithm of the gaps, pitch and yaw as coordinates of states with the tail at one angle.
 
     A yaw or pitch that changes alone would close a thin gap many times over: gaps are kept instead of the offset.
@@ -341,8 +341,8 @@ class _Place:
         """What acts as these four coordinates, angles of tail and body against the wall, |q| and current, (8,)."""
         seen, attitude = observed_at(self._robot, state), state[rigid_links.ATTITUDE : rigid_links.PHASE]
         tail = seen[kernel.TURN] + state[rigid_links.PHASE]
-        place = seen[kernel.AZIMUTH], self._closeness(state), seen[kernel.WALL_PITCH], seen[kernel.WALL_YAW]
-        return np.array([*place, tail, seen[kernel.TURN], np.linalg.norm(attitude), state[rigid_links.CURRENT]])
+        pose = seen[kernel.AZIMUTH], self._closeness(state), seen[kernel.WALL_PITCH], seen[kernel.WALL_YAW]
+        return np.array([*pose, tail, seen[kernel.TURN], np.linalg.norm(attitude), state[rigid_links.CURRENT]])
 
     def _chart_derivative(self, state: Samples) -> Samples:
         """Derivative of the chart by what acts, (8, 8)."""

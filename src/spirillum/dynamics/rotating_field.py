@@ -4,7 +4,7 @@ Held to the axis about which the field turns, the answer is a closed form (see `
 robot finds its own attitude: at low rates it may turn about a short axis or wobble, at higher ones its axis comes
 near that of the field and it swims as a corkscrew, until the field turns faster than it can follow (K. I. Morozov and
 A. M. Leshansky, Nanoscale 6:1580, 2014; Y. Man and E. Lauga, Phys. Fluids 25:071904, 2013). Here every rate is a run
-in time that goes on from the attitude of the one before, as when the field is slowly sped up.
+in time that continues from the attitude of the one before, as when the field is slowly sped up.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ def in_tilted_field(links: _A, requested: Field) -> _A:
         raise InputError(f"field.{next(iter(given))} without a field; allowed: with drive.kind = 'magnetic'")
     for name in ("rotation_rate", "strength"):
         if name in given:
-            place = "magnetic.field" if name == "strength" else f"magnetic.{name}"
-            raise InputError(f"field.{name} of a run; allowed: {place} of the robot")
+            field = "magnetic.field" if name == "strength" else f"magnetic.{name}"
+            raise InputError(f"field.{name} of a run; allowed: {field} of the robot")
     return own.changed(requested, 0.0).on(links)
 
 

@@ -184,7 +184,7 @@ def rotation_matrix(quaternion: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class Poses:
-    """A robot's way through time."""
+    """A robot's trajectory."""
 
     time: Samples
     """(n,) increasing, s."""
@@ -214,14 +214,14 @@ class Poses:
 
     def at(self, time: float) -> RobotPose:
         """The pose at a time, between samples in straight lines and even turns."""
-        place = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2))
-        step = float(self.time[place + 1] - self.time[place])
-        share = float(np.clip((time - self.time[place]) / step, 0.0, 1.0))
+        index = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2))
+        step = float(self.time[index + 1] - self.time[index])
+        share = float(np.clip((time - self.time[index]) / step, 0.0, 1.0))
 
         def between(values: Samples) -> Samples:
-            return np.asarray(values[place] + share * (values[place + 1] - values[place]))
+            return np.asarray(values[index] + share * (values[index + 1] - values[index]))
 
-        attitude = _turned(self.attitude[place], self.attitude[place + 1], share)
+        attitude = _turned(self.attitude[index], self.attitude[index + 1], share)
         return RobotPose(between(self.position), attitude, float(between(self.tail_phase)))
 
 

@@ -5,7 +5,7 @@ It is the free motion of `spirillum.predict` with the trajectory: the same run, 
 The film under a level robot: what resists its sinking, and what pushes it sideways as it swims.
 In thin films the resistance to sinking approaches 3 sqrt(2) pi mu L (a_e/h)^(3/2), 1/a_e = 1/a - 1/R, for a cylinder
 of length L and radius a (the limit of Jeffrey and Onishi, Q. J. Mech. Appl. Math. 34:129, 1981), so that the gap of a
-level cylinder falls as 1/time^2. A body that turns is pushed along the wall the way that its lowest line moves, as a
+level cylinder falls as 1/time^2. A body that turns is pushed in the direction of its lowest line, as a
 journal is in its bearing (W. J. Harrison, Trans. Cambridge Philos. Soc. 22:39, 1913).
 """
 
@@ -93,7 +93,7 @@ _TURNS = 30
 _FILMS = 5
 """Gaps at which the film is stated."""
 _SAMPLES = 400
-"""Samples of the way in an answer."""
+"""Samples of the trajectory in an answer."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,7 +140,7 @@ class Settling(DisplayMixin):
         return float(self._free.robot.tube[kernel.COEFFICIENT])
 
     def way(self, name: str) -> Samples:
-        """Part of the way that was followed, at every step of the run.
+        """Part of the trajectory that was followed, at every step of the run.
 
         Args:
             name: `time` (s), `gap` (m), `azimuth`, `pitch`, `yaw` (rad, against the wall), `contact_force` (N), `x` (m)
@@ -280,7 +280,7 @@ def settle(
 
 
 def _films(free: FreeMotion, first: float, last: float) -> tuple[LubricationFilm, ...]:
-    """The film at gaps of the way, where the model `tube` resolves it."""
+    """The film at gaps of the trajectory, where the model `tube` resolves it."""
     motion, robot = free.prediction, free.robot
     radius = float(robot.tube[kernel.RADIUS])
     table = find_table(RobotGeometry.of(motion.batch), radius, "yaw")

@@ -249,7 +249,7 @@ def _check_in_tube(requested: InTube, model: str, *, walled: bool, drawn: bool) 
         raise InputError(f"in_tube.{name} is given with {given}; allowed: only with model 'tube', motion 'free'")
     if drawn and requested.continued is not None:
         raise InputError(
-            "in_tube.continued is given together with a posterior, each draw of which moves in its own way; allowed: "
+            "in_tube.continued is given together with a posterior, each draw of which moves differently; allowed: "
             "one of them"
         )
 

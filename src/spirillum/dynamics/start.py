@@ -70,15 +70,15 @@ def _seat(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) 
     if placement.gap is not None and placement.gap > most:
         raise InputError(f"placement.gap = {show(placement.gap, 'mm')}; allowed: at most {show(most, 'mm')}")
     if placement.gap is None and not lying:
-        seat = Seat(radius, 0.0, pitch)
-        fits = seat.clearance(body) > 0
+        pose = Seat(radius, 0.0, pitch)
+        fits = pose.clearance(body) > 0
     else:
         gap = min(gap_of(placement, robot.body.diameter, radius), most)
-        seat = Seat.at_gap(body, radius, gap, pitch)
-        fits = bool(np.isfinite(seat.offset))
+        pose = Seat.at_gap(body, radius, gap, pitch)
+        fits = bool(np.isfinite(pose.offset))
     if not fits:
         raise InputError(f"placement.pitch = {show(pitch, 'deg')}: the body does not fit; allowed: a smaller pitch")
-    return seat
+    return pose
 
 
 def reach_of(robot: Robot) -> Reach:
@@ -202,7 +202,7 @@ def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
         gap = float(links.gaps(state).min())
         raise InputError(
             f"placement: a gap of {show(gap, 'mm')} with that pitch and yaw lies outside the robot's table; allowed: a "
-            "place nearer to level"
+            "pose nearer to level"
         )
 
 

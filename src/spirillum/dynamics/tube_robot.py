@@ -99,9 +99,9 @@ class TubeRobot(FreeRobot):
         first = max(int(np.searchsorted(self.bends, start, "right")) - 1, 0)
         return replace(self, flow=self.flow[first : int(np.searchsorted(self.bends, stop, "left")) + 1])
 
-    def contact_event(self, place: int, *, touches: bool) -> str:
+    def contact_event(self, site: int, *, touches: bool) -> str:
         """Which part of the robot touches the wall, or leaves it."""
-        return f"{self.names[place]} {'touches' if touches else 'leaves'} the wall"
+        return f"{self.names[site]} {'touches' if touches else 'leaves'} the wall"
 
     def range_left(self, state: Samples, time: float) -> str:
         """A sentence on the range of the table that was left."""

@@ -133,7 +133,7 @@ def _number(dataset: xr.Dataset, name: str) -> float:
 
 _STARTS = ("gap", "eccentricity", "pitch", "yaw")
 """Fields of a placement that define the initial pose."""
-_PLACES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
+_POSES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
 """Where a run names a missing table."""
 
 
@@ -160,8 +160,8 @@ def run_in_tube(
         start if options.continued is None else earlier_run(options.continued, steady, table, links, timetable.switches)
     )
     dataset = tube_run(steady, links, begun, timetable, wait=options.wait or 0.0, progress=progress)
-    places = {name: dataset[of].values for name, of in _PLACES.items()}
-    checked = compare_with_check(links.table, **places, time=dataset["time"].values)
+    poses = {name: dataset[of].values for name, of in _POSES.items()}
+    checked = compare_with_check(links.table, **poses, time=dataset["time"].values)
     notes = list(notes_in(dataset.attrs))
     limits = motion_limits(steady.batch, dataset["velocity"].values, dataset["tail_rotation_rate"].values)
     if options.flow is not None:
@@ -293,7 +293,7 @@ def compare_with_check(
 ) -> Checked:
     """Compare the poses of a motion, (n,), with those at which its table was checked; None: it repeats itself."""
     notes = []
-    checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
+    checked = np.array([largest_yaw(table, *pose) for pose in zip(offset, pitch, strict=True)])
     beyond = np.flatnonzero(np.abs(yaw) > checked)
     held = range_of(table)
     doubtful = (

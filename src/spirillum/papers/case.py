@@ -218,9 +218,9 @@ def _trials(assumption: CaseAssumption) -> Iterator[CaseTrial]:
     for number, value in enumerate(assumption.values):
         fields = {path: values[number] for path, values in assumption.set.items()}
         factors = {path: values[number] for path, values in assumption.scale.items()}
-        place = {name: values[number] for name, values in assumption.placement.items()}
+        pose = {name: values[number] for name, values in assumption.placement.items()}
         run = {name: values[number] for name, values in assumption.run.items()}
-        yield CaseTrial(assumption.name, value, fields, factors, place, run)
+        yield CaseTrial(assumption.name, value, fields, factors, pose, run)
 
 
 def has_table(case: Case, point: CasePoint) -> bool:
@@ -300,7 +300,7 @@ def _tail(robot: Robot, model: str, _point: CasePoint, _is_nominal: bool) -> dic
     """Entries of the bare tail along and about its axis, SI, with the model's errors on resolved tails."""
     matrix = resistance(robot, part="tail", model=model, about="tail-root").matrix
     errors = tail_error(RobotBatch.of(robot), CHECKED[model])._asdict()
-    return {name: CaseValue(abs(float(matrix[place])), abs(errors[name]) / 100.0) for name, place in _ENTRIES.items()}
+    return {name: CaseValue(abs(float(matrix[index])), abs(errors[name]) / 100.0) for name, index in _ENTRIES.items()}
 
 
 def _run(robot: Robot, point: CasePoint, progress: Progress | None) -> dict[str, CaseValue]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from spirillum.papers.biorob2012.claims import evaluated, foretold
+from spirillum.papers.biorob2012.claims import claims_of_study, predictions_of_study
 from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.papers.claim import Claim
 from spirillum.papers.studies import study_of
@@ -36,7 +36,7 @@ class Paper(NamedTuple):
     """Figures of this paper only."""
 
 
-_PAPERS = {"biorob2012": Paper(evaluated, foretold, PAPER_FIGURES, more_figures)}
+_PAPERS = {"biorob2012": Paper(claims_of_study, predictions_of_study, PAPER_FIGURES, more_figures)}
 
 
 def _paper_of(dataset: xr.Dataset) -> Paper | None:

@@ -237,9 +237,9 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     verdicts = {
         verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
     }
-    foretold = predictions_of(dataset)
+    predictions = predictions_of(dataset)
     third = {
-        verdict: sum(c.verdict == verdict for c in foretold)
+        verdict: sum(c.verdict == verdict for c in predictions)
         for verdict in ("predicted-agrees", "predicted-disagrees", "depends")
     }
     content = {
@@ -252,7 +252,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "results": dataset["outside"].size,
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),
         "claims": verdicts,
-        **({"predictions": third} if foretold else {}),
+        **({"predictions": third} if predictions else {}),
         "observations": dataset.attrs["observations"],
     }
     return envelope("study", content, notes_in(dataset.attrs))

@@ -29,47 +29,6 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.units import KINDS, Kind, parse_quantity
 
-__all__ = [
-    "NONE",
-    "AlsoReads",
-    "Angle",
-    "BackEmfConstant",
-    "Charge",
-    "Current",
-    "Density",
-    "Factor",
-    "FieldValue",
-    "Inductance",
-    "InverseCurrent",
-    "Length",
-    "LengthOrZero",
-    "MagneticField",
-    "MagneticMoment",
-    "Mass",
-    "MomentAngle",
-    "Pitch",
-    "Pressure",
-    "Rate",
-    "Resistance",
-    "ResistancePerCurrent",
-    "RotaryFriction",
-    "Section",
-    "SignedLength",
-    "Text",
-    "Time",
-    "Torque",
-    "TorqueConstant",
-    "Velocity",
-    "Viscosity",
-    "Voltage",
-    "Yaw",
-    "all_metadata",
-    "default_of",
-    "field_values",
-    "kind_of",
-    "quantity_schema",
-]
-
 
 def meanings(model: type[BaseModel]) -> dict[str, str]:
     """Meanings of the fields of a table by their names; its own docstrings override inherited ones."""

@@ -92,7 +92,7 @@ class RankedRobot(NamedTuple):
     high: Mapping[str, float]
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in JSON."""
+        """As in JSON."""
         ends = {
             name: {"low": self.low[name], "high": self.high[name]} if np.isfinite(self.low[name]) else {}
             for name in self.values
@@ -133,7 +133,7 @@ class Best(NamedTuple):
         return self.spread < _ALIKE
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in JSON."""
+        """As in JSON."""
         found: dict[str, Any] = {"what": self.what, "quantity": self.quantity, "robot": self.robot.name}
         found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
         found |= {"robots": self.known, "of_robots": self.robots}
@@ -183,7 +183,7 @@ class StudyRanking:
         return tuple(self.robots[0].values) if self.robots else ()
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in JSON; at most a thousand robots."""
+        """As in JSON; at most a thousand robots."""
         return {
             "model": self.model,
             "friction": self.friction,
@@ -239,7 +239,7 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     if STEADY_SPEED in beside:
         known.insert(0, STEADY_SPEED)
     values = {name: _flat(chosen, name, names) for name in known}
-    values[known[-1]] = np.abs(values[known[-1]])  # a motor that turns the other way draws no less
+    values[known[-1]] = np.abs(values[known[-1]])  # a motor in the other sense of rotation draws no less
     low, high, kind = _ends(chosen, known, names)
     order = np.argsort(-values["forward_velocity"], kind="stable")
     order = order[np.isfinite(values["forward_velocity"][order])]

@@ -323,7 +323,7 @@ def _with_models(study: Study, robots: Sequence[Robot], fit: Fit, name: str) -> 
             f"{name}: model 'auto' is one for all robots, and {afloat[0]} has no channel, but others have; allowed: "
             f'robots in channels alone, or models = ["{UNBOUNDED}"], which leaves out the walls'
         )
-    # One that does not fit its channel has no answer, and its reason stands in the dataset: it decides nothing.
+    # One that does not fit its channel has no answer, and its reason is in the dataset: it decides nothing.
     own = afloat or fit.models
     chosen = choose_model(AUTO, robots[0], fit=fit) if own else ModelChoice(WALLED, IN_CHANNEL)
     models = dict.fromkeys(chosen.model if model == AUTO else model for model in study.models)

@@ -27,19 +27,6 @@ from spirillum.swimming.drives import DriveState, at_rate, battery_voltage, driv
 from spirillum.swimming.released_motion import Motion, Screw, check_full, motion_of
 from spirillum.swimming.reynolds import body_reynolds, is_stokes_flow, reynolds_limits, tail_reynolds
 
-__all__ = [
-    "Rates",
-    "Swimming",
-    "calibrated_balance",
-    "calibrated_resistance",
-    "friction_reading",
-    "requirements",
-    "speed_error",
-    "swim",
-    "swimming_of",
-]
-
-
 LEVEL = 0.95
 """Level of the intervals."""
 

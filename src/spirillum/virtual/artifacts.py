@@ -292,8 +292,8 @@ def _cables(count: int, seed: int, size: tuple[int, int]) -> Samples:
     cover = np.zeros((rows, columns), dtype=np.uint8)
     along = np.linspace(-0.05, 1.05, 40)
     for _ in range(count):
-        place, lean, sway, phase = rng.uniform([0.1, -0.2, 0.02, 0.0], [0.9, 0.2, 0.05, 2.0 * np.pi])
-        across = columns * (place + sway * np.sin(2.0 * np.pi * along + phase)) + lean * rows * (along - 0.5)
+        start, lean, sway, phase = rng.uniform([0.1, -0.2, 0.02, 0.0], [0.9, 0.2, 0.05, 2.0 * np.pi])
+        across = columns * (start + sway * np.sin(2.0 * np.pi * along + phase)) + lean * rows * (along - 0.5)
         path = np.rint(16.0 * np.column_stack([across, rows * along])).astype(np.int32)
         cv2.polylines(
             cover,

@@ -59,8 +59,8 @@ class Disturbances:
         rng = np.random.default_rng([seed, _BUBBLES])
         count = degradation.bubbles
         reach = 0.5 * lens.size[0] / lens.focal * lens.eye
-        places = rng.uniform([-reach, -0.35 * reach / 2], [reach, 0.35 * reach / 2], (count, 2))
-        self._bubbles = np.column_stack([places, np.full(count, top)])
+        positions = rng.uniform([-reach, -0.35 * reach / 2], [reach, 0.35 * reach / 2], (count, 2))
+        self._bubbles = np.column_stack([positions, np.full(count, top)])
         self._bubble_radius = rng.uniform(0.4e-3, 1.3e-3, count)
         speed, azimuth = rng.uniform(_MIN_DRIFT, _MAX_DRIFT, count), rng.uniform(0.0, 2.0 * np.pi, count)
         self._drift = np.column_stack([speed * np.cos(azimuth), 0.2 * speed * np.sin(azimuth), np.zeros(count)])
@@ -113,9 +113,9 @@ class Disturbances:
             light *= (1.0 - _HAND_SHADE * along[:, None] * across[None, :])[..., None]
 
     def _add_bubbles(self, light: Samples, time: float) -> None:
-        places = self._bubbles + time * self._drift
-        middle = self._lens.seen(places)
-        edge = self._lens.seen(places + np.column_stack([self._bubble_radius, 0 * places[:, :2]]))
+        positions = self._bubbles + time * self._drift
+        middle = self._lens.seen(positions)
+        edge = self._lens.seen(positions + np.column_stack([self._bubble_radius, 0 * positions[:, :2]]))
         for (u, v, _), radius in zip(middle, np.abs(edge[:, 0] - middle[:, 0]), strict=True):
             window, du, dv = _around(light, u, v, 1.5 * radius + 2)
             far = np.hypot(du, dv) / radius
@@ -125,10 +125,10 @@ class Disturbances:
             light[window] += (_BUBBLE_LIGHT * spot + 0.06 * (far < 0.9))[..., None]
 
     def _add_glare(self, light: Samples, position: Samples) -> None:
-        place = position.copy() if self._degradation.glare_moves else np.array([0.0, 0.0, position[2]])
-        place[:2] += self._glare_at
+        glare = position.copy() if self._degradation.glare_moves else np.array([0.0, 0.0, position[2]])
+        glare[:2] += self._glare_at
         length, diameter = self._body
-        ends = self._lens.seen(place + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
+        ends = self._lens.seen(glare + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
         scale = abs(ends[1, 0] - ends[0, 0]) / 1e-3
         area = self._degradation.glare * scale**2 * length * diameter * 0.94  # of an ellipse of axes 1.6 to 1
         minor = np.sqrt(area / (np.pi * 1.6))

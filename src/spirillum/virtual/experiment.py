@@ -195,8 +195,8 @@ def virtual_experiment(
     }
     planned = [
         item
-        for place, name in enumerate(robots)
-        for item in _planned(name, robots[name], steady[name], plan, camera, place, _gap(robots[name], placement))
+        for index, name in enumerate(robots)
+        for item in _planned(name, robots[name], steady[name], plan, camera, index, _gap(robots[name], placement))
     ]
     claim = {"mark": _MARK, "content": mark, "what": "virtual experiment"}
     inputs = study if isinstance(study, (str, Path)) else None
@@ -247,8 +247,8 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
     if loaded.count > _MOST:
         raise InputError(f"the study has {loaded.count} robots; allowed: at most {_MOST} videos")
     found: dict[str, Robot] = {}
-    for place in range(loaded.count):
-        robot = loaded.robot_at(place)
+    for index in range(loaded.count):
+        robot = loaded.robot_at(index)
         name = robot.name
         if loaded.study.grid is not None:
             tail = robot.tail
@@ -272,14 +272,14 @@ def _planned(
     steady: Mapping[str, float],
     plan: _Plan,
     camera: CameraOptions,
-    place: int,
+    index: int,
     gap: float | None = None,
 ) -> list[Planned]:
     """The trials of the robot at an index of the study."""
     planned = []
     low, high = swimming_range(robot, camera)
     for number in range(1, plan.trials + 1):
-        rng = np.random.default_rng([plan.seed, place, number])
+        rng = np.random.default_rng([plan.seed, index, number])
         factor = float(max(1.0 + plan.spread * rng.standard_normal(), 0.1))
         rates = {key: factor * value for key, value in steady.items()}
         velocity = rates["forward_velocity"]
@@ -322,10 +322,10 @@ def _files_of(folder: Path, planned: Planned) -> list[Path]:
 
 def _is_whole_film(path: Path) -> bool:
     """Whether a file is a complete MP4 video: its boxes, each with its length first, fill it."""
-    size, place, kinds = path.stat().st_size, 0, set()
+    size, offset, kinds = path.stat().st_size, 0, set()
     with opened(path, "a video of a trial", sys.maxsize) as file:
-        while place < size:
-            file.seek(place)
+        while offset < size:
+            file.seek(offset)
             head = file.read(16)
             length, kind = int.from_bytes(head[:4], "big"), head[4:8]
             if length == 1:  # its length follows, in 64 bits
@@ -333,8 +333,8 @@ def _is_whole_film(path: Path) -> bool:
             if length < len(head[:8]) or len(head) < 8:
                 return False
             kinds.add(kind)
-            place += length
-    return place == size and {b"ftyp", b"moov", b"mdat"} <= kinds
+            offset += length
+    return offset == size and {b"ftyp", b"moov", b"mdat"} <= kinds
 
 
 def _first_bytes(path: Path) -> bytes:

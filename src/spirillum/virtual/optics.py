@@ -84,8 +84,8 @@ class VirtualLens:
     def points(self, pixels: Samples, height: float) -> Samples:
         """Points (n, 3), m, that are seen at pixels (n, 2), at a height z below the surface, m."""
         rays = self.sightlines(pixels)
-        places = rays[:, :2] + rays[:, 2:4] * ((self.surface - height) / -rays[:, 4:])
-        return np.column_stack([places, np.full(len(places), height)])
+        points = rays[:, :2] + rays[:, 2:4] * ((self.surface - height) / -rays[:, 4:])
+        return np.column_stack([points, np.full(len(points), height)])
 
 
 _SPACING = 2e-3
@@ -230,20 +230,20 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
     for apart, width, colour in ((1.0, *_FINE_LINES), (5.0, *_STRONG_LINES)):
         bare = np.ones(still.light.shape[:2])
         for axis in (0, 1):  # lines across x, then across y
-            places = still.floor[..., axis].astype(float)
-            pixel = np.abs(np.gradient(places, axis=1 - axis))
-            bare *= 1.0 - _line_share(places, pixel, apart * spacing, width * spacing)
+            positions = still.floor[..., axis].astype(float)
+            pixel = np.abs(np.gradient(positions, axis=1 - axis))
+            bare *= 1.0 - _line_share(positions, pixel, apart * spacing, width * spacing)
         ratio *= bare[..., None]
         ratio += (1.0 - bare[..., None]) * (linear(np.array(colour)) / paper)
     shine = still.shine[..., None]
     still.light[:] = (still.light - shine) * ratio + shine
 
 
-def _line_share(places: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
+def _line_share(positions: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
     """Share of each pixel that parallel lines cover, centred at multiples of the spacing.
 
     Args:
-        places: of the pixels' middles across the lines, m.
+        positions: of the pixels' middles across the lines, m.
         pixel: their sizes, m.
         spacing: from one line to the next, m.
         width: of a line, m.
@@ -251,7 +251,7 @@ def _line_share(places: Samples, pixel: Samples, spacing: float, width: float) -
     low, high = (
         width * np.floor(edge / spacing + 0.5)
         + np.clip(edge - spacing * np.floor(edge / spacing + 0.5) + 0.5 * width, 0.0, width)
-        for edge in (places - 0.5 * pixel, places + 0.5 * pixel)
+        for edge in (positions - 0.5 * pixel, positions + 0.5 * pixel)
     )
     return np.asarray((high - low) / pixel)
 

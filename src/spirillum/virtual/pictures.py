@@ -83,9 +83,9 @@ class Cover:
         far = np.clip(np.hypot(*across.T), _NEAREST, _FARTHEST)
         shift, floor, detail = (np.interp(far, _FAR, values) for values in self._paths(height))
         move = self._side * (shift * self._pixels / far)[:, None] * across
-        places = np.stack([top + v - move[:, 1], left + u + move[:, 0]])
+        pixels = np.stack([top + v - move[:, 1], left + u + move[:, 0]])
         sharp, blurred = (
-            np.stack([map_coordinates(light[..., k], places, order=1, mode="nearest") for k in range(3)], axis=-1)
+            np.stack([map_coordinates(light[..., k], pixels, order=1, mode="nearest") for k in range(3)], axis=-1)
             for light in (self._still.light, self._blurred)
         )
         seen = blurred + detail[:, None] * (sharp - blurred)
@@ -295,9 +295,9 @@ _LARGE = 480
 def stamp(image: np.ndarray) -> None:
     """Write the label into the lower right corner of a picture of bytes, which is changed."""
     mask = np.zeros((5, 4 * len(_TEXT) - 1), dtype=bool)
-    for place, letter in enumerate(_TEXT):
+    for index, letter in enumerate(_TEXT):
         rows = [[digit == "1" for digit in row] for row in _LETTERS[letter].split()]
-        mask[:, 4 * place : 4 * place + 3] = rows
+        mask[:, 4 * index : 4 * index + 3] = rows
     times = 2 if image.shape[1] >= _LARGE else 1
     mask = np.repeat(np.repeat(mask, times, axis=0), times, axis=1)
     height, width = mask.shape

@@ -197,15 +197,15 @@ def _shortened(points: Samples, faces: Faces) -> tuple[Samples, Faces, Faces]:
     origin = np.arange(len(faces))
     while True:
         edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)  # (m, 3, 2)
-        key, place = np.unique(edges[..., 0] * len(points) + edges[..., 1], return_inverse=True)  # one number an edge
-        unique, place = np.stack(np.divmod(key, len(points)), axis=-1), place.reshape(-1, 3)
+        key, index = np.unique(edges[..., 0] * len(points) + edges[..., 1], return_inverse=True)  # one number an edge
+        unique, index = np.stack(np.divmod(key, len(points)), axis=-1), index.reshape(-1, 3)
         long = np.linalg.norm(points[unique[:, 0]] - points[unique[:, 1]], axis=1) > _LONGEST
         if not long.any():
             return points, faces, origin
         middle = np.full(len(unique), -1)
         middle[long] = len(points) + np.arange(int(long.sum()))
         points = np.concatenate([points, 0.5 * (points[unique[long, 0]] + points[unique[long, 1]])])
-        halves = middle[place]  # new vertex on each edge of each triangle, or -1
+        halves = middle[index]  # new vertex on each edge of each triangle, or -1
         parts, sources = [], []
         for number in range(4):
             chosen = (halves >= 0).sum(axis=1) == number

@@ -83,8 +83,8 @@ class TrialTrajectory:
         if time.size < 2:
             raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
         now = self.series(time)
-        place = np.stack([now["x"], now["y"], now["z"]], axis=-1)
-        return TrialTrajectory(time, place, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
+        position = np.stack([now["x"], now["y"], now["z"]], axis=-1)
+        return TrialTrajectory(time, position, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
 
     def rates(self) -> dict[str, float]:
         """Mean rates from the first sample to the last: `forward_velocity`, `body_rotation_rate`, ..."""
@@ -140,11 +140,11 @@ def steady_trajectory(
     """
     turns = abs(tail_rotation_rate) * duration / (2.0 * np.pi)
     time = np.linspace(0.0, duration, 2 + (int(_SAMPLES_PER_TURN * turns) if wobble > 0 else 0))
-    places = position + np.outer(time, [forward_velocity, 0.0, 0.0])
-    places[:, 1] += wobble * np.cos(tail_phase + tail_rotation_rate * time)
+    path = position + np.outer(time, [forward_velocity, 0.0, 0.0])
+    path[:, 1] += wobble * np.cos(tail_phase + tail_rotation_rate * time)
     return TrialTrajectory(
         time,
-        places,
+        path,
         np.full_like(time, heading),
         np.zeros_like(time),
         body_angle + body_rotation_rate * time,
@@ -185,5 +185,5 @@ def trajectory_of(poses: Poses, view: str, *, leftwards: bool, axis: float) -> T
     # Unwrapped by the run's own count of turns.
     guess = angle[0] + poses.roll - poses.roll[0]
     roll = angle + 2.0 * np.pi * np.round((guess - angle) / (2.0 * np.pi))
-    place = poses.position @ turn.T + np.array([0.0, 0.0, axis])
-    return TrialTrajectory(poses.time - poses.time[0], place, heading, pitch, roll, roll + poses.tail_phase)
+    position = poses.position @ turn.T + np.array([0.0, 0.0, axis])
+    return TrialTrajectory(poses.time - poses.time[0], position, heading, pitch, roll, roll + poses.tail_phase)

@@ -323,8 +323,8 @@ def render(
         atomic_write_all([*beside, names["nc"]]) as parts,  # all of them appear together, or none
         video_writer(target, camera.size, camera.fps, degradation.crf, tags) as writer,
     ):
-        for place, text in beside.items():
-            parts[place].write_text(text, encoding="utf-8")
+        for file, text in beside.items():
+            parts[file].write_text(text, encoding="utf-8")
         write_dataset(truth, parts[names["nc"]])
         _write_frames(writer, frames, (kept, counted), camera.fps, on_progress)
         on_progress("render: writing", len(kept), len(kept))

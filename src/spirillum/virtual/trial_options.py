@@ -86,7 +86,7 @@ class TrialOptions(Options):
     tail_phase: Angle = 0.0
     """Of the tail at the first frame."""
     gap: LengthOrZero | None = None
-    """Between body and tube, in the picture and for a model with walls; None: that of the reference place of `tube`
+    """Between body and tube, in the picture and for a model with walls; None: that of the reference pose of `tube`
     (0.5 mm for the paper's body). A run has its own."""
 
 

@@ -59,4 +59,4 @@ def test_a_way_that_ends_before_the_steady_motion_is_said_to() -> None:
         (settling("drains", np.nan), False),
     ):
         words = " ".join(text.get_text() for text in settling_figure(made).findobj(Text))
-        assert ("The run ends at 30 s; the rest of the way" in words.replace("\n", " ")) is said
+        assert ("The run ends at 30 s; the remaining path" in words.replace("\n", " ")) is said

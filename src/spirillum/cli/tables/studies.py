@@ -205,7 +205,7 @@ def _basis_of_design(answer: Answer) -> Iterator[Detail]:
         )
     counts = answer["designs"]
     yield Detail(
-        f"{counts['swum']} designs: {counts['refused']} cannot be built or swum, "
+        f"{counts['swum']} designs: {counts['refused']} cannot be built or have no steady motion, "
         f"{counts['breaking_a_condition']} break a condition"
     )
 

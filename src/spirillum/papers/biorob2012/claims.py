@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def evaluated(dataset: xr.Dataset) -> list[Claim]:
-    """Hold a study that names this paper against its statements; empty for one of other channels."""
+def claims_of_study(dataset: xr.Dataset) -> list[Claim]:
+    """Compare a study that names this paper with its statements; empty for one of other channels."""
     if not _of_this_paper(dataset):
         return []
     evidence = Evidence(dataset)
@@ -34,7 +34,7 @@ def evaluated(dataset: xr.Dataset) -> list[Claim]:
     return [claim for source in sources for claim in source(evidence)]
 
 
-def foretold(dataset: xr.Dataset) -> list[Claim]:
+def predictions_of_study(dataset: xr.Dataset) -> list[Claim]:
     """Evaluate the statements for released robots, verdicts of a third kind; empty without such robots."""
     return claims_predicted.predicted(Evidence(dataset)) if _of_this_paper(dataset) else []
 

@@ -166,7 +166,7 @@ def _reynolds_numbers(readings: FrictionModelRuns) -> Iterator[Claim]:
         if tail is None:
             continue
         seen, wanted = speeds[number][tail], readings.evidence.speed_of(stated.value)
-        found = readings.against(seen, wanted, "mm/s", 1e3)
+        found = readings.compare(seen, wanted, "mm/s", 1e3)
         yield readings.claim(
             f"Largest Reynolds number, {channel} channel, at lambda = {stated.wavelength_mm:g} mm, "
             f"B_o = {stated.amplitude_mm:g} mm",
@@ -187,7 +187,7 @@ def _velocity_drops(readings: FrictionModelRuns) -> Iterator[Claim]:
             f"The {which} velocity decrease, wide to narrow, at lambda = {wavelength:g} mm, B_o = {amplitude:g} mm",
             f"{drop:g} mm/s",
             _range(drops, " mm/s", 1e3),
-            readings.against(drops, 1e-3 * drop, "mm/s", 1e3),
+            readings.compare(drops, 1e-3 * drop, "mm/s", 1e3),
         )
 
 
@@ -196,7 +196,7 @@ def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
     if not wide.size:
         return
     loss = 1.0 - narrow.sum(axis=0) / wide.sum(axis=0)
-    found = readings.against(loss, GLOBAL_DROP, "%", 100.0)
+    found = readings.compare(loss, GLOBAL_DROP, "%", 100.0)
     if readings.missing:
         found = Judgement("depends", f"no table: {readings.missing}, and it speaks of the mean of all")
     yield readings.claim(
@@ -209,7 +209,7 @@ def _global_drop(readings: FrictionModelRuns) -> Iterator[Claim]:
         "Robots travel slower in the narrow channel",
         "all tails",
         f"the narrow channel takes {_range(1.0 - narrow / wide, ' %', 100.0)} of the speed",
-        readings.judged(readings.holds(wide - narrow)),
+        readings.verdict_on(readings.holds(wide - narrow)),
     )
 
 
@@ -220,7 +220,7 @@ def _speeds(readings: FrictionModelRuns) -> Iterator[Claim]:
         ("Forward velocity increases with wavelength", rising),
         ("Forward velocity decreases with amplitude, except at lambda = 25 mm", falling),
     ):
-        yield readings.claim(statement, "trend", _steps(steps), readings.judged(readings.holds(steps)))
+        yield readings.claim(statement, "trend", _steps(steps), readings.verdict_on(readings.holds(steps)))
 
 
 def _steps(steps: Values) -> str:
@@ -237,7 +237,7 @@ def _body_rotation(readings: FrictionModelRuns) -> Iterator[Claim]:
         "Body rotation rates are of the order of 1e-2 to 1e-1",
         "1e-2 to 1e-1 (unit not stated)",
         _range(rates, " Hz", 1.0 / Hz),
-        readings.judged(readings.holds(inside)),
+        readings.verdict_on(readings.holds(inside)),
     )
     errors = {
         name: np.abs(readings.of("modelled_body_rotation_rate", name) / readings.of("body_rotation_rate") - 1.0)
@@ -248,7 +248,7 @@ def _body_rotation(readings: FrictionModelRuns) -> Iterator[Claim]:
         "SBT and RFT predict body rotation rates within 1 to 50 %, RFT with the large errors",
         "1 to 50 %",
         ", ".join(f"{label(name)} misses by {_range(error, ' %', 100.0)}" for name, error in errors.items()),
-        readings.judged(readings.holds(within)),
+        readings.verdict_on(readings.holds(within)),
     )
 
 
@@ -259,7 +259,7 @@ def _motor_rates(readings: FrictionModelRuns) -> Iterator[Claim]:
         "Motor rates are identical in wide and narrow channel",
         "identical",
         f"{_range(rates, ' Hz', 1.0 / Hz)}; they differ by {_range(apart, ' %', 100.0)}",
-        readings.judged(readings.holds(_EQUAL - apart)),
+        readings.verdict_on(readings.holds(_EQUAL - apart)),
     )
     rising = np.diff(rates, axis=1)
     for statement, steps in (
@@ -267,7 +267,7 @@ def _motor_rates(readings: FrictionModelRuns) -> Iterator[Claim]:
         ("The motor's rate increases with wavelength", rising),
         ("The motor's rate saturates as the wavelength increases", -np.diff(rising, axis=1)),
     ):
-        yield readings.claim(statement, "trend", _steps(steps), readings.judged(readings.holds(steps)))
+        yield readings.claim(statement, "trend", _steps(steps), readings.verdict_on(readings.holds(steps)))
 
 
 def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
@@ -280,7 +280,7 @@ def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
         by_amplitude = np.std(found.mean(axis=1), axis=1).mean(axis=0)
         spreads = f"over amplitudes {_range(by_amplitude, '')}, over wavelengths {_range(by_wavelength, '')}"
         computed = f"spread {spreads} N m s/rad (RFT)"
-        judgement = readings.judged(readings.holds((by_amplitude - by_wavelength)[None]))
+        judgement = readings.verdict_on(readings.holds((by_amplitude - by_wavelength)[None]))
     else:
         computed, judgement = "not computed", Judgement("depends", f"no table: {readings.missing}")
     statement = "B_eff depends mostly on the amplitude instead of the wavelength"
@@ -292,7 +292,7 @@ def _effective_friction(readings: FrictionModelRuns) -> Iterator[Claim]:
         "Friction is not the rotor's alone",
         "B_eff well above B_m",
         f"B_eff {_range(found, ' N m s/rad')} by (18), {_range(found / rotor, ' times B_m')}",
-        readings.judged(readings.holds(found - 3.0 * rotor)),
+        readings.verdict_on(readings.holds(found - 3.0 * rotor)),
     )
     with np.errstate(invalid="ignore"):
         spread = np.fmax.reduce(found, axis=-1) / np.fmin.reduce(found, axis=-1) - 1.0
@@ -323,7 +323,7 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
         "SBT in better agreement",
         ", ".join(f"{label(name)} {_range(error, ' mm/s', 1e3)}" for name, error in errors.items())
         + " root mean square",
-        readings.judged(readings.holds((errors["rft"] - errors["sbt"])[None])),
+        readings.verdict_on(readings.holds((errors["rft"] - errors["sbt"])[None])),
     )
     factors = readings.of("body_drag_factor", "sbt")
     for number, (channel, stated) in enumerate(BODY_DRAG_FACTORS.items()):
@@ -333,7 +333,7 @@ def _models(readings: FrictionModelRuns) -> Iterator[Claim]:
                 f"Body drag factor that represents the walls of the {channel} channel (Table III)",
                 f"{stated:g} D_x",
                 f"{_range(of_tails, '')} by inverting (15) with SBT's tail at the speeds and rates of the readings",
-                readings.against(_of_tails(np.ma.median, of_tails), stated, "", 1.0),
+                readings.compare(_of_tails(np.ma.median, of_tails), stated, "", 1.0),
             )
 
 
@@ -343,5 +343,5 @@ def _contact(readings: FrictionModelRuns) -> Iterator[Claim]:
         "The robot is in intermittent contact with the channel's surface",
         "intermittent",
         f"asperities touch for {_range(share, ' %', 100.0)} of the time",
-        readings.judged(readings.holds(np.minimum(share, 1.0 - share))),
+        readings.verdict_on(readings.holds(np.minimum(share, 1.0 - share))),
     )

@@ -171,10 +171,10 @@ def _computed_drop(evidence: Evidence, model: str, claim: str) -> Claim:
         verdict = _holds_for_any_weights(losses)
         return Claim(claim, _PAPER_DROP, words, verdict, f"{_EQUAL_RATES}; {_FITTED}")
     band = evidence.drops_of_the_band(model)
-    words = f"{words} ({evidence.place})"
+    words = f"{words} ({evidence.pose})"
     nothing = "no factor is fitted: the walls are computed"
     if band is None:
-        why = f"{nothing}, at one assumed place of many: the paper does not report gap and pitch"
+        why = f"{nothing}, at one assumed pose of many: the paper does not report gap and pitch"
         return Claim(claim, _PAPER_DROP, words, "undecidable", f"{_EQUAL_RATES}; {why}")
     words = f"{words}; over the band, at the same gap and pitch in both channels, {fraction_between(band)}"
     why = f"{nothing}, over a band, for the paper does not report gap and pitch"

@@ -119,13 +119,13 @@ class Evidence:
 
     def tail(self, wavelength_mm: float, amplitude_mm: float) -> tuple[int, int] | None:
         """Indices of a tail in the grid, if it is there."""
-        places = []
+        indices = []
         for name, value in (("wavelength", wavelength_mm), ("amplitude", amplitude_mm)):
             near = np.flatnonzero(np.isclose(self.dataset[name].values, value * 1e-3, rtol=1e-6))
             if not near.size:
                 return None
-            places.append(int(near[0]))
-        return places[0], places[1]
+            indices.append(int(near[0]))
+        return indices[0], indices[1]
 
     def speed_of(self, reynolds: float) -> float:
         """U = Re mu/(rho D_b), m/s: the speed behind a Reynolds number if its length is the body's diameter."""
@@ -147,7 +147,7 @@ class Evidence:
         )
 
     @property
-    def place(self) -> str:
+    def pose(self) -> str:
         """Poses of the models that compute the walls, in words."""
         return reference_pose(self._settings)
 
@@ -212,7 +212,7 @@ class FrictionModelRuns:
         found: Values = np.where(known.any(axis=0), np.all((flat > 0) | ~known, axis=0), np.nan)
         return found
 
-    def judged(self, holds: Values, *, of_all: bool = True) -> Judgement:
+    def verdict_on(self, holds: Values, *, of_all: bool = True) -> Judgement:
         """The verdict on a statement, 1, 0 or NaN in each reading; one `of_all` stays open without a table."""
         known = np.isfinite(holds)
         count, total = int(np.nansum(holds)), int(known.sum())
@@ -231,7 +231,7 @@ class FrictionModelRuns:
         shares = "; ".join(self._share(holds, name) for name in names)
         return Judgement("depends", f"{_joined(names)}: it holds in {count} of {total} readings, {shares}{lacking}")
 
-    def against(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
+    def compare(self, values: Values, stated: float, unit: str, scale: float) -> Judgement:
         """The verdict on a stated number, SI; `scale` is the SI unit over the shown one."""
         known = values[np.isfinite(values)]
         if not known.size:

@@ -48,7 +48,7 @@ def drop_picture(shown: StudyView) -> Picture | None:
     ]
     if evidence.computed:
         names = ", ".join(label_of_model(name) for name in evidence.computed)
-        notes.append(f"Nothing is fitted in {names}: the walls are computed ({evidence.place}).")
+        notes.append(f"Nothing is fitted in {names}: the walls are computed ({evidence.pose}).")
         if shown.banded:
             notes.append(
                 "Band: the least to the largest loss over gaps and pitches that are the same in both channels."
@@ -194,14 +194,14 @@ def frenet_figure(robot: Robot) -> Figure:
         axes.plot(axis[:, 0], axis[:, 1], color=FAINT, linewidth=0.9, dashes=(9, 3, 2, 3), zorder=1)
         points = 72.0 * PAGE / float(span[0])
         _draw_wire(axes, seen(wire), (wire - middle) @ away, tail.wire_diameter / unit * points)
-        for number, place in enumerate(marked.position / unit):
+        for number, position in enumerate(marked.position / unit):
             vectors = (marked.tangent[number], marked.normal[number], marked.binormal[number])
             colours = (COLOURS["blue"], COLOURS["vermillion"], COLOURS["green"])
             for name, vector, colour in zip("tnb", vectors, colours, strict=True):
                 _draw_arrow(
-                    axes, seen(place[None])[0], seen((place + reach * vector)[None])[0], name, colour, bold=True
+                    axes, seen(position[None])[0], seen((position + reach * vector)[None])[0], name, colour, bold=True
                 )
-            axes.plot(*seen(place[None])[0], marker="o", markersize=4.5, color=INK, zorder=9)
+            axes.plot(*seen(position[None])[0], marker="o", markersize=4.5, color=INK, zorder=9)
         for name, vector in zip("xyz", np.eye(3), strict=True):
             _draw_arrow(
                 axes, seen(start[None])[0], seen((start + 1.3 * reach * vector)[None])[0], name, INK, bold=False
@@ -259,11 +259,11 @@ def _draw_arrow(axes: Axes, start: Samples, end: Samples, name: str, colour: str
             )
         )
     way = end - start
-    place = end + 0.53 * way / max(float(np.hypot(*way)), 1e-12)
+    position = end + 0.53 * way / max(float(np.hypot(*way)), 1e-12)
     text = f"$\\mathbf{{{name}}}$" if bold else f"${name}$"
     axes.text(
-        float(place[0]),
-        float(place[1]),
+        float(position[0]),
+        float(position[1]),
         text,
         ha="center",
         va="center",

@@ -59,7 +59,7 @@ def _notes(settling: Settling) -> list[str]:
     if settling.lying.state != "steady" or not slow > _SHORT * end:
         return []
     return [
-        f"The run ends at {end:.3g} s; the rest of the way to the steady motion, which is solved for, decays with a "
+        f"The run ends at {end:.3g} s; the remaining path to the steady motion, which is solved for, decays with a "
         f"time constant of {slow:.3g} s, at last: before, azimuth and yaw may go past it and come back."
     ]
 
