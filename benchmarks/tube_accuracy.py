@@ -34,7 +34,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_resolution
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.placement import Placement
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.steady import swim
 
 Row = dict[str, Any]
@@ -76,7 +76,7 @@ def body(radius: float, length: float, rear: Any) -> Outline:
 
 
 def held(outline: Outline, radius: float, offset: float, fineness: Fineness) -> Timed:
-    return timed(lambda: held_in_tube(Solids([(outline, 0)], Seat(radius, offset), fineness), []))
+    return timed(lambda: held_in_tube(Solids([(outline, 0)], TubePose(radius, offset), fineness), []))
 
 
 def took(*runs: Timed) -> Row:
@@ -250,7 +250,7 @@ def wire_rows(*, quick: bool) -> list[Row]:
         for length in lengths:
             x = np.linspace(-0.5 * length, 0.5 * length, 60)
             wire = wire_along(np.stack([x, 0 * x, 0 * x], axis=1), b)
-            lines.append(held_in_tube(Solids([], Seat(1.0, 0.0), Fineness(tolerance=1e-5)), [(wire, 1)], offset))
+            lines.append(held_in_tube(Solids([], TubePose(1.0, 0.0), Fineness(tolerance=1e-5)), [(wire, 1)], offset))
         found = (lines[1].matrix - lines[0].matrix)[6:, 6:]
         load, loss = lines[1].load[6] - lines[0].load[6], lines[1].drag - lines[0].drag
         no_gradient = (found[0, 0] - load**2 / (8 * np.pi + loss)) / annulus_axial_drag(b, 1.0, offset)

@@ -78,16 +78,16 @@ def main() -> None:
     ]
     places = Places(RobotGeometry.of(batches[0]), tube_radius(batches[0]))
     yaw = arguments.yaw * places.largest_yaw(arguments.t, arguments.f)
-    seat = places.seat_between(arguments.t, arguments.f, yaw)
+    pose = places.pose_between(arguments.t, arguments.f, yaw)
     film = np.empty((6, 6))
     table = FilmTable.of(places.geometry.body, places.radius, yaw=1.1 * LARGEST_YAW, pitch=1.1 * max(STEEPEST))
-    film_at(table.packed, seat.offset, seat.pitch, seat.yaw, film)
+    film_at(table.packed, pose.offset, pose.pitch, pose.yaw, film)
     tails = tuple((RobotGeometry.of(batch), even_phases(_TRUE)) for batch in batches)
-    (solved,) = solutions([NodeSolution(tails, seat, _FINENESS)], "phases", workers=1)
-    print(f"pitch {np.degrees(seat.pitch):.2f} deg, yaw {np.degrees(yaw):.2f} deg")
+    (solved,) = solutions([NodeSolution(tails, pose, _FINENESS)], "phases", workers=1)
+    print(f"pitch {np.degrees(pose.pitch):.2f} deg, yaw {np.degrees(yaw):.2f} deg")
     print("\n".join(["| wavelength, phases | " + " | ".join(RESPONSES) + " |", "| --- |" + " ---: |" * len(RESPONSES)]))
     for (geometry, _), matrices in zip(tails, solved, strict=True):
-        true = rest_at(matrices, film, arguments.t, seat)
+        true = rest_at(matrices, film, arguments.t, pose)
         for count in _COUNTS:
             errors = largest_errors(true, cut_of_film(arguments.t) * film, count)
             words = " | ".join(f"{100.0 * error:.2g}" for error in errors)

@@ -26,7 +26,7 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.stages import RESPONSES, response_errors
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels.tube_table import INSIDE
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 _PHASES = 3
 
@@ -34,7 +34,7 @@ _PHASES = 3
 class Drawn(NamedTuple):
     """A place and the phases of the tail there, rad."""
 
-    seat: Seat
+    pose: TubePose
     phases: tuple[float, ...]
 
 
@@ -45,12 +45,12 @@ def drawn(places: Places, count: int, seed: int) -> list[Drawn]:
     while len(found) < count:
         t, f = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0))), float(draw.uniform(-1.0, 1.0))
         share = float(draw.uniform(-1.0, 1.0)) if len(found) % 3 else 0.0
-        seat = places.seat_between(t, f, share * places.largest_yaw(t, f))
+        pose = places.pose_between(t, f, share * places.largest_yaw(t, f))
         first = float(draw.uniform(0.0, 2.0 * np.pi))
-        clear = places.tail_clearance(seat) > places.least_clearance
-        if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
+        clear = places.tail_clearance(pose) > places.least_clearance
+        if clear and pose.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
             found.append(
-                Drawn(seat, tuple((first + 2.0 * np.pi * k / _PHASES) % (2.0 * np.pi) for k in range(_PHASES)))
+                Drawn(pose, tuple((first + 2.0 * np.pi * k / _PHASES) % (2.0 * np.pi) for k in range(_PHASES)))
             )
     return found
 
@@ -59,7 +59,7 @@ def errors_of(table: TubeTable, place: Drawn, true: np.ndarray) -> np.ndarray:
     """Errors of `RESPONSES` at every phase of a place, percent, (phases, 6); infinite outside the table."""
     found = []
     for phase, matrix in zip(place.phases, true, strict=True):
-        own, left = table.at(place.seat.offset, place.seat.pitch, place.seat.yaw, phase)
+        own, left = table.at(place.pose.offset, place.pose.pitch, place.pose.yaw, phase)
         found.append(100.0 * response_errors(own, matrix, true) if left == INSIDE else np.full(len(RESPONSES), np.inf))
     return np.stack(found)
 
@@ -98,11 +98,11 @@ def main() -> None:
     chosen = drawn(Places(tables[0].geometry, tables[0].radius), asked.places, asked.seed)
     fineness = Fineness("standard", asked.tolerance)
     questions = [
-        NodeSolution(tuple((table.geometry, place.phases) for table in tables), place.seat, fineness)
+        NodeSolution(tuple((table.geometry, place.phases) for table in tables), place.pose, fineness)
         for place in chosen
     ]
     answers = solutions(questions, "held out", _tell, asked.workers)
-    yawed = np.array([place.seat.yaw != 0.0 for place in chosen])
+    yawed = np.array([place.pose.yaw != 0.0 for place in chosen])
     for number, (table, change) in enumerate(zip(tables, changes, strict=True)):
         errors = [errors_of(table, place, answer[number]) for place, answer in zip(chosen, answers, strict=True)]
         print(f"\n{asked.robot} {' '.join(change.values())}: {len(chosen)} places, {_PHASES} phases each\n")

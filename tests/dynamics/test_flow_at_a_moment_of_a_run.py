@@ -29,12 +29,12 @@ def test_traction_carries_the_weight_and_nothing_along_the_tube(run: xr.Dataset)
     """The table moved it, a coarse solution of the flow answers: to their errors."""
     flow = sp.flow_of_run(run, 0.0, resolution={"tolerance": 0.05})
     weight = sp.load("biorob2012-wide").derived()["submerged_weight"].value
-    force, seat = flow.field.wrench()[:3], flow.seat
-    assert seat is not None
-    up, right = seat.across @ force
+    force, pose = flow.field.wrench()[:3], flow.seat
+    assert pose is not None
+    up, right = pose.across @ force
     assert up == pytest.approx(-weight * np.cos(AZIMUTH), rel=0.03)
     assert abs(right) == pytest.approx(weight * np.sin(AZIMUTH), rel=0.03)
-    assert abs(force @ seat.forward) < 1e-3 * weight
+    assert abs(force @ pose.forward) < 1e-3 * weight
     assert flow.held_force == pytest.approx(weight, rel=0.03)
     assert flow.prediction.tail_rotation_rate == float(run["tail_rotation_rate"][0])
 

@@ -6,7 +6,7 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.robot.outline import body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 CAPSULE = body_outline("capsule", 18e-3, 35e-3, 0.0, "hemisphere", "flat")
 BODIES = {
@@ -103,7 +103,7 @@ def test_a_rounded_edge_has_the_film_of_an_ellipsoid(edge: float, most: float) -
     normal = np.array([np.sin(pitch), 0.0, np.cos(pitch), 0.0, 0.0, 0.0])
     films = []
     for gap in (0.5e-6, 2e-6):
-        film = film_resistance(body, tube, Seat.at_gap(body, tube, gap, pitch).offset, pitch, 0.0)
+        film = film_resistance(body, tube, TubePose.at_gap(body, tube, gap, pitch).offset, pitch, 0.0)
         films.append(normal @ film @ normal)
     reduced = (edge * across) ** 1.5 / (edge + across)
     assert films[0] - films[1] == pytest.approx(12 * np.pi * reduced * (1 / 0.5e-6 - 1 / 2e-6), rel=most)

@@ -12,7 +12,7 @@ from spirillum.fluid.tube.confined import held_in_tube
 from spirillum.fluid.tube.film import film_resistance
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.robot.outline import body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 A = 9.0
 LENGTHS = (75.0, 95.0)
@@ -32,8 +32,8 @@ def film(tube: float, gap: float) -> np.ndarray:
 
 
 def rest(tube: float, gap: float, tolerance: float) -> np.ndarray:
-    seat = Seat(tube, tube - A - gap, 0.0)
-    whole = per_length(lambda body: held_in_tube(Solids([(body, 0)], seat, Fineness(tolerance=tolerance)), []).matrix)
+    pose = TubePose(tube, tube - A - gap, 0.0)
+    whole = per_length(lambda body: held_in_tube(Solids([(body, 0)], pose, Fineness(tolerance=tolerance)), []).matrix)
     return whole - film(tube, gap)
 
 

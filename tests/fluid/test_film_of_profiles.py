@@ -13,7 +13,7 @@ from spirillum.fluid.tube.nodes import rings_of
 from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels.tube_table import clearance, contact_offset, smallest_gap
 from spirillum.robot.outline import Outline, body_outline, profile_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 TUBE, A = 20e-3, 9e-3
 
@@ -65,10 +65,10 @@ def test_gap_and_contact_are_those_of_the_outline(name: str, pitch: float, yaw: 
     outline = BODIES[name]
     body = FilmBody.of(outline)
     allowed = 6e-4 * A
-    seat = Seat.at_gap(outline, TUBE, 1e-3, pitch, yaw=yaw)
-    assert smallest_gap(head_of(body), seat.offset, pitch, yaw) == pytest.approx(1e-3, abs=allowed)
-    state, (along, up, right) = np.zeros(rigid_links.STATES), seat.rotation
-    state[2] = -seat.offset
+    pose = TubePose.at_gap(outline, TUBE, 1e-3, pitch, yaw=yaw)
+    assert smallest_gap(head_of(body), pose.offset, pitch, yaw) == pytest.approx(1e-3, abs=allowed)
+    state, (along, up, right) = np.zeros(rigid_links.STATES), pose.rotation
+    state[2] = -pose.offset
     flip = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # (x, up, right) to (x, left, up)
     rotation = np.ascontiguousarray(flip @ np.stack([along, up, right]) @ flip.T)
     normal, point, j = np.empty(3), np.empty(3), np.empty(7)
@@ -79,13 +79,13 @@ def test_gap_and_contact_are_those_of_the_outline(name: str, pitch: float, yaw: 
         assert TUBE - np.hypot(*touching[1:]) == pytest.approx(gaps[-1], abs=1e-12)
     assert min(gaps) == pytest.approx(1e-3, abs=allowed)
     if yaw == 0.0:
-        floor = Seat.at_gap(outline, TUBE, 0.0, pitch).offset
+        floor = TubePose.at_gap(outline, TUBE, 0.0, pitch).offset
         assert contact_offset(rings_of(outline), TUBE, pitch) == pytest.approx(floor, abs=allowed)
         lift = np.sin(pitch)
         depths = [
-            clearance(head_of(body), x, half, ring, ball, seat.offset, lift, 0.0) for x, ring, half, ball in body.rings
+            clearance(head_of(body), x, half, ring, ball, pose.offset, lift, 0.0) for x, ring, half, ball in body.rings
         ]
-        assert min(depths) == pytest.approx(floor - seat.offset, abs=2.0 * allowed)
+        assert min(depths) == pytest.approx(floor - pose.offset, abs=2.0 * allowed)
 
 
 @pytest.mark.parametrize("place", [(0.0101, 0.0, 0.0), (0.0098, 0.02, 0.01)])

@@ -31,7 +31,7 @@ from spirillum.kernels.tube_table import (
 )
 from spirillum.papers.biorob2012.published import paper_study
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.studies.study_loader import load_study
 
 LARGEST = {
@@ -57,8 +57,8 @@ def shipped(name: str) -> tuple[TubeTable, Places]:
     return table, Places(geometry, radius)
 
 
-def over_a_turn(table: TubeTable, seat: Seat) -> np.ndarray:
-    return np.stack([table.at(seat.offset, seat.pitch, seat.yaw, phase)[0] for phase in even_phases()])
+def over_a_turn(table: TubeTable, pose: TubePose) -> np.ndarray:
+    return np.stack([table.at(pose.offset, pose.pitch, pose.yaw, phase)[0] for phase in even_phases()])
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -77,11 +77,11 @@ def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
     assert image.geometry.hand == -1.0
     draw, sign = np.random.default_rng(5), MIRROR[:, None] * MIRROR
     for _ in range(20):
-        seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1.0, 1.0))
-        yaw = draw.uniform(-1.0, 1.0) * largest_yaw(table.packed, seat.offset, seat.pitch)
+        pose = places.pose_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1.0, 1.0))
+        yaw = draw.uniform(-1.0, 1.0) * largest_yaw(table.packed, pose.offset, pose.pitch)
         phase = draw.uniform(0.0, 2.0 * np.pi)
-        own, left = table.at(seat.offset, seat.pitch, yaw, phase)
-        other, image_left = image.at(seat.offset, seat.pitch, -yaw, np.pi - phase)
+        own, left = table.at(pose.offset, pose.pitch, yaw, phase)
+        other, image_left = image.at(pose.offset, pose.pitch, -yaw, np.pi - phase)
         scale = np.sqrt(np.diag(own))
         assert (left, image_left) == (INSIDE, INSIDE)
         assert np.abs((sign * other - own) / np.outer(scale, scale)).max() < 1e-10
@@ -110,11 +110,11 @@ def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None
     table, places = shipped(name)
     draw = np.random.default_rng(0)
     for _ in range(100):
-        seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
-        deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - seat.offset) if seat.pitch == 0 else 0.0
-        most = largest_yaw(table.packed, seat.offset + deeper, seat.pitch)
+        pose = places.pose_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
+        deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - pose.offset) if pose.pitch == 0 else 0.0
+        most = largest_yaw(table.packed, pose.offset + deeper, pose.pitch)
         yaw, phase = draw.uniform(-1, 1) * YAW_SLACK * most, draw.uniform(0, 2 * np.pi)
-        matrix, left = table.at(seat.offset + deeper, seat.pitch, yaw, phase)
+        matrix, left = table.at(pose.offset + deeper, pose.pitch, yaw, phase)
         scale = np.sqrt(np.diag(matrix))
         assert left == INSIDE
         assert np.array_equal(matrix, matrix.T)
@@ -126,10 +126,10 @@ def test_means_over_a_turn_need_no_more_phases(name: str) -> None:
     """Where the tail is nearest to the glass, too."""
     table, places = shipped(name)
     for t, f, yaw in ((0.1, 1.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.3, 1.0)):
-        seat = places.seat_between(t, f, yaw * places.largest_yaw(t, f))
+        pose = places.pose_between(t, f, yaw * places.largest_yaw(t, f))
         few, many = np.empty((8, 8)), np.empty((8, 8))
         for count, out in ((PHASES, few), (45, many)):
-            mean_resistance_at(table.packed, seat.offset, seat.pitch, seat.yaw, count, out)
+            mean_resistance_at(table.packed, pose.offset, pose.pitch, pose.yaw, count, out)
         scale = np.sqrt(np.diag(many))
         assert np.abs((few - many) / np.outer(scale, scale)).max() < 2e-6
 
@@ -151,7 +151,8 @@ def test_on_the_axis_raised_and_lowered_noses_are_mirror_images(name: str) -> No
     up, down = table.at(0.0, pitch, 0.0, 0.7)[0], table.at(0.0, -pitch, 0.0, 0.7 + np.pi)[0]
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
     assert np.all(
-        response_errors(sign[:, None] * down * sign, up, over_a_turn(table, Seat(places.radius, 0.0, pitch))) < allowed
+        response_errors(sign[:, None] * down * sign, up, over_a_turn(table, TubePose(places.radius, 0.0, pitch)))
+        < allowed
     )
 
 
@@ -163,13 +164,13 @@ def test_on_the_axis_raised_and_lowered_noses_are_mirror_images(name: str) -> No
 def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: float, yaw: float, phase: float) -> None:
     table, places = shipped(name)
     g = places.geometry
-    seat = Seat.at_gap(g.body, places.radius, 1e-3 * gap, np.radians(pitch), yaw=np.radians(yaw))
-    found, left = table.at(seat.offset, seat.pitch, seat.yaw, phase)
+    pose = TubePose.at_gap(g.body, places.radius, 1e-3 * gap, np.radians(pitch), yaw=np.radians(yaw))
+    found, left = table.at(pose.offset, pose.pitch, pose.yaw, phase)
     assert left == INSIDE
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
-    standard, high = (matrix_of(solved(g, seat, Fineness(wire, 0.005), phase)) for wire in WIRES)
-    assert np.all((response_errors(found, standard, over_a_turn(table, seat)) < allowed)[1:])
-    assert response_errors(found, high, over_a_turn(table, seat))[0] < allowed[0]
+    standard, high = (matrix_of(solved(g, pose, Fineness(wire, 0.005), phase)) for wire in WIRES)
+    assert np.all((response_errors(found, standard, over_a_turn(table, pose)) < allowed)[1:])
+    assert response_errors(found, high, over_a_turn(table, pose))[0] < allowed[0]
 
 
 @pytest.mark.parametrize("wire", ["standard", pytest.param("high", marks=pytest.mark.slow)])
@@ -177,10 +178,10 @@ def test_a_yawed_place_agrees_with_the_flow_solved_for(wire: Accuracy) -> None:
     """To the right, where the nodes are those of the mirror image; far from the glass, where few modes do."""
     table, places = shipped("biorob2012-narrow")
     g = places.geometry
-    seat = Seat.at_gap(g.body, places.radius, 4e-3, np.radians(1.0), yaw=-np.radians(3.0))
-    found, left = table.at(seat.offset, seat.pitch, seat.yaw, 4.0)
+    pose = TubePose.at_gap(g.body, places.radius, 4e-3, np.radians(1.0), yaw=-np.radians(3.0))
+    found, left = table.at(pose.offset, pose.pitch, pose.yaw, 4.0)
     assert left == INSIDE
-    errors = response_errors(found, matrix_of(solved(g, seat, Fineness(wire, 0.1), 4.0)), over_a_turn(table, seat))
+    errors = response_errors(found, matrix_of(solved(g, pose, Fineness(wire, 0.1), 4.0)), over_a_turn(table, pose))
     if wire == "standard":
         assert np.all(errors[1:] < 5e-3)
     else:
@@ -190,9 +191,9 @@ def test_a_yawed_place_agrees_with_the_flow_solved_for(wire: Accuracy) -> None:
 def test_nose_down_nothing_is_said_beyond_the_last_node() -> None:
     """The glass does not end the pitch there, so that no slack is the tail's way to its contact."""
     table, places = shipped("biorob2012-wide")
-    seat = Seat.at_gap(places.geometry.body, places.radius, 0.72e-3, -np.radians(8.0))
-    assert table.at(seat.offset, seat.pitch)[1] == INSIDE
-    last, left = table.at(seat.offset, 1.05 * seat.pitch)
+    pose = TubePose.at_gap(places.geometry.body, places.radius, 0.72e-3, -np.radians(8.0))
+    assert table.at(pose.offset, pose.pitch)[1] == INSIDE
+    last, left = table.at(pose.offset, 1.05 * pose.pitch)
     assert left == TOO_FAR_PITCHED
     assert sp.predict("biorob2012-wide", placement={"gap": "0.72 mm", "pitch": "-8 deg"}).model.form == "table"
     assert np.isfinite(last).all()

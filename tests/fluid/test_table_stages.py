@@ -38,7 +38,7 @@ def solved_by(shipped: TubeTable, monkeypatch: pytest.MonkeyPatch) -> TubeTable:
         sides = {geometry.hand: table for table in (shipped, shipped.mirrored()) for geometry in [table.geometry]}
         return [
             [
-                np.stack([sides[g.hand].at(n.seat.offset, n.seat.pitch, n.seat.yaw, phase)[0] for phase in phases])
+                np.stack([sides[g.hand].at(n.pose.offset, n.pose.pitch, n.pose.yaw, phase)[0] for phase in phases])
                 for g, phases in n.tails
             ]
             for n in nodes
@@ -67,10 +67,10 @@ def errors_between_nodes(table: TubeTable, truth: TubeTable, *, yawed: bool) -> 
     for _ in range(60):
         t, f = float(np.exp(draw.uniform(np.log(places.gaps[0]), 0.0))), float(draw.uniform(-0.9, 0.95))
         yaw = float(draw.uniform(-0.9, 0.9)) * places.largest_yaw(t, f) if yawed else 0.0
-        seat = places.seat_between(t, f, yaw)
+        pose = places.pose_between(t, f, yaw)
         turn = 2.0 * np.pi * np.arange(9) / 9
         own, true = (
-            np.stack([one.at(seat.offset, seat.pitch, seat.yaw, phase)[0] for phase in turn]) for one in (table, truth)
+            np.stack([one.at(pose.offset, pose.pitch, pose.yaw, phase)[0] for phase in turn]) for one in (table, truth)
         )
         worst = np.maximum(worst, response_errors(own[4], true[4], true))
     return dict(zip(RESPONSES, worst.tolist(), strict=True))

@@ -16,7 +16,7 @@ from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
 from spirillum.kernels.stokes_flow import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 
 def ball(x: float, radius: float) -> Outline:
@@ -51,7 +51,7 @@ def near(wire: Wire) -> np.ndarray:
 @lru_cache(maxsize=8)
 def swimmer(pitch: float, accuracy: Literal["standard", "high"]) -> Held:
     wire = coil()
-    solids = Solids([(ball(0.0, 0.4), 0)], Seat(1.0, 0.1, pitch), Fineness(accuracy, tolerance=1e-4), near(wire))
+    solids = Solids([(ball(0.0, 0.4), 0)], TubePose(1.0, 0.1, pitch), Fineness(accuracy, tolerance=1e-4), near(wire))
     return held_in_tube(solids, [(wire, 1)])
 
 
@@ -77,7 +77,7 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
     """Rings about a pitched axis, other waves and other modes: in the tube's axes the same matrix and load."""
     fineness = Fineness(tolerance=1e-4, order=8)
     level, pitched = (
-        held_in_tube(Solids([(ball(0.0, 0.4), 0)], Seat(1.0, 0.4, p), fineness), []) for p in (0.0, pitch)
+        held_in_tube(Solids([(ball(0.0, 0.4), 0)], TubePose(1.0, 0.4, p), fineness), []) for p in (0.0, pitch)
     )
     turn = in_tube_axes(pitch)
     matrix = turn @ pitched.matrix[:6, :6] @ turn.T
@@ -104,7 +104,7 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
 def test_a_capsule_that_is_hardly_pitched_is_level(offset: float, tolerance: float, allowed: float) -> None:
     """On rings that meet every wave by themselves, however coarsely waves are cut; also over a thin film."""
     level, hardly = (
-        held_in_tube(Solids([(capsule(), 0)], Seat(1.0, offset, pitch), Fineness(tolerance=tolerance)), [])
+        held_in_tube(Solids([(capsule(), 0)], TubePose(1.0, offset, pitch), Fineness(tolerance=tolerance)), [])
         for pitch in (0.0, 1e-9)
     )
     np.testing.assert_allclose(thirteen(hardly, 6), thirteen(level, 6), atol=allowed)
@@ -114,7 +114,9 @@ def test_a_capsule_that_is_hardly_pitched_is_level(offset: float, tolerance: flo
 def test_a_pitched_capsule() -> None:
     """Symmetric, positive, even in the pitch on the axis."""
     fineness = Fineness(tolerance=1e-3)
-    up, down = (held_in_tube(Solids([(capsule(), 0)], Seat(1.0, 0.0, pitch), fineness), []) for pitch in (0.12, -0.12))
+    up, down = (
+        held_in_tube(Solids([(capsule(), 0)], TubePose(1.0, 0.0, pitch), fineness), []) for pitch in (0.12, -0.12)
+    )
     assert np.linalg.eigvalsh(thirteen(up, 6))[0] > 0.002
     assert up.asymmetry < 2e-4
     mirror = np.array([1, 1, -1, -1, -1, 1, 1.0])  # z to -z: the nose falls instead of rising
@@ -122,7 +124,7 @@ def test_a_pitched_capsule() -> None:
     assert abs(thirteen(up, 6)[0, 2]) > 0.01  # what moves along its pitched axis drifts
 
 
-def velocities(found: Held, targets: np.ndarray, seat: Seat, blob2: np.ndarray) -> np.ndarray:
+def velocities(found: Held, targets: np.ndarray, pose: TubePose, blob2: np.ndarray) -> np.ndarray:
     """Of everything in the tube, summed as point forces: modes become tractions on rings, the wall reflects them.
 
     Stations of wires, squares of blob radii `blob2`, feel others as those feel them; other targets have 0.
@@ -161,13 +163,13 @@ def velocities(found: Held, targets: np.ndarray, seat: Seat, blob2: np.ndarray) 
     r = np.sqrt(np.sum(d**2, axis=-1) + e2)
     dot = np.einsum("tsi,sik->tsk", d, forces)
     total = np.einsum("ts,sik->tik", 1 / r + e2 / r**3, forces) + np.einsum("tsi,ts,tsk->tik", d, r**-3, dot)
-    placed = [seat.placed(points) for points in (targets, sources)]
-    lowest = [seat.radius - np.max(np.hypot(points[:, 1], points[:, 2])) for points in placed]
+    placed = [pose.placed(points) for points in (targets, sources)]
+    lowest = [pose.radius - np.max(np.hypot(points[:, 1], points[:, 2])) for points in placed]
     both = np.concatenate(placed)
-    waves = waves_between(seat.radius, float(np.ptp(both[:, 0])), float(np.mean(lowest)), 1e-5)
-    turned = np.einsum("ij,sjk->sik", seat.rotation, forces)
+    waves = waves_between(pose.radius, float(np.ptp(both[:, 0])), float(np.mean(lowest)), 1e-5)
+    turned = np.einsum("ij,sjk->sik", pose.rotation, forces)
     back = _reflected(placed[0], placed[1], turned, waves)
-    total -= np.einsum("ij,tik->tjk", seat.rotation, back)
+    total -= np.einsum("ij,tik->tjk", pose.rotation, back)
     result: np.ndarray = total / (8 * np.pi)
     return result
 
@@ -189,7 +191,7 @@ def test_no_slip_of_the_whole_flow(pitch: float) -> None:
     The flow is summed in space, with no modes and no elimination. In the flow that is held back it is that flow.
     """
     found = swimmer(pitch, "standard")
-    seat = found.strengths.solids.seat  # type: ignore[union-attr]
+    pose = found.strengths.solids.pose  # type: ignore[union-attr]
     wire = found.strengths.wires[0]
     picked = wire.points[:: max(1, len(wire.points) // 6)]
     inside = 0.16 * np.array([[0, 0, 0], [1.0, 0, 0], [0, -1, 0], [0.3, 0.4, 0.8], [-0.6, 0.2, -0.7]])
@@ -200,11 +202,11 @@ def test_no_slip_of_the_whole_flow(pitch: float) -> None:
             unit = np.eye(3)[i]
             wanted[rows, :, first + i] = unit
             wanted[rows, :, first + 3 + i] = np.cross(unit, targets[rows])
-    placed = seat.placed(targets)
+    placed = pose.placed(targets)
     speed = 2 - 2 * np.sum(placed[:, 1:] ** 2, axis=1)
-    wanted[:, :, 12] = speed[:, None] * seat.rotation[0]
+    wanted[:, :, 12] = speed[:, None] * pose.rotation[0]
     blob2 = np.repeat([0.0, wire.blob**2], [len(inside), len(picked)])
-    errors = np.abs(velocities(found, targets, seat, blob2) - wanted)
+    errors = np.abs(velocities(found, targets, pose, blob2) - wanted)
     assert np.max(errors[: len(inside)]) < 2e-4
     assert np.max(errors[len(inside) :]) < 2e-3  # the line of forces is corrected for the wire's thickness
 
@@ -227,7 +229,7 @@ def test_in_a_wide_tube_nothing_is_confined(accuracy: Literal["standard", "high"
     errors = []
     for radius in (50.0, 200.0):
         found = held_in_tube(
-            Solids([(solid, 0)], Seat(radius, 0.0), Fineness(accuracy, tolerance=1e-6), near(wire)), [(wire, 1)]
+            Solids([(solid, 0)], TubePose(radius, 0.0), Fineness(accuracy, tolerance=1e-6), near(wire)), [(wire, 1)]
         )
         errors.append(np.max(np.abs(found.matrix - free) / scale))
     assert errors[1] < 0.01
@@ -238,7 +240,7 @@ def slopes(radius: float, offset: float, shorter: float = 4.0, tolerance: float 
     """Straight wires, one longer by 1, at an offset below the axis of a tube of radius 1, far from a ball."""
     short, long = (
         held_in_tube(
-            Solids([(ball(-3.0 - 0.5 * length, 0.3), 0)], Seat(1.0, 0.0), Fineness(tolerance=tolerance)),
+            Solids([(ball(-3.0 - 0.5 * length, 0.3), 0)], TubePose(1.0, 0.0), Fineness(tolerance=tolerance)),
             [(straight(0.0, length, radius), 1)],
             offset,
         )
@@ -293,7 +295,7 @@ def test_a_wire_near_the_glass_against_a_cylinder_resolved() -> None:
     short, long = slopes(b, offset)
     bodies = [body_outline("capsule", 2 * b, length, 0.0, "hemisphere", "hemisphere") for length in (2.0, 3.0)]
     fineness = Fineness(tolerance=1e-2)
-    solid = [held_in_tube(Solids([(body, 0)], Seat(1.0, offset), fineness), []).matrix for body in bodies]
+    solid = [held_in_tube(Solids([(body, 0)], TubePose(1.0, offset), fineness), []).matrix for body in bodies]
     for i, error in ((0, 0.04), (1, 0.07), (2, 0.15)):
         wanted = solid[1][i, i] - solid[0][i, i]
         np.testing.assert_allclose(long.matrix[6 + i, 6 + i] - short.matrix[6 + i, 6 + i], wanted, rtol=error)
@@ -304,7 +306,7 @@ def test_a_lowered_tail_turns_about_its_own_axis() -> None:
     wire, solid = coil(), ball(0.0, 0.4)
     drop = np.array([0.0, 0.0, -0.3])
     lowered = Wire(wire.points + drop, wire.tangents, wire.lengths, wire.radius)
-    solids = Solids([(solid, 0)], Seat(1.0, 0.2), Fineness(tolerance=1e-4), near(wire))
+    solids = Solids([(solid, 0)], TubePose(1.0, 0.2), Fineness(tolerance=1e-4), near(wire))
     dropped, built = held_in_tube(solids, [(wire, 1)], 0.3), held_in_tube(solids, [(lowered, 1)])
     shift = np.eye(12)
     shift[6:9, 9:] = [[0, -drop[2], drop[1]], [drop[2], 0, -drop[0]], [-drop[1], drop[0], 0]]
@@ -315,11 +317,11 @@ def test_a_lowered_tail_turns_about_its_own_axis() -> None:
     assert dropped.matrix[8, 8] > 1.1 * level.matrix[8, 8]  # nearer to the wall
 
 
-LEVEL, PITCHED, YAWED = Seat(1.0, 0.2), Seat(1.0, 0.15, 0.1), Seat(1.0, 0.15, -0.05, yaw=0.1)
+LEVEL, PITCHED, YAWED = TubePose(1.0, 0.2), TubePose(1.0, 0.15, 0.1), TubePose(1.0, 0.15, -0.05, yaw=0.1)
 
 
 @pytest.mark.parametrize(
-    ("accuracy", "seat"),
+    ("accuracy", "pose"),
     [
         ("high", LEVEL),
         ("standard", PITCHED),
@@ -330,9 +332,9 @@ LEVEL, PITCHED, YAWED = Seat(1.0, 0.2), Seat(1.0, 0.15, 0.1), Seat(1.0, 0.15, -0
         ),
     ],
 )
-def test_reduced_basis_against_all_fields(seat: Seat, accuracy: Literal["standard", "high"]) -> None:
+def test_reduced_basis_against_all_fields(pose: TubePose, accuracy: Literal["standard", "high"]) -> None:
     """What a coil sends to a body that it nearly touches, at a phase that is not in the basis: field by field."""
-    solids = Solids([(ball(0.0, 0.4), 0)], seat, Fineness(accuracy, tolerance=1e-4), near(coil()))
+    solids = Solids([(ball(0.0, 0.4), 0)], pose, Fineness(accuracy, tolerance=1e-4), near(coil()))
     wire = turned(coil(), 1.0)
     found = held_in_tube(solids, [(wire, 1)])
     inner = Wire(
@@ -344,9 +346,9 @@ def test_reduced_basis_against_all_fields(seat: Seat, accuracy: Literal["standar
     assert isinstance(kept, list)
     (reduced,) = kept
     assert isinstance(reduced, Reduced)
-    placed = seat.placed(inner.points)
-    along = np.kron(np.eye(len(placed)), seat.rotation)
-    away = float(np.min(seat.distances(sources.x, sources.rho)))
+    placed = pose.placed(inner.points)
+    along = np.kron(np.eye(len(placed)), pose.rotation)
+    away = float(np.min(pose.distances(sources.x, sources.rho)))
     wall = solids.rings.sent(reduced.waves, solids.systems, placed, along, away)
     free: list[list[np.ndarray]] = [[], []]
     for m, cross in enumerate(_unbounded(solids, sources)):
@@ -371,7 +373,7 @@ def test_a_wire_alone_against_a_dense_matrix() -> None:
     wire = straight(-1.3, 1.2, 0.02)
     drag = []
     for solids in ([], [(ball(4.0, 0.4), 0)]):
-        found = held_in_tube(Solids(solids, Seat(1.0, 0.0), Fineness(tolerance=1e-8)), [(wire, 1)])
+        found = held_in_tube(Solids(solids, TubePose(1.0, 0.0), Fineness(tolerance=1e-8)), [(wire, 1)])
         drag.append(found.matrix[6:9, 6:9])
     waves = waves_between(1.0, float(np.ptp(wire.points[:, 0])), 1.0, 1e-8)
     count = len(wire.points)

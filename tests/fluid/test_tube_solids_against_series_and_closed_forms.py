@@ -13,7 +13,7 @@ from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.outline import Outline, body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 REFERENCE = json.loads((BENCHMARKS / "tube_reference.json").read_text(encoding="utf-8"))
@@ -36,7 +36,7 @@ def capsule(length: float, rear: Any = "hemisphere") -> Outline:
 def held(outline: Outline, radius: float, gap: float | None, fineness: Fineness, size: float = 9.0) -> Held:
     """A body of radius `size` at a gap from the floor; None: on the axis."""
     offset = 0.0 if gap is None else radius - size - gap
-    return held_in_tube(Solids([(outline, 0)], Seat(radius, offset), fineness), [])
+    return held_in_tube(Solids([(outline, 0)], TubePose(radius, offset), fineness), [])
 
 
 def thirteen(found: Held) -> np.ndarray:

@@ -41,7 +41,7 @@ from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.tube_table import film_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 R = 0.02
 
@@ -215,16 +215,16 @@ def test_beyond_the_last_node_the_yaw_goes_on_by_its_tangent(places: Places, fil
 def test_contact_offset_is_where_the_body_touches(shape: tuple, pitch: float) -> None:
     outline = body_outline(shape[0], 0.018, 0.044, 0.003, shape[1], shape[2])
     offset = kernel.contact_offset(rings_of(outline), R, pitch)
-    assert Seat(R, offset, pitch).clearance(outline) == pytest.approx(0.0, abs=1e-8)
+    assert TubePose(R, offset, pitch).clearance(outline) == pytest.approx(0.0, abs=1e-8)
 
 
 def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
     wire = places.geometry.wire()
     for row, t in enumerate(places.gaps):
         for f in (-1.0, 1.0):
-            seat = places.seat(float(t), f)
-            assert seat.tail_clearance(wire.points, wire.radius).clearance > 0.7 * wire.radius
-            assert seat.clearance(places.geometry.body) > 0
+            pose = places.pose(float(t), f)
+            assert pose.tail_clearance(wire.points, wire.radius).clearance > 0.7 * wire.radius
+            assert pose.clearance(places.geometry.body) > 0
         assert places.most[row].min() > 0
 
 
@@ -234,9 +234,9 @@ def test_largest_yaw_is_where_the_tail_nears_the_glass(geometry: RobotGeometry, 
     """Between its nodes, too, nose up and down: to 0.1 degrees."""
     places = places_in(geometry, radius)
     for f in (-0.9, -0.25, 0.0, 0.1, 0.6):
-        seat = places.seat_between(t, f, places.largest_yaw(t, f))
+        pose = places.pose_between(t, f, places.largest_yaw(t, f))
         for turned, sign in ((-0.1, 1.0), (0.1, -1.0)):
-            near = replace(seat, yaw=seat.yaw + np.radians(turned))
+            near = replace(pose, yaw=pose.yaw + np.radians(turned))
             assert sign * (places.tail_clearance(near) - places.least_clearance) > 0
 
 
@@ -244,7 +244,7 @@ def test_largest_yaw_is_where_the_tail_nears_the_glass(geometry: RobotGeometry, 
 def test_yawed_places_keep_the_tail_off_the_glass(geometry: RobotGeometry, radius: float) -> None:
     yawed, wire = places_in(geometry, radius), geometry.wire()
     clear = [
-        yawed.seat(float(t), float(f), float(most)).tail_clearance(wire.points, wire.radius).clearance
+        yawed.pose(float(t), float(f), float(most)).tail_clearance(wire.points, wire.radius).clearance
         for t, row in zip(yawed.yaw_gaps, yawed.most_yaw, strict=True)
         for f, most in zip(yawed.yaw_pitches, row, strict=True)
     ]
@@ -272,7 +272,7 @@ def test_as_many_phases_as_it_has_coefficients_give_a_function_of_the_phase_back
 def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
     """A factor of three harmonics and its film, from seven phases; five are not enough."""
     planted = 0.3 * np.random.default_rng(8).normal(size=(7, kernel.PARAMETERS))
-    film, seat = np.diag(np.arange(1.0, 7.0)), Seat(R, 0.004, 0.0)
+    film, pose = np.diag(np.arange(1.0, 7.0)), TubePose(R, 0.004, 0.0)
 
     def full(phase: float) -> np.ndarray:
         factor = lower(planted, phase)
@@ -281,7 +281,7 @@ def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
         return matrix
 
     for count, enough in ((5, False), (7, True), (PHASES, True)):
-        found = rest_at(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, seat)
+        found = rest_at(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, pose)
         assert found.shape == (PHASES, kernel.PARAMETERS)
         back = matrices_at(found, np.array([1.234]))[0]
         back[:6, :6] += kernel.cut_of_film(0.3) * film
@@ -431,8 +431,8 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
     coarse = Fineness("standard", 0.05, order=4)
     short = geometry._replace(coupling_diameter=0.0, tail_length=0.02)
     tails = [short._replace(wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
-    seat, elsewhere = Seat(R, 0.0), Seat(R, 0.002)
-    want = [NodeSolution(((tail, (0.4,)),), seat, coarse) for tail in tails]
+    pose, elsewhere = TubePose(R, 0.0), TubePose(R, 0.002)
+    want = [NodeSolution(((tail, (0.4,)),), pose, coarse) for tail in tails]
     told: list[int] = []
     together = solutions(
         [want[0], NodeSolution(((tails[0], (0.1,)),), elsewhere, coarse), want[1]],
@@ -454,7 +454,7 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
     coarse = Fineness("standard", 0.05, order=4)
     tail = geometry._replace(coupling_diameter=0.0, tail_length=0.02, wavelength=0.02)
-    one, more = (NodeSolution(((tail, phases),), Seat(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
+    one, more = (NodeSolution(((tail, phases),), TubePose(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
     assert not all_kept([one])
     tube._answer.cache_clear()
     solutions([one], "a place", workers=1)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.special import exp1
 
 from spirillum.fluid.tube.wall import point_reflection, point_waves, waves_between
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 EULER = 0.5772156649015329
 
@@ -118,15 +118,15 @@ def test_waves_that_are_left_out_are_damped() -> None:
     assert min(errors) > 1e-3  # and no more waves than it takes
 
 
-def test_seats() -> None:
-    """A seat's rotation, places and distances by hand."""
-    seat = Seat(2.0, 0.5, 0.3)
+def test_poses() -> None:
+    """A pose's rotation, places and distances by hand."""
+    pose = TubePose(2.0, 0.5, 0.3)
     c, s = np.cos(0.3), np.sin(0.3)
-    np.testing.assert_allclose(seat.placed(np.array([[1.0, 0.0, 0.0]])), [[c, s - 0.5, 0.0]])
-    np.testing.assert_allclose(seat.placed(np.array([[0.0, 1.0, 2.0]])), [[-s, c - 0.5, 2.0]])
-    found = seat.distances(np.array([0.0]), np.array([0.4]))
+    np.testing.assert_allclose(pose.placed(np.array([[1.0, 0.0, 0.0]])), [[c, s - 0.5, 0.0]])
+    np.testing.assert_allclose(pose.placed(np.array([[0.0, 1.0, 2.0]])), [[-s, c - 0.5, 2.0]])
+    found = pose.distances(np.array([0.0]), np.array([0.4]))
     theta = np.linspace(0, 2 * np.pi, 20001)
-    ring = seat.placed(np.stack([0 * theta, 0.4 * np.cos(theta), 0.4 * np.sin(theta)], axis=1))
+    ring = pose.placed(np.stack([0 * theta, 0.4 * np.cos(theta), 0.4 * np.sin(theta)], axis=1))
     np.testing.assert_allclose(found, 2.0 - np.max(np.hypot(ring[:, 1], ring[:, 2])), rtol=1e-6)
 
 

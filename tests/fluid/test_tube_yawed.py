@@ -10,7 +10,7 @@ from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.robot.outline import Arc, Outline, body_outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 BODIES = {
     "ball": Outline((Arc((0.0, 0.0), (0.4, 0.4), (0.0, np.pi)),), ()),
@@ -31,10 +31,10 @@ def coil(phase: float = 0.0, hand: float = 1.0) -> Wire:
 
 
 @lru_cache(maxsize=4)
-def solids(body: str, seat: Seat, fineness: Fineness) -> Solids:
+def solids(body: str, pose: TubePose, fineness: Fineness) -> Solids:
     wire = coil()
     near = np.stack([wire.points[:, 0], np.hypot(*wire.points[:, 1:].T), np.full(len(wire.points), wire.blob)], axis=1)
-    return Solids([(BODIES[body], 0)], seat, fineness, near)
+    return Solids([(BODIES[body], 0)], pose, fineness, near)
 
 
 def thirteen(found: Held) -> np.ndarray:
@@ -45,9 +45,9 @@ def thirteen(found: Held) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def robot(body: str, seat: Seat, phase: float = 0.7, hand: float = 1.0, fineness: Fineness = COARSE) -> np.ndarray:
+def robot(body: str, pose: TubePose, phase: float = 0.7, hand: float = 1.0, fineness: Fineness = COARSE) -> np.ndarray:
     """R, load and drag in body axes."""
-    return thirteen(held_in_tube(solids(body, seat, fineness), [(coil(phase, hand), 1)]))
+    return thirteen(held_in_tube(solids(body, pose, fineness), [(coil(phase, hand), 1)]))
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
@@ -71,16 +71,16 @@ def in_other_axes(matrix: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 )
 def test_mirror_image(body: str, pitch: float, yaw: float) -> None:
     """Yaw, phase and hand mirrored: so is everything."""
-    one = robot(body, Seat(1.0, 0.1, pitch, yaw=yaw), 0.7)
-    other = robot(body, Seat(1.0, 0.1, pitch, yaw=-yaw), np.pi - 0.7, -1.0)
+    one = robot(body, TubePose(1.0, 0.1, pitch, yaw=yaw), 0.7)
+    other = robot(body, TubePose(1.0, 0.1, pitch, yaw=-yaw), np.pi - 0.7, -1.0)
     assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-8
 
 
 @pytest.mark.parametrize("body", ROUND_AND_EDGED)
 def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
     """Two decoupled systems against the coupled one: nose up and the tail at phi, nose to the left at phi + 90 deg."""
-    pitched = robot(body, Seat(1.0, 0.0, -0.12), 0.7)
-    yawed = robot(body, Seat(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi)
+    pitched = robot(body, TubePose(1.0, 0.0, -0.12), 0.7)
+    yawed = robot(body, TubePose(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi)
     quarter = axis_rotation(np.array([0.5 * np.pi]))[0]  # z to -y
     np.testing.assert_allclose(quarter @ [0, 0, 1], [0, -1, 0], atol=1e-15)
     assert difference(yawed, in_other_axes(pitched, quarter)) < 1e-8
@@ -88,8 +88,8 @@ def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
 
 def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
     """Offset and pitch in one vertical plane: from 180 degrees further, above the axis and pitched the other way."""
-    below = robot("ball", Seat(1.0, 0.1, 0.1, yaw=0.15), 0.7)
-    above = robot("ball", Seat(1.0, -0.1, -0.1, yaw=-0.15), 0.7 + np.pi)
+    below = robot("ball", TubePose(1.0, 0.1, 0.1, yaw=0.15), 0.7)
+    above = robot("ball", TubePose(1.0, -0.1, -0.1, yaw=-0.15), 0.7 + np.pi)
     half = axis_rotation(np.array([np.pi]))[0]
     assert difference(below, in_other_axes(above, half)) < 1e-8
 
@@ -97,7 +97,7 @@ def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
 @pytest.mark.parametrize("body", [pytest.param("ball", marks=pytest.mark.slow), "capsule"])
 def test_reciprocal_and_positive(body: str) -> None:
     """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
-    found = held_in_tube(solids(body, Seat(1.0, 0.2, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
+    found = held_in_tube(solids(body, TubePose(1.0, 0.2, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
     whole = thirteen(found)
     scale = np.sqrt(np.diag(whole))
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
@@ -111,15 +111,15 @@ def test_reciprocal_and_positive(body: str) -> None:
 )
 def test_continuous_where_the_yaw_goes_to_zero(body: str, pitch: float, yaw: float, error: float) -> None:
     """Pitched, and level on rings that meet every wave by themselves."""
-    straight, hardly = (robot(body, Seat(1.0, 0.1, pitch, yaw=angle)) for angle in (0.0, yaw))
+    straight, hardly = (robot(body, TubePose(1.0, 0.1, pitch, yaw=angle)) for angle in (0.0, yaw))
     assert difference(straight, hardly) < error
 
 
 def test_a_sphere_does_not_feel_its_yaw() -> None:
     fineness, ball = Fineness(tolerance=1e-4, order=8), [(BODIES["ball"], 0)]
-    level = thirteen(held_in_tube(Solids(ball, Seat(1.0, 0.3), fineness), []))
-    seat = Seat(1.0, 0.3, -0.2, yaw=0.3)
-    yawed = thirteen(held_in_tube(Solids(ball, seat, fineness), []))
+    level = thirteen(held_in_tube(Solids(ball, TubePose(1.0, 0.3), fineness), []))
+    pose = TubePose(1.0, 0.3, -0.2, yaw=0.3)
+    yawed = thirteen(held_in_tube(Solids(ball, pose, fineness), []))
     c, s, cos, sin = np.cos(0.2), np.sin(-0.2), np.cos(0.3), np.sin(0.3)
     to_place = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
     scale = np.sqrt(np.diag(level))
@@ -131,7 +131,7 @@ def test_a_sphere_does_not_feel_its_yaw() -> None:
 
 @pytest.mark.slow
 def test_convergence_with_fineness() -> None:
-    place = Seat(1.0, 0.35, 0.1, yaw=0.1)
+    place = TubePose(1.0, 0.35, 0.1, yaw=0.1)
     coarse, fine, finest = (
         robot("capsule", place, fineness=Fineness(tolerance=tolerance)) for tolerance in (3e-3, 3e-4, 1e-4)
     )
@@ -141,10 +141,10 @@ def test_convergence_with_fineness() -> None:
 
 def test_several_tails_against_one_factorisation() -> None:
     """A table's way: solids once, any tail at any phase."""
-    seat = Seat(1.0, 0.1, 0.1, yaw=0.15)
-    shared = solids("ball", seat, COARSE)
+    pose = TubePose(1.0, 0.1, 0.1, yaw=0.15)
+    shared = solids("ball", pose, COARSE)
     held_in_tube(shared, [(coil(), 1)])
-    alone = Solids([(BODIES["ball"], 0)], seat, shared.fineness, np.array([[-0.7, 0.15, coil().blob]]))
+    alone = Solids([(BODIES["ball"], 0)], pose, shared.fineness, np.array([[-0.7, 0.15, coil().blob]]))
     one, other = (thirteen(held_in_tube(s, [(coil(2.0, -1.0), 1)])) for s in (shared, alone))
     assert difference(one, other) < 1e-3
     assert len(shared.factors) == 1

@@ -14,7 +14,7 @@ from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.band import TOLERANCE, at_pose, band_poses, left_open
 from spirillum.swimming.steady import Swimming
 
@@ -61,9 +61,9 @@ def test_steepest_place_keeps_the_film_that_is_resolved(walled: Any) -> None:
     g = RobotGeometry.of(RobotBatch.of(sp.load(WIDE)))
     wire = g.wire()
     for place in places(walled)[2::3]:
-        seat = Seat.at_gap(g.body, RADIUS, place.gap or 0.0, place.pitch or 0.0)
-        assert seat.clearance(g.body) == pytest.approx(place.gap)
-        clear = seat.tail_clearance(wire.points, wire.radius).clearance
+        pose = TubePose.at_gap(g.body, RADIUS, place.gap or 0.0, place.pitch or 0.0)
+        assert pose.clearance(g.body) == pytest.approx(place.gap)
+        clear = pose.tail_clearance(wire.points, wire.radius).clearance
         assert WIRE_FILM * wire.radius <= clear < (WIRE_FILM + 0.2) * wire.radius
 
 

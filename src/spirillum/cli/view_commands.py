@@ -151,7 +151,7 @@ def flow(
     from spirillum.cli import renderer
     from spirillum.fields.flow import box_around, flow_answer, plane_around, seat_in_tube
     from spirillum.files import guard_inputs
-    from spirillum.fluid.tube.domain import seat_of
+    from spirillum.fluid.tube.domain import pose_of
     from spirillum.results.flow import check_targets, write_flow
 
     with guard_inputs(run):
@@ -173,7 +173,7 @@ def flow(
         if time is None:
             raise InputError("no moment of the run; allowed: --time, such as 0.5s")
         moment = moment_of_run(run, time, fineness).prediction
-        loaded, seat = moment.robot, seat_of(moment.batch)
+        loaded, seat = moment.robot, pose_of(moment.batch)
     plane_around(loaded, plane, offset, extent, resolution, seat)
     if volume is not None:
         box_around(loaded, extent, volume_resolution, seat)

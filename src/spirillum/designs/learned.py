@@ -27,7 +27,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
-from spirillum.fluid.tube.domain import seat_limits
+from spirillum.fluid.tube.domain import pose_limits
 from spirillum.fluid.wire.slender import Slender
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold
@@ -146,7 +146,7 @@ class LearnedTube(Corrected):
     name = "tube"
 
     def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        return seat_limits(batch, "robot", Slender().part_domain(batch, "robot"))
+        return pose_limits(batch, "robot", Slender().part_domain(batch, "robot"))
 
 
 class LearnedSlender(Corrected):

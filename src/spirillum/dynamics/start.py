@@ -19,7 +19,7 @@ from spirillum.robot.geometry import Channel
 from spirillum.robot.links import outlines_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.tube_pose import GAP_SHARE, Seat, gap_of, largest_gap
+from spirillum.robot.tube_pose import GAP_SHARE, TubePose, gap_of, largest_gap
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
 
@@ -33,7 +33,7 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
     state[ATTITUDE], state[ATTITUDE + 2] = np.cos(0.5 * pitch), -np.sin(0.5 * pitch)
     if robot.channel is None:
         return state
-    state[POSITION + 2] = -_seat(robot, placement, robot.channel, lying=lying).offset
+    state[POSITION + 2] = -_pose(robot, placement, robot.channel, lying=lying).offset
     return state
 
 
@@ -61,20 +61,20 @@ def _check(robot: Robot, placement: Placement) -> None:
         raise InputError(f"placement.{name} is set, but the robot has no channel; allowed: a pitch, or a [channel]")
 
 
-def _seat(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) -> Seat:
+def _pose(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) -> TubePose:
     robot.check_body("motion beside the wall of a channel, with lubrication films,", ", or channel = 'none'")
     radius, body, pitch = 0.5 * channel.diameter, outlines_of(robot)["body"], placement.pitch or 0.0
     if placement.eccentricity is not None:
-        return Seat.of(placement, body, robot.body.diameter, radius)
+        return TubePose.of(placement, body, robot.body.diameter, radius)
     most = largest_gap(body, radius, pitch)
     if placement.gap is not None and placement.gap > most:
         raise InputError(f"placement.gap = {show(placement.gap, 'mm')}; allowed: at most {show(most, 'mm')}")
     if placement.gap is None and not lying:
-        pose = Seat(radius, 0.0, pitch)
+        pose = TubePose(radius, 0.0, pitch)
         fits = pose.clearance(body) > 0
     else:
         gap = min(gap_of(placement, robot.body.diameter, radius), most)
-        pose = Seat.at_gap(body, radius, gap, pitch)
+        pose = TubePose.at_gap(body, radius, gap, pitch)
         fits = bool(np.isfinite(pose.offset))
     if not fits:
         raise InputError(f"placement.pitch = {show(pitch, 'deg')}: the body does not fit; allowed: a smaller pitch")
@@ -222,7 +222,7 @@ def state_at(start: InitialPose, offset: float) -> Samples:
 def _offset(robot: Robot, start: InitialPose, gap: float, radius: float) -> float:
     """Offset at which the body's smallest gap is `gap`, m."""
     body = outlines_of(robot)["body"]
-    offset = Seat.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
+    offset = TubePose.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
     if not offset >= -1e-12 * radius:
         most = max(largest_gap(body, radius, start.pitch, start.yaw), 0.0)
         raise InputError(

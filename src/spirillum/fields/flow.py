@@ -18,14 +18,14 @@ from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fields.fluid_field import FluidField, flow_field
 from spirillum.fields.grid import PLANES, PointGrid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fields.in_tube import tube_flow_field
-from spirillum.fluid.tube.domain import seat_of
+from spirillum.fluid.tube.domain import pose_of
 from spirillum.notes import Note, note_attributes
 from spirillum.quantities import unit_of
 from spirillum.robot.load import load
 from spirillum.robot.model_options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import prepared
@@ -76,7 +76,7 @@ class Flow(DisplayMixin):
         return self.prediction.robot
 
     @property
-    def seat(self) -> Seat | None:
+    def seat(self) -> TubePose | None:
         """The tube and the robot's pose in it; None for unbounded fluid."""
         return _seat(self.prediction)
 
@@ -300,8 +300,8 @@ def _field(prediction: Prediction, phase: float) -> FluidField:
     return tube_flow_field(prediction.batch, body, rotor, phase, prediction.plug_velocity)
 
 
-def _seat(prediction: Prediction) -> Seat | None:
-    return seat_of(prediction.batch) if prediction.model.name == "tube" else None
+def _seat(prediction: Prediction) -> TubePose | None:
+    return pose_of(prediction.batch) if prediction.model.name == "tube" else None
 
 
 def seat_in_tube(
@@ -309,12 +309,12 @@ def seat_in_tube(
     model: str,
     placement: Placement | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
-) -> Seat | None:
+) -> TubePose | None:
     """The tube and the robot's pose in it, before anything is solved; None with the model `slender`."""
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
         return None
-    return seat_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
+    return pose_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
 
 
 def plane_around(
@@ -323,7 +323,7 @@ def plane_around(
     offset: str | float = 0.0,
     extent: str | float | None = None,
     resolution: int = PLANE_RESOLUTION,
-    seat: Seat | None = None,
+    seat: TubePose | None = None,
 ) -> PointGrid:
     """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     plane = "".join(sorted(str(plane)))
@@ -333,7 +333,7 @@ def plane_around(
 
 
 def box_around(
-    robot: Robot, extent: str | float | None = None, resolution: int = VOLUME_RESOLUTION, seat: Seat | None = None
+    robot: Robot, extent: str | float | None = None, resolution: int = VOLUME_RESOLUTION, seat: TubePose | None = None
 ) -> PointGrid:
     """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it."""
     return volume_grid(robot, _margin(extent), resolution, seat)

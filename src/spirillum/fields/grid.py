@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, check_range
 from spirillum.robot.robot import Robot
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class PointGrid:
 
 
 def plane_grid(
-    robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: Seat | None = None
+    robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: TubePose | None = None
 ) -> PointGrid:
     """A grid on one of `PLANES`."""
     box, across = _box(robot, margin, seat), PLANES[plane]
@@ -71,12 +71,12 @@ def plane_grid(
     return _grid(sides, {across: np.array([offset])}, resolution, "resolution")
 
 
-def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> PointGrid:
+def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: TubePose | None = None) -> PointGrid:
     """A grid in a box around the robot."""
     return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
 
 
-def _box(robot: Robot, margin: float | None, seat: Seat | None) -> dict[str, tuple[float, float]]:
+def _box(robot: Robot, margin: float | None, seat: TubePose | None) -> dict[str, tuple[float, float]]:
     """Both ends of the box along each axis, m."""
     wire = 0.5 * robot.tail.wire_diameter
     coupling = 0.5 * robot.coupling.diameter if robot.coupling.length > 0 else 0.0
@@ -92,7 +92,7 @@ def _box(robot: Robot, margin: float | None, seat: Seat | None) -> dict[str, tup
     return box if seat is None else _in_glass(box, seat, whole=margin is None)
 
 
-def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -> dict[str, tuple[float, float]]:
+def _in_glass(box: dict[str, tuple[float, float]], seat: TubePose, *, whole: bool) -> dict[str, tuple[float, float]]:
     """The box, cut off a little outside of a tube's wall."""
     reach = (1.0 + _GLASS) * seat.radius
     glass = _glass(box["x"], seat, reach)
@@ -101,7 +101,7 @@ def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -
     return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}
 
 
-def _glass(ends: tuple[float, float], seat: Seat, reach: float) -> dict[str, tuple[float, float]]:
+def _glass(ends: tuple[float, float], seat: TubePose, reach: float) -> dict[str, tuple[float, float]]:
     """Least and largest y and z in body axes of points at most `reach` from a tube's axis, between two ends along x."""
     start, forward = seat.offset * seat.across[0], seat.forward  # the tube's axis in body axes
     glass = {}
@@ -147,7 +147,7 @@ def dataset_on(
     fields: Callable[[Samples], tuple[Samples, Samples]],
     frame: str,
     progress: Progress | None,
-    seat: Seat | None = None,
+    seat: TubePose | None = None,
 ) -> xr.Dataset:
     """The flow on a grid, NaN inside solids; an axis with one point becomes a scalar."""
     import xarray as xr

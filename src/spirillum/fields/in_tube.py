@@ -20,14 +20,14 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.errors import InputError
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
-from spirillum.fluid.tube.domain import seat_of
+from spirillum.fluid.tube.domain import pose_of
 from spirillum.fluid.tube.solids import Solids
 from spirillum.fluid.tube.tube import held_robot
 from spirillum.fluid.tube.wall import waves_between
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 _DECAY = 2.5
 """Rate, times the radius, at which the flow of a force at least dies out along the tube."""
@@ -50,7 +50,7 @@ class TubeFlowField(FluidField):
 
     held: Held = field(repr=False)
     """Tractions for unit motions, at this phase, viscosity 1."""
-    seat: Seat
+    seat: TubePose
     """The tube and the robot's pose in it."""
     solids: tuple[tuple[str, Outline], ...]
     """Names and outlines of the solids of revolution."""
@@ -197,7 +197,7 @@ class _Reflection:
 
         from spirillum.kernels.stokes_flow import wave_amplitudes
 
-        seat, tolerance = strengths.solids.seat, strengths.solids.fineness.tolerance
+        seat, tolerance = strengths.solids.pose, strengths.solids.fineness.tolerance
         cut = -float(np.log(tolerance))
         columns = list(_columns(strengths, density, forces, cut))
         low = min(float(part.x.min()) for part in columns)
@@ -264,7 +264,7 @@ def _classes(columns: Sequence[_Sources], radius: float) -> tuple[tuple[float, A
 
 def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: float) -> Iterator[_Sources]:
     """Point forces equivalent to the tractions, and those along the wires."""
-    seat = strengths.solids.seat
+    seat = strengths.solids.pose
     if strengths.wires:
         points = seat.placed(np.concatenate([wire.points for wire in strengths.wires]))
         both = np.stack([forces, forces], axis=1) @ seat.rotation.T
@@ -278,7 +278,7 @@ def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float)
 
     Of a yawed robot, which has no mirror image in its tube, they stand on whole circles.
     """
-    panels, seat = solids.panels, solids.seat
+    panels, seat = solids.panels, solids.pose
     x_p, rho_p = panels.x[number], panels.rho[number]
     length = float(np.sum(np.hypot(np.diff(x_p), np.diff(rho_p))))
     steepest = cut / float(np.min(seat.distances(x_p, rho_p)))
@@ -330,4 +330,4 @@ def tube_flow_field(
     solids = tuple(RobotGeometry.of(batch).outlines.items())
     if not solids:
         raise InputError("the flow around a bare tail in a tube is not computed; allowed: model slender, or a body")
-    return TubeFlowField(held, seat_of(batch), solids, twists, float(mean_flow), float(batch.viscosity[0]))
+    return TubeFlowField(held, pose_of(batch), solids, twists, float(mean_flow), float(batch.viscosity[0]))

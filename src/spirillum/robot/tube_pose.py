@@ -1,7 +1,7 @@
 """Pose of a robot in its tube: its axis, and the clearances between its surfaces and the wall.
 
-A `Placement` is what a user asks for; a `Seat` is the geometry that follows from it. The tube's axis is horizontal. The
-body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi about the vertical,
+A `Placement` is what a user asks for; a `TubePose` is the geometry that follows from it. The tube's axis is horizontal.
+The body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi about the vertical,
 nose to +y: its axis is (cos(alpha) cos(psi), cos(alpha) sin(psi), sin(alpha)). A point (x, y, z) of the robot's frame
 lies at the height -e + x sin(alpha) + z cos(alpha), and to the side at (x cos(alpha) - z sin(alpha)) sin(psi)
 + y cos(psi).
@@ -54,7 +54,7 @@ class TailClearance:
 
 
 @dataclass(frozen=True)
-class Seat:
+class TubePose:
     """Where in a tube the robot's axis runs; m and rad.
 
     `rotation`, `placed` and `distances` use the axes in which the flow is solved: x along robot or tube, y up, z to
@@ -73,7 +73,7 @@ class Seat:
     """psi, nose to +y (to the left, seen along the tube)."""
 
     @classmethod
-    def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> Seat:
+    def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> TubePose:
         """Return the pose of a placement; by default level, at the gap of `gap_of`."""
         if placement.eccentricity is not None:
             return cls(radius, placement.eccentricity * (radius - 0.5 * body_diameter), 0.0, placement.tail_drop)
@@ -83,7 +83,7 @@ class Seat:
     @classmethod
     def at_gap(
         cls, body: Outline, radius: float, gap: float, pitch: float = 0.0, tail_drop: float = 0.0, yaw: float = 0.0
-    ) -> Seat:
+    ) -> TubePose:
         """Return the pose at which the body's smallest distance to the wall is `gap`: the lower one of two.
 
         For a level body of largest radius a, e = R - a - gap. The offset is NaN where the gap is larger than
@@ -232,19 +232,19 @@ def gap_of(placement: Placement, body_diameter: float, radius: float) -> float:
 @lru_cache(maxsize=4096)
 def largest_gap(outline: Outline, radius: float, pitch: float = 0.0, yaw: float = 0.0) -> float:
     """Largest smallest distance to the wall that any offset leaves, m; negative where the body does not fit."""
-    return Seat(radius, _centred(outline, radius, pitch, yaw), pitch, yaw=yaw).clearance(outline)
+    return TubePose(radius, _centred(outline, radius, pitch, yaw), pitch, yaw=yaw).clearance(outline)
 
 
 @lru_cache(maxsize=4096)
 def _offset(outline: Outline, radius: float, gap: float, pitch: float, yaw: float) -> float:
-    """Offset e of `Seat.at_gap`, m."""
+    """Offset e of `TubePose.at_gap`, m."""
     if pitch == 0 and yaw == 0:
         e = radius - _largest_radius(outline) - gap
         return float(e) if e >= -1e-12 * radius else np.nan
     from scipy.optimize import brentq
 
     def spare(e: float) -> float:
-        return Seat(radius, e, pitch, yaw=yaw).clearance(outline) - gap
+        return TubePose(radius, e, pitch, yaw=yaw).clearance(outline) - gap
 
     # Between the two offsets with that gap there is more of it. Mostly the tube's axis lies between them, which saves
     # the search for the middle.
@@ -262,7 +262,7 @@ def _centred(outline: Outline, radius: float, pitch: float, yaw: float) -> float
     from scipy.optimize import minimize_scalar
 
     found = minimize_scalar(
-        lambda e: -Seat(radius, e, pitch, yaw=yaw).clearance(outline),
+        lambda e: -TubePose(radius, e, pitch, yaw=yaw).clearance(outline),
         bounds=(-radius, radius),
         options={"xatol": 1e-9 * radius},
     )
@@ -271,7 +271,7 @@ def _centred(outline: Outline, radius: float, pitch: float, yaw: float) -> float
 
 def _largest_radius(outline: Outline) -> float:
     """Largest radius a of a solid of revolution, m; where it is reached does not matter in a level tube."""
-    return -Seat(0.0, 0.0).clearance(outline)
+    return -TubePose(0.0, 0.0).clearance(outline)
 
 
 def contact_pitch(
@@ -290,17 +290,17 @@ def contact_pitch(
     """Largest pitch at which tail and coupling have a given clearance from the wall while the body's gap is fixed.
 
     The nose is raised from level, or lowered, until the wire at any phase, or the coupling, comes to the clearance, or
-    until the nose leaves the body no seat with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
+    until the nose leaves the body no pose with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
     NaN where a level robot does not fit.
     """
     sign = -1.0 if nose_down else 1.0
 
     def spare(pitch: float) -> float:
-        seat = Seat.at_gap(body, radius, gap, sign * pitch, tail_drop, yaw)
-        if np.isnan(seat.offset):
+        pose = TubePose.at_gap(body, radius, gap, sign * pitch, tail_drop, yaw)
+        if np.isnan(pose.offset):
             return -radius
-        tail = seat.tail_clearance(points, wire_radius).clearance
-        solid = np.inf if coupling is None else seat.clearance(coupling)
+        tail = pose.tail_clearance(points, wire_radius).clearance
+        solid = np.inf if coupling is None else pose.clearance(coupling)
         return min(tail, solid) - clearance
 
     if spare(0.0) < -1e-12 * radius:

@@ -47,7 +47,7 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.kernels.tube_table import MOTIONS, film_at
 from spirillum.robot.outline import Outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 _HALF_TURN = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
 
@@ -221,9 +221,9 @@ def _nodes(places: Places) -> list[NodeSolution]:
     def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
         return places.geometry, even_phases(place.phases, places.geometry.form.starts)
 
-    level = [NodeSolution((tail(place),), place.seat, places.fineness(place.t, place.seat)) for place in _level(places)]
+    level = [NodeSolution((tail(place),), place.pose, places.fineness(place.t, place.pose)) for place in _level(places)]
     yawed = [
-        NodeSolution((tail(place), mirrored(*tail(place))), place.seat, places.fineness(place.t, place.seat))
+        NodeSolution((tail(place), mirrored(*tail(place))), place.pose, places.fineness(place.t, place.pose))
         for place in _yawed(places)
     ]
     return level + yawed
@@ -235,9 +235,9 @@ def _check_memory(geometry: RobotGeometry, nodes: Sequence[NodeSolution]) -> Non
     The level node of each gap stands for the tilted ones with it, and the first with yaw, nearest to the glass, for all
     with yaw.
     """
-    level = [node for node in nodes if node.seat.level]
-    for node in (*level, *[node for node in nodes if node.seat.yaw][:1]):
-        check_solvable(geometry, node.seat, node.fineness)
+    level = [node for node in nodes if node.pose.level]
+    for node in (*level, *[node for node in nodes if node.pose.yaw][:1]):
+        check_solvable(geometry, node.pose, node.fineness)
 
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
@@ -252,23 +252,23 @@ class _Place(NamedTuple):
 
     t: float
     f: float
-    seat: Seat
+    pose: TubePose
     phases: int
     """Of the tail, evenly spread."""
 
 
-def _phases_at(places: Places, seat: Seat) -> int:
+def _phases_at(places: Places, pose: TubePose) -> int:
     """Number of phases of the tail at a node."""
-    return places.stage.phases_at(places.tail_clearance(seat) / float(np.max(places.swept[:, 1])))
+    return places.stage.phases_at(places.tail_clearance(pose) / float(np.max(places.swept[:, 1])))
 
 
 def _level(places: Places) -> list[_Place]:
     """Nodes without yaw that are solved for: for each t those nose up, then, off the axis, those nose down."""
     return [
-        _Place(float(t), float(f), seat, _phases_at(places, seat))
+        _Place(float(t), float(f), pose, _phases_at(places, pose))
         for t in places.gaps
         for f in (*places.up, *(-places.down[1:] if t < 1.0 else ()))
-        for seat in [places.seat(float(t), float(f))]
+        for pose in [places.pose(float(t), float(f))]
     ]
 
 
@@ -277,25 +277,25 @@ def _yawed(places: Places) -> list[_Place]:
     if not places.stage.yawed:
         return []
     return [
-        _Place(float(t), float(f), seat, _phases_at(places, seat))
+        _Place(float(t), float(f), pose, _phases_at(places, pose))
         for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
         for f, most in zip(places.yaw_pitches, row, strict=True)
         for share in kernel.YAW_SHARES
-        for seat in [places.seat(float(t), float(f), share * float(most))]
+        for pose in [places.pose(float(t), float(f), share * float(most))]
     ]
 
 
-def _film_of(film: Samples, seat: Seat) -> Samples:
+def _film_of(film: Samples, pose: TubePose) -> Samples:
     out = np.empty((6, 6))
-    film_at(film, seat.offset, seat.pitch, seat.yaw, out)
+    film_at(film, pose.offset, pose.pitch, pose.yaw, out)
     return out
 
 
 def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: Sequence[Sequence[Samples]]) -> Samples:
     """The packed table from the 8x8 at its nodes, and at those with yaw of the robot and of its mirror image."""
     starts = places.geometry.form.starts
-    rest = [rest_at(m, _film_of(film, n.seat), n.t, n.seat, starts) for n, m in zip(_level(places), level, strict=True)]
+    rest = [rest_at(m, _film_of(film, n.pose), n.t, n.pose, starts) for n, m in zip(_level(places), level, strict=True)]
     most = places.most[-1]
     on_axis = OnAxis.of(places.up * most[0], np.stack(rest[-len(places.up) :]))
     rest += [on_axis.coefficients(float(-f * most[1])) for f in places.down[1:]]
@@ -312,8 +312,8 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
             here = share * float(yaw)
             sides.append((on_axis.coefficients(pitch, here), on_axis.coefficients(pitch, -here)))
     of_node = np.reshape(sides, (-1, len(kernel.YAW_SHARES), *np.shape(sides)[1:]))
-    seats = _yawed_seats(places)
-    middles = [_interpolated(straight, seat, of_node.shape[-2]) for seat in seats]
+    poses = _yawed_poses(places)
+    middles = [_interpolated(straight, pose, of_node.shape[-2]) for pose in poses]
     turned = np.stack([_powers(middle, node) for middle, node in zip(middles, of_node, strict=True)])
     yawed_nodes = places.yaw_gaps, places.yaw_pitches, places.yaw_limit
     return kernel.packed(places.radius, places.rings, *parts, *yawed_nodes, turned, film)
@@ -333,51 +333,51 @@ def _powers(middle: Samples, sides: Samples) -> Samples:
 
 def _both_sides(film: Samples, place: _Place, starts: int, own: Samples, image: Samples) -> tuple[Samples, Samples]:
     """Fourier coefficients of the rest's factor with the nose to the left and to the right."""
-    back = replace(place.seat, yaw=-place.seat.yaw)
-    left = rest_at(own, _film_of(film, place.seat), place.t, place.seat, starts)
+    back = replace(place.pose, yaw=-place.pose.yaw)
+    left = rest_at(own, _film_of(film, place.pose), place.t, place.pose, starts)
     return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back, starts)
 
 
-def _yawed_seats(places: Places) -> list[Seat]:
+def _yawed_poses(places: Places) -> list[TubePose]:
     """Poses of all nodes with yaw, with their yaw set to zero."""
-    return [places.seat(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
+    return [places.pose(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
 
 
-def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
+def _interpolated(straight: Samples, pose: TubePose, count: int) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, interpolated from the table without yaw."""
     out = np.empty((count, kernel.PARAMETERS))
-    kernel.outer_coefficients(straight, seat.offset, seat.pitch, out)
+    kernel.outer_coefficients(straight, pose.offset, pose.pitch, out)
     return out
 
 
 def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
     """Check poses of a table between its nodes, the hardest first, then random ones, each with some phases."""
     draw, least = np.random.default_rng(_SEED), np.log(0.5 * places.gaps[0])
-    hardest = iter(places.stage.hardest_yawed if yawed else [(*pose, 0.0) for pose in places.stage.hardest])
+    hardest = iter(places.stage.hardest_yawed if yawed else [(*hard, 0.0) for hard in places.stage.hardest])
     chosen: list[NodeSolution] = []
     while len(chosen) < places.stage.held_out:
         rise, f, share = (float(draw.uniform(low, high)) for low, high in ((0.0, 1.0), (-0.8, 1.0), (-1.0, 1.0)))
         rise, f, share = next(hardest, (rise, f, share if yawed else 0.0))
         t = float(np.exp((1.0 - rise) * least))
         yaw = share * places.largest_yaw(t, f) if yawed else 0.0
-        seat, first = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
+        pose, first = places.pose_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         phases = tuple(first + phase for phase in even_phases(_CHECKED_PHASES))
-        clear = places.tail_clearance(seat) > places.least_clearance
-        if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(NodeSolution(((places.geometry, phases),), seat, places.fineness_of_check(seat)))
+        clear = places.tail_clearance(pose) > places.least_clearance
+        if clear and pose.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
+            chosen.append(NodeSolution(((places.geometry, phases),), pose, places.fineness_of_check(pose)))
     return chosen
 
 
 def _largest_errors(
-    table: Samples, poses: Sequence[NodeSolution], solved: Sequence[Sequence[Samples]]
+    table: Samples, checks: Sequence[NodeSolution], solved: Sequence[Sequence[Samples]]
 ) -> dict[str, float]:
     """Largest error of `RESPONSES` at poses with their solutions, over their sizes in a turn of the tail."""
     errors = []
-    for pose, answers in zip(poses, solved, strict=True):
-        (_, phases), seat = pose.tails[0], pose.seat
+    for check, answers in zip(checks, solved, strict=True):
+        (_, phases), pose = check.tails[0], check.pose
         found = np.empty((len(phases) + PHASES, kernel.MOTIONS, kernel.MOTIONS))
         for phase, out in zip((*phases, *even_phases()), found, strict=True):
-            kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phase, out)
+            kernel.resistance_at(table, pose.offset, pose.pitch, pose.yaw, phase, out)
         turn = found[len(phases) :]
         errors += [response_errors(own, true, turn) for own, true in zip(found, answers[0], strict=False)]
     return dict(zip(RESPONSES, np.max(errors, axis=0).tolist(), strict=True))

@@ -21,7 +21,7 @@ from spirillum.fluid.tube.wall import point_reflection
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 _EIGHT_PI = 8.0 * np.pi
 
@@ -145,23 +145,23 @@ class _Link:
         system = wire_system(turned, solids.fineness.wire)
         lines = tuple(_lowered(wire, drop) for wire, _ in turned)
         points = np.concatenate([wire.points for wire in lines])
-        seat, forces = solids.seat, 3 * len(points)
-        placed = seat.placed(points)
-        distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
-        own = solids.fineness.waves(seat.radius, placed[:, 0], distance, solids.fineness.wire_damping)
+        pose, forces = solids.pose, 3 * len(points)
+        placed = pose.placed(points)
+        distance = pose.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
+        own = solids.fineness.waves(pose.radius, placed[:, 0], distance, solids.fineness.wire_damping)
         # from forces in robot axes to those in the tube's
-        along = np.asarray(np.kron(np.eye(len(points)), seat.rotation), dtype=np.float64)
+        along = np.asarray(np.kron(np.eye(len(points)), pose.rotation), dtype=np.float64)
         mobility = system.mobility.copy()
         mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
         start = 0
         for wire in lines:
             here = slice(start, start + wire.points.size)
-            mobility[here, here] += _near_wall(wire, seat)
+            mobility[here, here] += _near_wall(wire, pose)
             start = here.stop
         motion = np.zeros((len(system.motion), MOTIONS))
         motion[:, : MOTIONS - 1] = system.motion
-        speed = 2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / seat.radius**2
-        motion[:forces, MOTIONS - 1] = (speed[:, None] * seat.rotation[0]).ravel()
+        speed = 2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / pose.radius**2
+        motion[:forces, MOTIONS - 1] = (speed[:, None] * pose.rotation[0]).ravel()
         if solids.none:
             return cls(solids, lines, system, mobility, motion, [], ())
         sources = Sources.of(lines, system)
@@ -193,7 +193,7 @@ def _reduced(solids: Solids, sources: Sources) -> Reduced:
     return found[0]
 
 
-def _near_wall(wire: Wire, seat: Seat) -> Samples:
+def _near_wall(wire: Wire, pose: TubePose) -> Samples:
     """Correction of a line of forces for the finite thickness of a wire at a wall, (3 n, 3 n), robot axes.
 
     A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
@@ -201,16 +201,16 @@ def _near_wall(wire: Wire, seat: Seat) -> Samples:
     arccosh(h/a) in place of the logarithm, and 2 sqrt(1 - (a/h)^2) in place of 2 (Jeffrey and Onishi, 1981). The
     difference is spread over a length h of the wire, for shorter waves of force do not feel the wall.
     """
-    placed, tangents = seat.placed(wire.points), wire.tangents @ seat.rotation.T
+    placed, tangents = pose.placed(wire.points), wire.tangents @ pose.rotation.T
     rho = np.hypot(placed[:, 1], placed[:, 2])
-    height = seat.radius - rho
+    height = pose.radius - rho
     ratio = height / wire.radius
     outward = placed * np.array([0.0, 1.0, 1.0]) / np.maximum(rho, 1e-300)[:, None]
     normal = outward - np.sum(outward * tangents, axis=1, keepdims=True) * tangents
     missing = np.arccosh(ratio) - np.log(2.0 * ratio)
     film = 1.0 - np.sqrt(1.0 - ratio**-2)
     local = missing[:, None, None] * (np.eye(3) + _dyads(tangents)) + film[:, None, None] * _dyads(normal)
-    local = 2.0 * seat.rotation.T @ local @ seat.rotation
+    local = 2.0 * pose.rotation.T @ local @ pose.rotation
     apart = np.linalg.norm(wire.points[:, None] - wire.points, axis=-1)
     width = 0.5 * (height[:, None] + height)
     spread = np.exp(-0.5 * (apart / width) ** 2) / (np.sqrt(2.0 * np.pi) * width)

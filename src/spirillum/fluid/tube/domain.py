@@ -13,7 +13,7 @@ from spirillum.envelope import quantity
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
-from spirillum.robot.tube_pose import Seat, gap_of, largest_gap
+from spirillum.robot.tube_pose import TubePose, gap_of, largest_gap
 from spirillum.units import show
 
 WIRE_FILM = 0.75
@@ -26,10 +26,10 @@ _WIDEST = 1e3
 """Largest size of a channel, m: those without one are infinite."""
 
 
-def seat_of(batch: RobotBatch, index: int = 0) -> Seat:
+def pose_of(batch: RobotBatch, index: int = 0) -> TubePose:
     """Pose of robot number `index`; by default level, at a gap of `GAP_SHARE`."""
     g = RobotGeometry.of(batch, index)
-    return Seat.of(batch.pose, g.body, g.width, tube_radius(batch, index))
+    return TubePose.of(batch.pose, g.body, g.width, tube_radius(batch, index))
 
 
 def tube_radius(batch: RobotBatch, index: int = 0) -> float:
@@ -38,30 +38,30 @@ def tube_radius(batch: RobotBatch, index: int = 0) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _tail_clearance(g: RobotGeometry, seat: Seat) -> tuple[float, str]:
+def _tail_clearance(g: RobotGeometry, pose: TubePose) -> tuple[float, str]:
     """Smallest clearance of the tail over a turn, m, and its position in words."""
     wire = g.wire()
-    found = seat.tail_clearance(wire.points, wire.radius)
+    found = pose.tail_clearance(wire.points, wire.radius)
     behind = show(-float(wire.points[found.index, 0]), "mm")
     return found.clearance, f" {behind} behind the body's middle at phase {show(found.phase, 'deg')}"
 
 
 def placement_answer(batch: RobotBatch) -> dict[str, Any]:
     """Pose of the first robot of a batch, for results."""
-    seat = seat_of(batch)
-    room = seat.radius - 0.5 * RobotGeometry.of(batch).width
+    pose = pose_of(batch)
+    room = pose.radius - 0.5 * RobotGeometry.of(batch).width
     found: dict[str, Any] = {
         "kind": "in the channel",
-        "gap": quantity(seat.clearance(RobotGeometry.of(batch).body), "m"),
-        "eccentricity": quantity(seat.offset / room, "1"),
-        "pitch": quantity(seat.pitch, "rad"),
+        "gap": quantity(pose.clearance(RobotGeometry.of(batch).body), "m"),
+        "eccentricity": quantity(pose.offset / room, "1"),
+        "pitch": quantity(pose.pitch, "rad"),
         "ends": batch.placement.ends_of(number_of(batch.channel_length, 0)),
     }
-    if seat.yaw:
-        found["yaw"] = quantity(seat.yaw, "rad")
-    if seat.tail_drop:
+    if pose.yaw:
+        found["yaw"] = quantity(pose.yaw, "rad")
+    if pose.tail_drop:
         note = "a surrogate: no rigid tail on a revolute joint does it"
-        found["tail_drop"] = quantity(seat.tail_drop, "m", note=note)
+        found["tail_drop"] = quantity(pose.tail_drop, "m", note=note)
     if batch.placement.flow is not None:
         found["flow"] = quantity(batch.placement.flow, "m/s")
     return found
@@ -80,7 +80,7 @@ class _Films(NamedTuple):
     """Position of the smallest clearance of the last tail."""
 
 
-def seat_limits(
+def pose_limits(
     batch: RobotBatch,
     part: str,
     kept: Sequence[Limit],
@@ -196,9 +196,9 @@ def _films(batch: RobotBatch, part: str, kept: Sequence[Limit], thinnest_gap: fl
         largest[index] = largest_gap(g.body, radius, batch.placement.pitch or 0.0, batch.placement.yaw)
         if not thinnest_gap * g.body_diameter <= asked[index] <= largest[index]:
             continue
-        seat = seat_of(batch, index)
+        pose = pose_of(batch, index)
         if "coupling" in outlines and "coupling" in PIECES[part]:
-            coupling[index] = seat.clearance(outlines["coupling"])
+            coupling[index] = pose.clearance(outlines["coupling"])
         if "tail" in PIECES[part]:
-            tail[index], where = _tail_clearance(g, seat)
+            tail[index], where = _tail_clearance(g, pose)
     return _Films(asked, largest, coupling, tail, where if batch.size == 1 else "")

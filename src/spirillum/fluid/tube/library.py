@@ -21,7 +21,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
-from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
+from spirillum.fluid.tube.domain import pose_limits, pose_of, tube_radius
 from spirillum.fluid.tube.outer_resistance import Progress
 from spirillum.fluid.tube.stages import STAGES, StageName
 from spirillum.fluid.tube.table import BELOW, TubeTable, key_of, least_checked_gap
@@ -187,17 +187,17 @@ class TabledTube(Tube):
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
         """See `SwimmerModel.stated_speed_error`; none beyond the yaws at which the table was checked."""
-        seat, table = seat_of(batch, 0), self.table_of(batch)
-        known = abs(seat.yaw) <= largest_yaw(table.packed, seat.offset, seat.pitch)
-        return table.speed_error_at(seat.yaw) if known else float("nan")
+        pose, table = pose_of(batch, 0), self.table_of(batch)
+        known = abs(pose.yaw) <= largest_yaw(table.packed, pose.offset, pose.pitch)
+        return table.speed_error_at(pose.yaw) if known else float("nan")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """Limits of the poses for which the table's errors were estimated."""
         gaps, least, yaws, most = np.full((4, batch.size), np.nan)
         for index in range(batch.size):
-            table, seat = self.table_of(batch, index), seat_of(batch, index)
-            gaps[index], least[index] = seat.clearance(table.geometry.body), least_checked_gap(table.packed)
-            yaws[index], most[index] = abs(seat.yaw), largest_yaw(table.packed, seat.offset, seat.pitch)
+            table, pose = self.table_of(batch, index), pose_of(batch, index)
+            gaps[index], least[index] = pose.clearance(table.geometry.body), least_checked_gap(table.packed)
+            yaws[index], most[index] = abs(pose.yaw), largest_yaw(table.packed, pose.offset, pose.pitch)
         near = f"the table is below it {BELOW}"
         aside = "the table was checked at such yaws, and there is no error estimate beyond"
         return [
@@ -209,14 +209,14 @@ class TabledTube(Tube):
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
         unbounded = Slender().part_domain(batch, part)
-        return seat_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
+        return pose_limits(batch, part, unbounded, thinnest_gap=THINNEST_GAP, wire_film=0.0)
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
         for index in within(batch, self.part_domain(batch, "robot")):
-            seat, mean = seat_of(batch, index), np.empty((MOTIONS, MOTIONS))
-            mean_resistance_at(self.table_of(batch, index).packed, seat.offset, seat.pitch, seat.yaw, PHASES, mean)
-            axes = along_the_tube(np.array(seat.pitch), np.array(seat.yaw))
+            pose, mean = pose_of(batch, index), np.empty((MOTIONS, MOTIONS))
+            mean_resistance_at(self.table_of(batch, index).packed, pose.offset, pose.pitch, pose.yaw, PHASES, mean)
+            axes = along_the_tube(np.array(pose.pitch), np.array(pose.yaw))
             found[index] = 0.0
             found[index][np.ix_(_HELD, _HELD)] = number_of(batch.viscosity, index) * axes.T @ mean @ axes
         return self._with_ends(batch, found)
@@ -239,8 +239,8 @@ def tabled(batch: RobotBatch) -> TabledTube | None:
     for index, table in enumerate(tables_of(batch)):
         if table is None:
             return None
-        seat = seat_of(batch, index)
-        if np.isfinite(seat.offset) and table.at(seat.offset, seat.pitch, seat.yaw)[1] != INSIDE:
+        pose = pose_of(batch, index)
+        if np.isfinite(pose.offset) and table.at(pose.offset, pose.pitch, pose.yaw)[1] != INSIDE:
             return None
         found[_key(batch, index)] = table
     return TabledTube(found)

@@ -23,7 +23,7 @@ from spirillum.fluid.tube.tube import finest_wire
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import STEEPEST, YAW_SHARES, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.outline import Arc, Outline, Segment, Smooth
-from spirillum.robot.tube_pose import Seat, last_clear
+from spirillum.robot.tube_pose import TubePose, last_clear
 from spirillum.units import show
 
 _THINNEST_REST = 0.08
@@ -89,9 +89,9 @@ class Places:
         """Points of the wire's centreline, at angle 0 about the axis: what it sweeps does not know its wavelength."""
         return self.geometry.swept(_SWEPT)
 
-    def tail_clearance(self, seat: Seat) -> float:
+    def tail_clearance(self, pose: TubePose) -> float:
         """Smallest distance between the wire's surface and the glass over a turn of the tail, m."""
-        return seat.tail_clearance(self.swept, 0.5 * self.geometry.wire_diameter).clearance
+        return pose.tail_clearance(self.swept, 0.5 * self.geometry.wire_diameter).clearance
 
     @property
     def least_clearance(self) -> float:
@@ -150,19 +150,19 @@ class Places:
     @cached_property
     def yaw_limit(self) -> Samples:
         """Numbers of `limited_yaw`: the tail is then off the glass as elsewhere."""
-        seats = [self.seat(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
-        x, pitches = np.array([(seat.offset / self.radius, seat.pitch) for seat in seats]).T
-        return yaw_limit_of(x, pitches, np.array([self._widest(seat) for seat in seats]), LARGEST_YAW)
+        poses = [self.pose(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
+        x, pitches = np.array([(pose.offset / self.radius, pose.pitch) for pose in poses]).T
+        return yaw_limit_of(x, pitches, np.array([self._widest(pose) for pose in poses]), LARGEST_YAW)
 
-    def fineness(self, t: float, seat: Seat) -> Fineness:
+    def fineness(self, t: float, pose: TubePose) -> Fineness:
         """Resolution of the flow at a place."""
         gap = t * contact_offset(self.rings, self.radius, 0.0)
-        found = self.stage.fineness(gap, 0.5 * self.geometry.body_diameter, seat)
+        found = self.stage.fineness(gap, 0.5 * self.geometry.body_diameter, pose)
         return replace(found, wire=finest_wire(self.geometry))
 
-    def fineness_of_check(self, seat: Seat) -> Fineness:
+    def fineness_of_check(self, pose: TubePose) -> Fineness:
         """Resolution of the flow at a check pose."""
-        found = self.stage.fineness_of_check(0.5 * self.geometry.body_diameter, seat)
+        found = self.stage.fineness_of_check(0.5 * self.geometry.body_diameter, pose)
         return replace(found, wire=finest_wire(self.geometry))
 
     @cached_property
@@ -172,25 +172,25 @@ class Places:
 
     def largest_yaw(self, t: float, f: float) -> float:
         """Largest yaw at a node, rad."""
-        seat = self.seat_between(t, f)
-        return limited_yaw(self.yaw_limit, seat.offset / self.radius, seat.pitch)
+        pose = self.pose_between(t, f)
+        return limited_yaw(self.yaw_limit, pose.offset / self.radius, pose.pitch)
 
     @cached_property
     def most(self) -> Samples:
         """Largest pitch nose up and nose down at each node t, (gaps, 2), rad."""
         return np.array([[self._steepest(float(t), sign) for sign in (1.0, -1.0)] for t in self.gaps])
 
-    def seat(self, t: float, f: float, yaw: float = 0.0) -> Seat:
+    def pose(self, t: float, f: float, yaw: float = 0.0) -> TubePose:
         """Pose at a node; negative f is nose down."""
         row = int(np.argmin(np.abs(self.gaps - t)))
         pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
-        return self._seat(t, pitch, yaw)
+        return self._pose(t, pitch, yaw)
 
-    def seat_between(self, t: float, f: float, yaw: float = 0.0) -> Seat:
+    def pose_between(self, t: float, f: float, yaw: float = 0.0) -> TubePose:
         """Pose at any t; its largest pitch is that of the next node below."""
         row = max(int(np.searchsorted(self.gaps, t, side="right")) - 1, 0)
         pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
-        return self._seat(t, pitch, yaw)
+        return self._pose(t, pitch, yaw)
 
     @cached_property
     def thinnest(self) -> float:
@@ -199,30 +199,30 @@ class Places:
         tail = float(np.max(self.swept[:, 1])) + 0.5 * self.geometry.wire_diameter
         return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * self.least_clearance)
 
-    def _seat(self, t: float, pitch: float, yaw: float = 0.0) -> Seat:
-        return Seat(self.radius, (1.0 - t) * contact_offset(self.rings, self.radius, pitch), pitch, yaw=yaw)
+    def _pose(self, t: float, pitch: float, yaw: float = 0.0) -> TubePose:
+        return TubePose(self.radius, (1.0 - t) * contact_offset(self.rings, self.radius, pitch), pitch, yaw=yaw)
 
     def _steepest(self, t: float, sign: float) -> float:
         """Largest pitch in one sense at a node t."""
         outlines, film = self.geometry.outlines, self.least_clearance
 
         def spare(size: float) -> float:
-            seat = self._seat(t, sign * size)
-            if seat.offset < 0:
+            pose = self._pose(t, sign * size)
+            if pose.offset < 0:
                 return -self.radius
-            floor = t / (1.0 - t) * seat.offset if t < 1 else contact_offset(self.rings, self.radius, sign * size)
-            found = self.tail_clearance(seat) - film
-            found = min(found, seat.clearance(outlines["body"]) - 0.5 * floor)
+            floor = t / (1.0 - t) * pose.offset if t < 1 else contact_offset(self.rings, self.radius, sign * size)
+            found = self.tail_clearance(pose) - film
+            found = min(found, pose.clearance(outlines["body"]) - 0.5 * floor)
             if "coupling" in outlines:
-                found = min(found, seat.clearance(outlines["coupling"]) - 0.5 * min(floor, film))
+                found = min(found, pose.clearance(outlines["coupling"]) - 0.5 * min(floor, film))
             return found
 
         return max(float(_LEAST_PITCH), last_clear(spare, STEEPEST[0 if sign > 0 else 1], *_SEARCH))
 
-    def _widest(self, seat: Seat) -> float:
+    def _widest(self, pose: TubePose) -> float:
         """Largest yaw of a pose, also beyond the largest of a table."""
 
         def spare(yaw: float) -> float:
-            return self.tail_clearance(replace(seat, yaw=yaw)) - self.least_clearance
+            return self.tail_clearance(replace(pose, yaw=yaw)) - self.least_clearance
 
         return max(float(_LEAST_PITCH), last_clear(spare, *_SEARCH_YAW))

@@ -18,7 +18,7 @@ from spirillum.fluid.tube.tube import is_solved, solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import MIRROR, cut_of_film
 from spirillum.kernels.tube_table import MOTIONS as RATES
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.units import show
 from spirillum.worker_pool import imap_unordered
 
@@ -42,7 +42,7 @@ class NodeSolution(NamedTuple):
 
     tails: tuple[tuple[RobotGeometry, tuple[float, ...]], ...]
     """Robots that differ in their tails, each with the phases of its tail, rad."""
-    seat: Seat
+    pose: TubePose
     fineness: Fineness
 
 
@@ -54,7 +54,7 @@ def matrix_of(full: Samples) -> Samples:
 
 def _solve(place: NodeSolution) -> list[Samples]:
     """Solve for every tail at one node: (phases, 8, 8), viscosity 1."""
-    return [matrix_of(full) for full in solved_together(place.tails, place.seat, place.fineness)]
+    return [matrix_of(full) for full in solved_together(place.tails, place.pose, place.fineness)]
 
 
 def _solve_numbered(numbered: tuple[int, NodeSolution]) -> list[Samples]:
@@ -83,17 +83,17 @@ def solutions(
 
 def solved_as_one(places: Sequence[NodeSolution]) -> list[list[int]]:
     """Indices of nodes that differ in their tails only and are solved for together."""
-    shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
+    shared: dict[tuple[RobotGeometry, TubePose, Fineness], list[int]] = {}
     for number, place in enumerate(places):
         bodies = {g.without_tail for g, _ in place.tails}
-        shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
+        shared.setdefault((bodies.pop(), place.pose, place.fineness), []).append(number)
     return list(shared.values())
 
 
 def all_kept(places: Sequence[NodeSolution]) -> bool:
     """Whether the solutions at some nodes are cached for all phases of all their tails."""
     return all(
-        is_solved(g, place.seat, place.fineness, p) for place in places for g, phases in place.tails for p in phases
+        is_solved(g, place.pose, place.fineness, p) for place in places for g, phases in place.tails for p in phases
     )
 
 
@@ -182,17 +182,17 @@ def seen_in_mirror(matrices: Samples) -> Samples:
     return found
 
 
-def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat, starts: int = 1) -> Samples:
+def rest_at(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: int = 1) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36).
 
     Args:
         matrices: at evenly spread phases from 0, as many as matter there, (phases, 8, 8).
-        film: of the body at that seat, (6, 6).
+        film: of the body at that pose, (6, 6).
         t: of the place.
-        seat: named where the rest is not positive definite.
+        pose: named where the rest is not positive definite.
         starts: wires of the tail.
     """
     rest = matrices.copy()
     rest[:, :6, :6] -= cut_of_film(t) * film
-    where = f"at an offset of {show(seat.offset, 'mm')} and a pitch of {show(seat.pitch, 'deg')}"
+    where = f"at an offset of {show(pose.offset, 'mm')} and a pitch of {show(pose.pitch, 'deg')}"
     return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES, starts)

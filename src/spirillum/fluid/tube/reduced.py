@@ -79,9 +79,9 @@ class Reduced:
     def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:
         """The basis of wires that turn about the solids' axis, for each of some tails."""
         sources = Sources.joined(tails)
-        seat, placed = solids.seat, solids.seat.placed(_swept(sources))
-        away = float(np.min(seat.distances(sources.x, sources.rho)))
-        along = seat.rotation[0, 0]
+        pose, placed = solids.pose, solids.pose.placed(_swept(sources))
+        away = float(np.min(pose.distances(sources.x, sources.rho)))
+        along = pose.rotation[0, 0]
         beside = sources.rho * np.sqrt(1.0 - along**2)
         reach = np.concatenate([along * sources.x - beside, along * sources.x + beside])
         waves = solids.waves(0.5 * (solids.gap + away), reach)
@@ -179,7 +179,7 @@ def _screen(solids: Solids, sources: Sources) -> Samples:
     """
     x, rho = (values.ravel()[:, None] for values in (solids.panels.x, solids.panels.rho))
     apart = (x - sources.x) ** 2 + (rho - sources.rho) ** 2
-    clear = solids.seat.distances(x.ravel(), rho.ravel())[:, None] * solids.seat.distances(sources.x, sources.rho)
+    clear = solids.pose.distances(x.ravel(), rho.ravel())[:, None] * solids.pose.distances(sources.x, sources.rho)
     found: Samples = 1.0 - apart / (apart + 4.0 * np.maximum(clear, 0.0))
     return found
 

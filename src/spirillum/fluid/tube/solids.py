@@ -25,7 +25,7 @@ from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 MOTIONS = 13
 """Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, opposed."""
@@ -82,30 +82,30 @@ class Solids:
     """Solids of revolution and the wall."""
 
     def __init__(
-        self, solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples | None = None
+        self, solids: Sequence[tuple[Outline, int]], pose: TubePose, fineness: Fineness, lines: Samples | None = None
     ) -> None:
         """Cut into panels and count modes, without solving.
 
         Args:
             solids: outlines, and the part (0 body, 1 rotor) with which each moves; none for wires alone.
-            seat: where in the tube they are.
+            pose: where in the tube they are.
             fineness: how finely.
             lines: points of wires (x, rho, blob radius) that come close, (n, 3), m.
         """
-        self.seat, self.fineness = seat, fineness
+        self.pose, self.fineness = pose, fineness
         self.parts = np.array([part for _, part in solids])
         self.kept: dict[str, object] = {}  # what others derive from the factors and want to use again
         self.tails: tuple[tuple[Wire, ...], ...] = ()  # those that share a basis, see `confined`
         near = np.zeros((0, 3)) if lines is None else lines
         if not solids:
             return
-        longest = _longest(solids, seat, fineness, near)
+        longest = _longest(solids, pose, fineness, near)
         self.panels = panels_of([outline for outline, _ in solids], longest, fineness.order)
-        self.counts = _mode_counts(self.panels, seat, fineness, near)
+        self.counts = _mode_counts(self.panels, pose, fineness, near)
 
     @property
     def none(self) -> bool:
-        """Whether there are no solids; then only `seat` and `fineness` are defined."""
+        """Whether there are no solids; then only `pose` and `fineness` are defined."""
         return self.parts.size == 0
 
     @property
@@ -124,15 +124,15 @@ class Solids:
         if self.none:
             return 0.0
         rows, waves, modes = 3.0 * self.panels.size, self.waves(self.gap).k.size, self.modes
-        factors = (4.0 if self.seat.yaw else 2.0) * float(self.size) ** 2  # one system of both families, or two
+        factors = (4.0 if self.pose.yaw else 2.0) * float(self.size) ** 2  # one system of both families, or two
         free = modes * rows**2
-        level = waves * (12.0 * modes * rows + 2.0 * (3.0 * modes) ** 2) if self.seat.level else 0.0
+        level = waves * (12.0 * modes * rows + 2.0 * (3.0 * modes) ** 2) if self.pose.level else 0.0
         return 8.0 * (factors + free + level)
 
     @cached_property
     def gap(self) -> float:
         """Smallest distance from the wall, m."""
-        return float(np.min(self.seat.distances(self.panels.x, self.panels.rho)))
+        return float(np.min(self.pose.distances(self.panels.x, self.panels.rho)))
 
     @cached_property
     def rows(self) -> tuple[Rows, Rows]:
@@ -151,14 +151,14 @@ class Solids:
     def systems(self) -> tuple[System, ...]:
         """Families of unknowns that are solved for together: both where the robot is yawed."""
         even, odd = self.rows
-        return ((even, odd),) if self.seat.yaw else ((even,), (odd,))
+        return ((even, odd),) if self.pose.yaw else ((even,), (odd,))
 
     @cached_property
     def rings(self) -> Rings:
         """Coupling of the solids' rings with the wall's waves."""
-        if self.seat.level:
-            return LevelRings(self.panels, self.seat.offset, self.modes)
-        return TiltedRings(self.panels, self.seat, self.counts, self.fineness.precision)
+        if self.pose.level:
+            return LevelRings(self.panels, self.pose.offset, self.modes)
+        return TiltedRings(self.panels, self.pose, self.counts, self.fineness.precision)
 
     def waves(self, distance: float, wires: Samples | None = None) -> WallWaves:
         """The waves that matter between the solids, or solids and wires.
@@ -169,8 +169,8 @@ class Solids:
         """
         x, fineness = self.panels.x.ravel(), self.fineness
         if wires is None:
-            return fineness.waves(self.seat.radius, x, distance, fineness.damping)
-        return fineness.waves(self.seat.radius, np.concatenate([x, wires]), distance, fineness.wire_damping)
+            return fineness.waves(self.pose.radius, x, distance, fineness.damping)
+        return fineness.waves(self.pose.radius, np.concatenate([x, wires]), distance, fineness.wire_damping)
 
     @cached_property
     def motion(self) -> tuple[Samples, Samples]:
@@ -188,16 +188,16 @@ class Solids:
 
     def _through_flow(self, parity: int) -> list[Samples]:
         """Modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on tilted rings: `stokes_flow`."""
-        if parity and not self.seat.yaw:
+        if parity and not self.pose.yaw:
             return []
         modes = min(4, self.modes)
         theta = 2.0 * np.pi * (np.arange(16) + 0.5) / 16
         x, rho = (values.ravel()[:, None] for values in (self.panels.x, self.panels.rho))
         cos, sin = np.cos(theta), np.sin(theta)
         places = np.stack(np.broadcast_arrays(x, rho * cos, rho * sin), axis=-1)
-        placed = self.seat.placed(places.reshape(-1, 3))
-        speed = (2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / self.seat.radius**2).reshape(x.size, -1)
-        along, up, right = self.seat.rotation[0]
+        placed = self.pose.placed(places.reshape(-1, 3))
+        speed = (2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / self.pose.radius**2).reshape(x.size, -1)
+        along, up, right = self.pose.rotation[0]
         parts = [speed * along, speed * (up * cos + right * sin), speed * (right * cos - up * sin)]
         q = np.arange(modes)[:, None]
         weights = np.where(q == 0, 1.0, 2.0) / theta.size
@@ -287,7 +287,7 @@ def check_fits(memory: float) -> None:
     check_memory(cause, memory / 2**30, "GiB of equations", 2.0**30, "as with a wider gap or a narrower channel")
 
 
-def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples) -> np.ndarray:
+def _mode_counts(panels: Panels, pose: TubePose, fineness: Fineness, lines: Samples) -> np.ndarray:
     """Number of modes at each node; 0 and 1 represent all rigid motions.
 
     What a ring of radius rho at a distance e from the axis sends to the wall and back in mode m falls off as
@@ -295,8 +295,8 @@ def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples)
     for a film that is squeezed times powers of m, hence some more. So with wires, see `interaction`.
     """
     x, rho = panels.x.ravel(), panels.rho.ravel()
-    r = seat.radius
-    e = r - rho - np.maximum(seat.distances(x, rho), 1e-12 * r)
+    r = pose.radius
+    e = r - rho - np.maximum(pose.distances(x, rho), 1e-12 * r)
     zeta = np.arccosh(np.maximum((r**2 - rho**2 - e**2) / np.maximum(2.0 * e * rho, 1e-300), 1.0 + 1e-12))
     cut = -0.5 * np.log(fineness.tolerance)
     counts = 3 + np.ceil(_SQUEEZED * cut / zeta)
@@ -314,7 +314,7 @@ _SQUEEZED = 1.4
 
 
 def _longest(
-    solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples
+    solids: Sequence[tuple[Outline, int]], pose: TubePose, fineness: Fineness, lines: Samples
 ) -> Callable[[int, Samples, Samples], Samples]:
     """Longest panels allowed at (x, rho): close to other solids, the film at the wall, and wires."""
 
@@ -323,7 +323,7 @@ def _longest(
         for other, (outline, _) in enumerate(solids):
             if other != solid:
                 found = np.minimum(found, 2.0 * outline.distance(x, rho))
-        film = np.maximum(seat.distances(x, rho), 0.0)
+        film = np.maximum(pose.distances(x, rho), 0.0)
         found = np.minimum(found, fineness.panel * np.sqrt(2.0 * film * np.maximum(rho, film)))
         if len(lines):
             near = np.min(np.hypot(x[:, None] - lines[:, 0], rho[:, None] - lines[:, 1]), axis=1)

@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.wall import SLACK
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 StageName = Literal["straight", "yaw", "fine"]
 Tilt = Literal["level", "pitched", "yawed"]
@@ -66,14 +66,14 @@ class Stage:
     film_intervals: int = 15
     """Intervals of its splines: with 11 it is within 0.4 %."""
 
-    def fineness(self, level_gap: float, body_radius: float, seat: Seat) -> Fineness:
+    def fineness(self, level_gap: float, body_radius: float, pose: TubePose) -> Fineness:
         """Return the resolution of a node whose level gap is given."""
         near: Where = "near" if level_gap < _NEAR * body_radius else "far"
-        return self.resolutions["tight" if body_radius > _TIGHT * seat.radius else near, _tilt_of(seat)]
+        return self.resolutions["tight" if body_radius > _TIGHT * pose.radius else near, _tilt_of(pose)]
 
-    def fineness_of_check(self, body_radius: float, seat: Seat) -> Fineness:
+    def fineness_of_check(self, body_radius: float, pose: TubePose) -> Fineness:
         """Return the resolution of a check pose."""
-        return (_FINEST if body_radius > _TIGHT * seat.radius else self.checks)[_tilt_of(seat)]
+        return (_FINEST if body_radius > _TIGHT * pose.radius else self.checks)[_tilt_of(pose)]
 
     def phases_at(self, clearance: float) -> int:
         """Number of phases of a tail with that clearance over the radius that it sweeps."""
@@ -143,8 +143,8 @@ def stage_of(name: str) -> StageName:
     raise InputError(f"stage = {name[:40]!r}{did_you_mean(name[:40], STAGES)}; allowed: {', '.join(STAGES)}")
 
 
-def _tilt_of(seat: Seat) -> Tilt:
-    return "level" if seat.level else "yawed" if seat.yaw else "pitched"
+def _tilt_of(pose: TubePose) -> Tilt:
+    return "level" if pose.level else "yawed" if pose.yaw else "pitched"
 
 
 RESPONSES = {

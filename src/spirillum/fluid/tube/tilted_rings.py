@@ -13,7 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, System, finer, midpoints, projectors, sent_to_wall
 from spirillum.fluid.tube.wall import WallWaves, distances_of, each, times_layers
 from spirillum.fluid.wire.sources import Panels
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 _FINER = 3
 """Nodes that average waves over a panel, over its own: with 2, normal resistance was 9 % low at a gap of 0.04 radii."""
@@ -69,14 +69,14 @@ class TiltedRings(Rings):
     parity move unknowns of both.
     """
 
-    def __init__(self, panels: Panels, seat: Seat, counts: np.ndarray, precision: type[np.floating]) -> None:
+    def __init__(self, panels: Panels, pose: TubePose, counts: np.ndarray, precision: type[np.floating]) -> None:
         """Rings of solids."""
-        self.panels, self.seat, self.counts, self.precision = panels, seat, counts, precision
+        self.panels, self.pose, self.counts, self.precision = panels, pose, counts, precision
 
     def _tiers(self, systems: Sequence[System], bearing: np.ndarray | None = None) -> list[_Tier]:
         """Panels sorted by their distance from the wall; with `bearing` some of their nodes only, never averaged."""
         fine = finer(self.panels, _FINER)
-        distances = self.seat.distances(*fine[:2]).min(axis=1)
+        distances = self.pose.distances(*fine[:2]).min(axis=1)
         step = np.floor(np.log(distances / distances.min()) / np.log(_TIER))
         tiers = []
         for number in np.unique(step):
@@ -210,7 +210,7 @@ class TiltedRings(Rings):
         The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
         waves are damped but where a ring nears the wall: they are evaluated on that arc only.
         """
-        symmetric = self.seat.yaw == 0
+        symmetric = self.pose.yaw == 0
         theta = midpoints(orders, tier.modes, whole=not symmetric)
         onto = [[part.astype(precision) for part in projectors(theta, tier.modes, parity)] for parity in (0, 1)]
         sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
@@ -245,7 +245,7 @@ class TiltedRings(Rings):
         shape = theta.size, x.size
         up, right = np.cos(theta)[:, None] * rho, np.sin(theta)[:, None] * rho
         points = np.stack([np.broadcast_to(x, shape), up, right], axis=-1)
-        return self.seat.placed(points.reshape(-1, 3)).reshape(*shape, 3)
+        return self.pose.placed(points.reshape(-1, 3)).reshape(*shape, 3)
 
     def _waves(
         self,
@@ -275,5 +275,5 @@ class TiltedRings(Rings):
 
         out = np.empty((3, 2, *placed.shape[:2], 2, high - low, 3), precision)
         fill = ring_waves if precision is np.float64 else single_ring_waves
-        fill(float(waves.k[number]), waves.radius, placed, theta, self.seat.rotation, low, out)
+        fill(float(waves.k[number]), waves.radius, placed, theta, self.pose.rotation, low, out)
         return out

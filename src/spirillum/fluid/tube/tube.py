@@ -28,7 +28,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.reference_errors import CHECKED, validation_note, what_is_fitted
 from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
-from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
+from spirillum.fluid.tube.domain import placement_answer, pose_limits, pose_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids, check_fits
 from spirillum.fluid.tube.stages import LARGEST_WIRE_ERROR
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
@@ -37,7 +37,7 @@ from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, within
 from spirillum.robot.outline import Outline
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -70,38 +70,38 @@ class _SolidKey(NamedTuple):
 
     solids: tuple[tuple[Outline, int], ...]
     near: tuple[tuple[float, ...], ...]
-    seat: Seat
+    pose: TubePose
     fineness: Fineness
 
 
-def _solid_key(g: RobotGeometry, part: str, seat: Seat, fineness: Fineness) -> _SolidKey:
+def _solid_key(g: RobotGeometry, part: str, pose: TubePose, fineness: Fineness) -> _SolidKey:
     near = tuple(map(tuple, _near(g).tolist())) if "tail" in PIECES[part] else ()
-    return _SolidKey(tuple(g.solids(part)), near, replace(seat, tail_drop=0.0), fineness)
+    return _SolidKey(tuple(g.solids(part)), near, replace(pose, tail_drop=0.0), fineness)
 
 
 @lru_cache(maxsize=1)
 def _solids(key: _SolidKey) -> Solids:
     """Solids of a pose; the last one is cached, for consecutive tails share a pose and factorizations are large."""
-    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3))
 
 
 @lru_cache(maxsize=4096)
 def _size(key: _SolidKey) -> int:
     """Number of unknowns of one parity."""
-    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3)).size
+    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3)).size
 
 
 @lru_cache(maxsize=4096)
 def _waves(key: _SolidKey) -> int:
     """Number of waves between solids and wall."""
-    solids = Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    solids = Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3))
     return 0 if solids.none else sum(solids.waves(solids.gap).orders)
 
 
 @lru_cache(maxsize=4096)
 def _memory(key: _SolidKey) -> float:
     """See `Solids.memory`."""
-    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3)).memory
+    return Solids(key.solids, key.pose, key.fineness, np.array(key.near).reshape(-1, 3)).memory
 
 
 def _turned(wire: Wire, phase: float) -> Wire:
@@ -114,15 +114,15 @@ class _Question(NamedTuple):
 
     geometry: RobotGeometry
     part: str
-    seat: Seat
+    pose: TubePose
     fineness: Fineness
     phase: float
 
 
 def _held(question: _Question) -> Held:
-    g, part, seat, fineness, phase = question
+    g, part, pose, fineness, phase = question
     wires = [(_turned(wire, phase), 1) for wire in g.wires()] if "tail" in PIECES[part] else []
-    return held_in_tube(_solids(_solid_key(g, part, seat, fineness)), wires, seat.tail_drop)
+    return held_in_tube(_solids(_solid_key(g, part, pose, fineness)), wires, pose.tail_drop)
 
 
 def _computed(question: _Question) -> Samples:
@@ -144,45 +144,45 @@ def _answer(question: _Question) -> Samples:
     return found
 
 
-def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> Samples:
+def solved(geometry: RobotGeometry, pose: TubePose, fineness: Fineness, phase: float) -> Samples:
     """R, load and drag of a whole robot, (13, 13): viscosity 1, no net flux, twists about the origin in body axes."""
-    return _answer(_Question(geometry, "robot", seat, fineness, phase))
+    return _answer(_Question(geometry, "robot", pose, fineness, phase))
 
 
-def is_solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> bool:
+def is_solved(geometry: RobotGeometry, pose: TubePose, fineness: Fineness, phase: float) -> bool:
     """Whether the result of `solved` is cached."""
-    return is_kept(_Question(geometry, "robot", seat, fineness, phase), _computed)
+    return is_kept(_Question(geometry, "robot", pose, fineness, phase), _computed)
 
 
 def solved_together(
-    tails: Sequence[tuple[RobotGeometry, tuple[float, ...]]], seat: Seat, fineness: Fineness
+    tails: Sequence[tuple[RobotGeometry, tuple[float, ...]]], pose: TubePose, fineness: Fineness
 ) -> list[Samples]:
     """As `solved`, (phases, 13, 13) for each of some robots that differ in their tails: wall and body are shared.
 
     Args:
         tails: robots, and the phases of their tails, rad.
-        seat: where they are.
+        pose: where they are.
         fineness: how finely the flow is resolved.
     """
-    keys = {_solid_key(g, "robot", seat, fineness) for g, _ in tails}
+    keys = {_solid_key(g, "robot", pose, fineness) for g, _ in tails}
     if len(keys) != 1:
         raise ValueError("robots that differ in more than their tails")
     solids = _solids(keys.pop())
     share_basis(solids, [g.wires() for g, _ in tails])
-    found = [np.stack([solved(g, seat, fineness, phase) for phase in phases]) for g, phases in tails]
+    found = [np.stack([solved(g, pose, fineness, phase) for phase in phases]) for g, phases in tails]
     share_basis(solids, [])
     return found
 
 
-def check_solvable(geometry: RobotGeometry, seat: Seat, fineness: Fineness) -> None:
+def check_solvable(geometry: RobotGeometry, pose: TubePose, fineness: Fineness) -> None:
     """Refuse a pose at which the flow around a whole robot does not fit into memory."""
-    check_fits(_memory(_solid_key(geometry, "robot", seat, fineness)))
+    check_fits(_memory(_solid_key(geometry, "robot", pose, fineness)))
 
 
 def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux."""
     fineness = Tube().fineness(batch, index)
-    return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
+    return _held(_Question(RobotGeometry.of(batch, index), "robot", pose_of(batch, index), fineness, phase))
 
 
 def finest_wire(g: RobotGeometry) -> Accuracy:
@@ -259,11 +259,11 @@ class Tube(SwimmerModel):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        limits = seat_limits(batch, part, Slender().part_domain(batch, part))
+        limits = pose_limits(batch, part, Slender().part_domain(batch, part))
         unknowns, waves, memory = np.zeros((3, batch.size))
         for index in within(batch, limits):
-            g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
-            key = _solid_key(g, part, seat, self.fineness(batch, index))
+            g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
+            key = _solid_key(g, part, pose, self.fineness(batch, index))
             unknowns[index] = _size(key)
             if unknowns[index] <= _MOST_UNKNOWNS:
                 waves[index] = _waves(key)
@@ -300,7 +300,7 @@ class Tube(SwimmerModel):
         phases = 2.0 * np.pi / batch.form.starts * (np.arange(count) + self._first) / count
         along = np.zeros((5, MOTIONS))
         along[[1, 3, 4], [3, 9, 12]] = 1.0
-        tilt = Seat(0.0, 0.0, batch.placement.pitch or 0.0, yaw=batch.placement.yaw)
+        tilt = TubePose(0.0, 0.0, batch.placement.pitch or 0.0, yaw=batch.placement.yaw)
         for row, first in ((0, 0), (2, 6)):
             along[row, first : first + 3] = tilt.forward
         answers, flows = np.zeros((batch.size, 5, 5)), np.zeros((batch.size, 5))
@@ -345,8 +345,8 @@ class Tube(SwimmerModel):
         found = np.full((batch.size, MOTIONS, MOTIONS), np.nan)
         turns = np.broadcast_to(phase, (batch.size,))
         for index in within(batch, self.part_domain(batch, part)):
-            g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
+            g, pose = RobotGeometry.of(batch, index), pose_of(batch, index)
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
-            question = _Question(g, part, seat, self.fineness(batch, index), turn)
+            question = _Question(g, part, pose, self.fineness(batch, index), turn)
             found[index] = number_of(batch.viscosity, index) * _answer(question)
         return found

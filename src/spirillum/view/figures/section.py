@@ -17,7 +17,7 @@ from spirillum.arrays import Values
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
-from spirillum.robot.tube_pose import Seat
+from spirillum.robot.tube_pose import TubePose
 from spirillum.view.figures.scene import wire_lines
 
 _GLASS, _RIM = "#dfe9f1", "#5d7486"
@@ -57,9 +57,9 @@ def draw_section(
         _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
 
 
-def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
+def draw_glass(axes: Axes, pose: TubePose, plane: str, offset: float, unit: float) -> None:
     """Plot the section of a tube's wall above the elements beyond it, on axes whose limits are set."""
-    wall = _bore(seat, plane, offset, np.array(axes.get_xlim()) * unit) / unit
+    wall = _bore(pose, plane, offset, np.array(axes.get_xlim()) * unit) / unit
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     frame = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
     # A path with a hole: the bore runs against the frame.
@@ -69,22 +69,22 @@ def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -
     axes.add_artist(Polygon(wall, closed=True, fill=False, edgecolor=_RIM, linewidth=1.0, zorder=5.6))
 
 
-def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
+def _bore(pose: TubePose, plane: str, offset: float, ends: Values) -> Values:
     """Corners of the bore's section, clockwise, m, (n, 2); it is carried on beyond both ends of the panel."""
     first, second = ("xyz".index(axis) for axis in plane)
     third = 3 - first - second
-    start = seat.across[:, third] * offset - [seat.offset, 0.0]
-    along, up = seat.across[:, first], seat.across[:, second]  # on the wall |start + x along + y up| = R
+    start = pose.across[:, third] * offset - [pose.offset, 0.0]
+    along, up = pose.across[:, first], pose.across[:, second]  # on the wall |start + x along + y up| = R
     if plane == "yz":
         angle = -2.0 * np.pi * _SAMPLES
-        circle = seat.radius * np.stack([np.sin(angle), -np.cos(angle)])
+        circle = pose.radius * np.stack([np.sin(angle), -np.cos(angle)])
         corners = np.linalg.solve(np.column_stack([along, up]), circle - start[:, None]).T
         return np.asarray(corners, dtype=float)
     x = ends.mean() + 0.55 * np.ptp(ends) * np.linspace(-1.0, 1.0, 800)
     there = start + x[:, None] * along
     size = float(up @ up)
     middle: Values = -(there @ up) / size
-    half = np.sqrt(np.maximum(middle**2 - (np.sum(there**2, axis=1) - seat.radius**2) / size, 0.0))
+    half = np.sqrt(np.maximum(middle**2 - (np.sum(there**2, axis=1) - pose.radius**2) / size, 0.0))
     upper, lower = np.column_stack([x, middle + half]), np.column_stack([x, middle - half])
     return np.concatenate([upper, lower[::-1]])
 

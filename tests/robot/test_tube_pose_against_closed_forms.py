@@ -13,7 +13,7 @@ from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
 from spirillum.robot.tube_pose import (
     STEEPEST_PITCH,
-    Seat,
+    TubePose,
     contact_pitch,
     largest_gap,
 )
@@ -69,7 +69,7 @@ def helix(phase: float = 0.0, count: int = 301) -> np.ndarray:
 @given(e=offsets, pitch=pitches)
 def test_gap_against_points_on_the_surface(shape: str, e: float, pitch: float) -> None:
     brute = R - in_tube(surface(shape), e, pitch).max()
-    found = Seat(R, e, pitch).clearance(SHAPES[shape])
+    found = TubePose(R, e, pitch).clearance(SHAPES[shape])
     assert found <= brute + 1e-15  # no point of the surface is closer
     assert found == pytest.approx(brute, abs=1e-6)
 
@@ -81,31 +81,31 @@ def test_level_body(shape: str, share: float) -> None:
     """E = R - a - gap, and no gap is larger than R - a."""
     a = max(float(p.points(np.linspace(0, 1, 3))[1].max()) for p in SHAPES[shape].pieces)
     gap = (R - a) * (1 - share)
-    e = Seat.at_gap(SHAPES[shape], R, gap).offset
+    e = TubePose.at_gap(SHAPES[shape], R, gap).offset
     assert e == pytest.approx(R - a - gap, abs=1e-15)
-    assert Seat(R, e).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-15)
+    assert TubePose(R, e).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-15)
     assert largest_gap(SHAPES[shape], R) == pytest.approx(R - a, abs=1e-15)
-    assert np.isnan(Seat.at_gap(SHAPES[shape], R, 1.001 * (R - a)).offset)
+    assert np.isnan(TubePose.at_gap(SHAPES[shape], R, 1.001 * (R - a)).offset)
 
 
 @given(e=offsets, pitch=pitches)
 def test_sphere_does_not_feel_its_pitch(e: float, pitch: float) -> None:
-    assert Seat(R, e, pitch).clearance(SHAPES["sphere"]) == pytest.approx(R - 0.009 - abs(e), abs=1e-12)
+    assert TubePose(R, e, pitch).clearance(SHAPES["sphere"]) == pytest.approx(R - 0.009 - abs(e), abs=1e-12)
     shifted = Outline((Arc((-0.02, 0.0), (0.004, 0.004), (0.0, np.pi)),), ())  # off the centre of rotation
     centre = abs(-e - 0.02 * np.sin(pitch))
-    assert Seat(R, e, pitch).clearance(shifted) == pytest.approx(R - 0.004 - centre, abs=1e-12)
+    assert TubePose(R, e, pitch).clearance(shifted) == pytest.approx(R - 0.004 - centre, abs=1e-12)
 
 
 @given(e=offsets, pitch=pitches)
 def test_capsule_is_a_ball_along_a_line(e: float, pitch: float) -> None:
     """Two hemispheres and their hull: the ball's centre is farthest from the axis at one end of the line."""
     ends = np.abs(-e + np.array([1, -1]) * 0.0085 * np.sin(pitch))
-    assert Seat(R, e, pitch).clearance(SHAPES["rounded"]) == pytest.approx(R - 0.009 - ends.max(), abs=1e-12)
+    assert TubePose(R, e, pitch).clearance(SHAPES["rounded"]) == pytest.approx(R - 0.009 - ends.max(), abs=1e-12)
 
 
 @given(gap=st.floats(1e-5, 3e-3), pitch=st.floats(0.0, np.radians(15)))
 def test_offset_of_a_pitched_capsule(gap: float, pitch: float) -> None:
-    e = Seat.at_gap(SHAPES["rounded"], R, gap, pitch).offset
+    e = TubePose.at_gap(SHAPES["rounded"], R, gap, pitch).offset
     assert e == pytest.approx(R - 0.009 - gap - 0.0085 * np.sin(pitch), abs=1e-12)
 
 
@@ -113,23 +113,23 @@ def test_offset_of_a_pitched_capsule(gap: float, pitch: float) -> None:
 @settings(max_examples=10)  # of each of five shapes
 @given(gap=st.floats(1e-5, 2e-3), pitch=st.floats(0.0, np.radians(20)))
 def test_offset_and_gap_are_inverse(shape: str, gap: float, pitch: float) -> None:
-    e = Seat.at_gap(SHAPES[shape], R, gap, pitch).offset
-    assert Seat(R, e, pitch).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-14)
-    assert Seat(R, e + 1e-5, pitch).clearance(SHAPES[shape]) < gap < largest_gap(SHAPES[shape], R, pitch)
+    e = TubePose.at_gap(SHAPES[shape], R, gap, pitch).offset
+    assert TubePose(R, e, pitch).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-14)
+    assert TubePose(R, e + 1e-5, pitch).clearance(SHAPES[shape]) < gap < largest_gap(SHAPES[shape], R, pitch)
 
 
 def test_nose_at_the_top_leaves_no_place() -> None:
     steep = np.radians(44)
     assert largest_gap(SHAPES["rounded"], R, steep) == pytest.approx(R - 0.009 - 0.0085 * np.sin(steep), abs=1e-9)
-    assert np.isnan(Seat.at_gap(SHAPES["rounded"], R, 0.0052, steep).offset)
-    assert not np.isnan(Seat.at_gap(SHAPES["rounded"], R, 0.005, steep).offset)
+    assert np.isnan(TubePose.at_gap(SHAPES["rounded"], R, 0.0052, steep).offset)
+    assert not np.isnan(TubePose.at_gap(SHAPES["rounded"], R, 0.005, steep).offset)
 
 
 @given(e=st.floats(0.0, 0.005), pitch=pitches, drop=st.floats(0.0, 0.002))
 def test_straight_rod(e: float, pitch: float, drop: float) -> None:
     """A rod on the motor axis: its far end is lowest, -e - x sin(pitch) - drop cos(pitch)."""
     rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
-    found = Seat(R, e, pitch, drop).tail_clearance(rod, 0.0005)
+    found = TubePose(R, e, pitch, drop).tail_clearance(rod, 0.0005)
     depth = e + 0.0875 * np.sin(pitch) + drop * np.cos(pitch)
     assert found.clearance == pytest.approx(R - 0.0005 - depth, abs=1e-15)
     assert found.index == 60 or pitch < 1e-12
@@ -140,7 +140,7 @@ def test_straight_rod(e: float, pitch: float, drop: float) -> None:
 def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
     """The closed form is the limit of many phases, attained at the phase and point that it names."""
     points = helix(count=301)
-    whole = Seat(R, e, pitch, drop).tail_clearance(points, 0.0005)
+    whole = TubePose(R, e, pitch, drop).tail_clearance(points, 0.0005)
     lowered = e + drop * np.cos(pitch)
     phases = np.linspace(0, 2 * np.pi, 361)
     many = min(R - 0.0005 - in_tube(turned(points, phase), lowered, pitch).max() for phase in phases)
@@ -153,8 +153,8 @@ def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
 @given(phase=st.floats(0.0, 6.28), e=st.floats(0.0, 0.009), pitch=pitches)
 def test_phase_is_that_of_the_wires_equation(phase: float, e: float, pitch: float) -> None:
     """The phase of closest approach does not depend on the phase at which the centreline is given."""
-    seat = Seat(R, e, pitch)
-    found, ahead = (seat.tail_clearance(helix(at, count=301), 0.0005) for at in (0.0, phase))
+    pose = TubePose(R, e, pitch)
+    found, ahead = (pose.tail_clearance(helix(at, count=301), 0.0005) for at in (0.0, phase))
     assert ahead.clearance == pytest.approx(found.clearance, abs=1e-14)
     there = in_tube(helix(found.phase, count=301), e, pitch)
     assert found.clearance == pytest.approx(R - 0.0005 - there.max(), abs=1e-14)
@@ -175,11 +175,11 @@ def test_contact_of_the_papers_robot(batch_of: Callable[..., Any]) -> None:
     coupling = solid_outlines(body, 0.035, 0.008, 0.01, 0.0005)["coupling"]
     for gap in (1e-4, 5e-4, 1e-3):
         found = contact_pitch(body, helix(), 0.0005, R, gap, coupling=coupling)
-        e = Seat.at_gap(body, R, gap, found).offset
-        assert Seat(R, e, found).tail_clearance(helix(), 0.0005).clearance == pytest.approx(0, abs=1e-10)
+        e = TubePose.at_gap(body, R, gap, found).offset
+        assert TubePose(R, e, found).tail_clearance(helix(), 0.0005).clearance == pytest.approx(0, abs=1e-10)
         steeper = found + 1e-4
-        lower = Seat.at_gap(body, R, gap, steeper).offset
-        assert Seat(R, lower, steeper).tail_clearance(helix(), 0.0005).clearance < 0
+        lower = TubePose.at_gap(body, R, gap, steeper).offset
+        assert TubePose(R, lower, steeper).tail_clearance(helix(), 0.0005).clearance < 0
         assert contact_pitch(body, helix(), 0.0005, R, gap, tail_drop=1e-3) < found
 
 
@@ -187,8 +187,8 @@ def test_contact_is_bounded_by_coupling_nose_and_the_largest_pitch() -> None:
     body, stub = SHAPES["sphere"], np.array([[-0.0275, 0.0, 0.0], [-0.028, 0.0, 0.0]])
     thick = cylinder_outline(0.014, -0.0095, -0.027)
     by_coupling = contact_pitch(body, stub, 0.0005, R, 5e-4, coupling=thick)
-    e = Seat.at_gap(body, R, 5e-4, by_coupling).offset
-    assert Seat(R, e, by_coupling).clearance(thick) == pytest.approx(0, abs=1e-10)
+    e = TubePose.at_gap(body, R, 5e-4, by_coupling).offset
+    assert TubePose(R, e, by_coupling).clearance(thick) == pytest.approx(0, abs=1e-10)
     assert contact_pitch(body, stub, 0.0005, 0.03, 0.015) == STEEPEST_PITCH
     assert np.isnan(contact_pitch(body, stub, 0.0005, R, 5e-4, tail_drop=0.012))
     assert np.isnan(contact_pitch(body, stub, 0.0005, R, 0.0111))  # no place for that gap, even level
@@ -204,11 +204,11 @@ def test_contact_is_bounded_by_coupling_nose_and_the_largest_pitch() -> None:
 def test_yawed_gap_against_points_on_the_surface(shape: str, e: float, pitch: float, yaw: float) -> None:
     one_side = surface(shape)
     brute = R - max(in_tube(one_side * [1, side, 1], e, pitch, yaw).max() for side in (-1, 1))
-    found = Seat(R, e, pitch, yaw=yaw).clearance(SHAPES[shape])
+    found = TubePose(R, e, pitch, yaw=yaw).clearance(SHAPES[shape])
     assert found <= brute + 1e-14
     assert found == pytest.approx(brute, abs=1e-6)
-    assert Seat(R, e, pitch, yaw=-yaw).clearance(SHAPES[shape]) == pytest.approx(found, abs=1e-14)
-    turned_over = Seat(R, -e, -pitch, yaw=yaw).clearance(SHAPES[shape])
+    assert TubePose(R, e, pitch, yaw=-yaw).clearance(SHAPES[shape]) == pytest.approx(found, abs=1e-14)
+    turned_over = TubePose(R, -e, -pitch, yaw=yaw).clearance(SHAPES[shape])
     assert turned_over == pytest.approx(found, abs=1e-14)
 
 
@@ -216,10 +216,10 @@ def test_yawed_gap_against_points_on_the_surface(shape: str, e: float, pitch: fl
 @given(pitch=tilts)
 def test_on_the_axis_yaw_is_pitch_to_the_side(pitch: float) -> None:
     for outline in SHAPES.values():
-        up, aside = Seat(R, 0.0, pitch).clearance(outline), Seat(R, 0.0, yaw=pitch).clearance(outline)
+        up, aside = TubePose(R, 0.0, pitch).clearance(outline), TubePose(R, 0.0, yaw=pitch).clearance(outline)
         assert aside == pytest.approx(up, abs=1e-13)
     up_tail, aside_tail = (
-        seat.tail_clearance(helix(), 0.0005) for seat in (Seat(R, 0.0, pitch), Seat(R, 0.0, yaw=pitch))
+        pose.tail_clearance(helix(), 0.0005) for pose in (TubePose(R, 0.0, pitch), TubePose(R, 0.0, yaw=pitch))
     )
     assert aside_tail.clearance == pytest.approx(up_tail.clearance, abs=1e-13)
 
@@ -228,7 +228,7 @@ def test_on_the_axis_yaw_is_pitch_to_the_side(pitch: float) -> None:
 @given(e=offsets, pitch=tilts, yaw=tilts, drop=st.floats(0.0, 0.003))
 def test_whole_turn_of_a_yawed_tail(e: float, pitch: float, yaw: float, drop: float) -> None:
     points, lower = helix(count=301), np.array([0.0, 0.0, -drop])
-    whole = Seat(R, e, pitch, drop, yaw).tail_clearance(points, 0.0005)
+    whole = TubePose(R, e, pitch, drop, yaw).tail_clearance(points, 0.0005)
     phases = np.linspace(0, 2 * np.pi, 361)
     many = min(R - 0.0005 - in_tube(turned(points, phase) + lower, e, pitch, yaw).max() for phase in phases)
     assert -1e-14 <= many - whole.clearance <= 0.0025 * np.radians(1) ** 2
@@ -241,12 +241,12 @@ def test_whole_turn_of_a_yawed_tail(e: float, pitch: float, yaw: float, drop: fl
 @settings(max_examples=5)
 @given(gap=st.floats(1e-5, 2e-3), pitch=st.floats(-0.2, 0.2), yaw=st.floats(-0.2, 0.2))
 def test_offset_of_a_yawed_body(shape: str, gap: float, pitch: float, yaw: float) -> None:
-    """Nose down as nose up; the lower of the two seats with that gap; continuous where the yaw goes to zero."""
-    e = Seat.at_gap(SHAPES[shape], R, gap, pitch, yaw=yaw).offset
-    assert Seat(R, e, pitch, yaw=yaw).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-13)
-    assert Seat(R, e + 1e-5, pitch, yaw=yaw).clearance(SHAPES[shape]) < gap
+    """Nose down as nose up; the lower of the two poses with that gap; continuous where the yaw goes to zero."""
+    e = TubePose.at_gap(SHAPES[shape], R, gap, pitch, yaw=yaw).offset
+    assert TubePose(R, e, pitch, yaw=yaw).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-13)
+    assert TubePose(R, e + 1e-5, pitch, yaw=yaw).clearance(SHAPES[shape]) < gap
     assert gap < largest_gap(SHAPES[shape], R, pitch, yaw)
-    hardly, straight = (Seat.at_gap(SHAPES[shape], R, gap, pitch, yaw=angle).offset for angle in (1e-9, 0.0))
+    hardly, straight = (TubePose.at_gap(SHAPES[shape], R, gap, pitch, yaw=angle).offset for angle in (1e-9, 0.0))
     assert hardly == pytest.approx(straight, abs=1e-10)
 
 
@@ -262,19 +262,19 @@ def test_contact_nose_down_and_yawed() -> None:
     assert np.hypot(*where) == pytest.approx(R - 0.0005, abs=1e-10)
 
 
-def test_axes_of_the_seat() -> None:
+def test_axes_of_the_pose() -> None:
     """Nose to +y with yaw, up with pitch; `forward` is the tube's axis in body axes."""
-    seat = Seat(R, 0.003, 0.2, yaw=0.1)
-    nose = seat.placed(np.array([[1.0, 0.0, 0.0]]))[0] + [0.0, 0.003, 0.0]
+    pose = TubePose(R, 0.003, 0.2, yaw=0.1)
+    nose = pose.placed(np.array([[1.0, 0.0, 0.0]]))[0] + [0.0, 0.003, 0.0]
     wanted = [np.cos(0.2) * np.cos(0.1), np.sin(0.2), -np.cos(0.2) * np.sin(0.1)]  # x, up, right
     np.testing.assert_allclose(nose, wanted, atol=1e-15)
-    np.testing.assert_allclose(seat.rotation @ seat.rotation.T, np.eye(3), atol=1e-15)
-    assert seat.forward[0] == pytest.approx(np.cos(0.2) * np.cos(0.1))
-    assert seat.forward[1] == pytest.approx(-np.sin(0.1))
+    np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-15)
+    assert pose.forward[0] == pytest.approx(np.cos(0.2) * np.cos(0.1))
+    assert pose.forward[1] == pytest.approx(-np.sin(0.1))
     x, rho = np.array([0.01, -0.03]), np.array([0.005, 0.002])
     many = [
         R - in_tube(np.stack([0 * t + xi, r * np.cos(t), r * np.sin(t)], axis=1), 0.003, 0.2, 0.1).max()
         for xi, r in zip(x, rho, strict=True)
         for t in [np.linspace(0, 2 * np.pi, 2001)]
     ]
-    np.testing.assert_allclose(seat.distances(x, rho), many, atol=1e-6)
+    np.testing.assert_allclose(pose.distances(x, rho), many, atol=1e-6)
