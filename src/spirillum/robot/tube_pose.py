@@ -1,10 +1,10 @@
 """Pose of a robot in its tube: its axis, and the clearances between its surfaces and the wall.
 
-A `Placement` is what a user asks for; a `TubePose` is the geometry that follows from it. The tube's axis is horizontal.
-The body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi about the vertical,
-nose to +y: its axis is (cos(alpha) cos(psi), cos(alpha) sin(psi), sin(alpha)). A point (x, y, z) of the robot's frame
-lies at the height -e + x sin(alpha) + z cos(alpha), and to the side at (x cos(alpha) - z sin(alpha)) sin(psi)
-+ y cos(psi).
+A `Placement` is what a user asks for; a `TubePose` is the geometry that follows from it. The tube's axis is
+horizontal. The body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi
+about the vertical, nose to +y: its axis is (cos(alpha) cos(psi), cos(alpha) sin(psi), sin(alpha)). A point (x, y, z)
+of the robot's frame lies at the height -e + x sin(alpha) + z cos(alpha), and to the side at (x cos(alpha) - z
+sin(alpha)) sin(psi) + y cos(psi).
 
 Without yaw the points (x, rho cos(theta), rho sin(theta)) of a ring about the robot's axis have the squared distance
 
