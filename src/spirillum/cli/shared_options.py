@@ -171,8 +171,8 @@ METAVARS = {
 }
 """Placeholder of a value in the help, where its kind does not give one."""
 _FRICTION = (
-    "Friction model. none; rotor: in the joint, between body and tail; body: between body and wall "
-    "the body; paper: as eq. (19) is printed, on the tail from outside."
+    "Friction model. none; rotor: in the joint, between body and tail; body: between body and "
+    "wall; paper: as eq. (19) is printed, on the tail from outside."
 )
 TEXTS = {
     "calibration": "Calibration file whose factors replace the robot's.",

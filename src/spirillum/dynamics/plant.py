@@ -356,11 +356,11 @@ class Plant:
         self._now = replace(self._now, flow=velocity, checkpoint=self._begun_anew())
 
     @validate_arguments
-    def impose_field(self, requested: Field) -> None:
+    def impose_field(self, asked: Field) -> None:
         """From now on the field of a magnetic robot is another one; its angle does not jump.
 
         Args:
-            requested: what changes of it.
+            asked: what changes of it.
 
         Raises:
             InputError: for a robot that no field turns.
@@ -368,7 +368,7 @@ class Plant:
         old = self._now.field
         if old is None:
             raise InputError(f"{self.robot.name} has no drive.kind = 'magnetic': no field turns it")
-        field = old.changed(requested, self._now.time)
+        field = old.changed(asked, self._now.time)
         if field != old:
             self._links = field.on(self._links)
             self._now = replace(self._now, field=field, checkpoint=self._begun_anew())

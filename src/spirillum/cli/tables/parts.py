@@ -88,7 +88,9 @@ def released_columns(answer: Answer) -> Iterator[Block]:
     there = [column for column in RELEASED_COLUMNS if column in answer]
     missing = {column: answer[column]["reason"] for column in there if "reason" in answer[column]}
     for reason in dict.fromkeys(missing.values()):
-        yield Detail(f"no {' and no '.join(column for column in missing if missing[column] == reason)}: {reason}")
+        line = f"no {' and no '.join(column for column in missing if missing[column] == reason)}: {reason}"
+        # Without a band a caution says what a table adds.
+        yield line if "band" in answer and "prepare" in reason else Detail(line)
     if "trial" in there and "trial" not in missing:
         wait, duration = (in_words(answer["trial"][name]) for name in ("wait", "duration"))
         yield f"trial: released, motor on after {wait}, mean over {duration}; {answer['trial']['assumption']}"
