@@ -10,11 +10,14 @@ import spirillum as sp
 
 RADIUS, START, LENGTH = 0.009, 4.0, 9.8
 """Of the body, m; begin and length of the film in the run, s."""
+HELD = 5.3e-4
+"""Speed of the robot held in its tube, m/s: on its film it is slower, and a camera resolves lengths, not shares."""
 
 
 @pytest.fixture(scope="module")
 def run() -> xr.Dataset:
-    return sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})
+    timing = {"duration": "14 s", "samples_per_turn": 40}
+    return sp.simulate("biorob2012-wide", model="tube", timing=timing, in_tube={"wait": "0 s"})
 
 
 @pytest.mark.slow
@@ -38,8 +41,8 @@ def test_run_in_the_tube_is_measured_within_the_stated_intervals(run: xr.Dataset
     }
     for name, value in truth.items():
         assert found[name].low < value < found[name].high, name
-        width = found[name].high - found[name].low
-        assert width < (0.2 if name == "body_rotation_rate" else 0.02) * abs(value), name
+        narrow = {"forward_velocity": 0.02 * HELD, "body_rotation_rate": 0.2 * abs(value)}
+        assert found[name].high - found[name].low < narrow.get(name, 0.02 * abs(value)), name
     assert rate(late["azimuth"]) < 0.0  # a film carries it the way in which its body turns
     assert truth["body_rotation_rate"] < 0.0
 
