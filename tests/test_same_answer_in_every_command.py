@@ -1,5 +1,7 @@
 """The same robot and the same question give the same numbers in every command: held, and the trial."""
 
+from pathlib import Path
+
 import pytest
 
 import spirillum as sp
@@ -31,7 +33,8 @@ def test_the_trial(tmp_path) -> None:  # type: ignore[no-untyped-def]
     compared = sp.compare_models(WIDE, models=["tube"]).predictions["tube"].trial
     study = sp.study({"robots": [WIDE], "models": ["tube"], "friction": ["rotor"], "trial": True})
     run = sp.simulate(WIDE)
-    filmed = sp.render(WIDE, tmp_path / "trial.mp4", run="trial", camera={"size": "160x120", "fps": 2})
+    word = Path("trial")  # as the command line has it
+    filmed = sp.render(WIDE, tmp_path / "trial.mp4", run=word, camera={"size": "160x120", "fps": 2})
     assert trial is not None
     assert compared is not None
     assert filmed.to_dict()["motion"] == "trial"

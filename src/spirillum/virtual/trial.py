@@ -207,7 +207,7 @@ def _shown(
     """The robot of a video and its motion."""
     from spirillum.dynamics.run_file import open_run, robot_of
 
-    if run is None or (isinstance(run, str) and run == RELEASED):
+    if run is None or (isinstance(run, str | Path) and str(run) == RELEASED):
         if robot is None:
             raise InputError("no robot; allowed: a preset's name or a robot file, or a run, which has its own")
         own = load(robot)
