@@ -91,45 +91,58 @@ typedef struct {
     const WallFlows *flows;
 } Waves;
 
-/* Fill the velocities (X, u_rho, v) at points for unit velocities on the wall, (orders, 3, 3) each. */
-static void fill_extensions(Waves waves, const double rho[LANES], double (*out)[9 * (waves.end - waves.first)]) {
-    const double wall = waves.wall;
-    double z[LANES], size[LANES], r[waves.end + 2][LANES], v[9][LANES], u[9][LANES];
-    EACH_LANE z[l] = larger(waves.k * rho[l], 1e-12 * wall);
-    fill_bessel_ratios(z, waves.end + 2, r, size);
-    EACH_LANE size[l] *= exp(z[l] - wall) / waves.flows[0].scaled; /* I_p(z)/I_p(k R), first of p = 0 */
-    for (int64_t p = 0; p < waves.end; p++) {
-        if (p >= waves.first) {
-            const double *w = waves.flows[p].inverse;
-            fill_flows(p, z, wall, r, v);
-            for (int i = 0; i < 9; i += 3) {
-                for (int j = 0; j < 3; j++) {
-                    EACH_LANE u[i + j][l]
-                        = size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
-                }
-            }
-            for (int l = 0; l < LANES; l++) {
-                for (int e = 0; e < 9; e++) out[l][(p - waves.first) * 9 + e] = u[e][l];
-            }
-        }
-        EACH_LANE size[l] *= r[p][l] / waves.flows[p].ratio;
-    }
+/* A few points at which the waves are taken order by order: p, k rho, I_p(k rho)/I_p(k R), ratios of Bessel functions. */
+typedef struct {
+    const Waves *waves;
+    int64_t p;
+    double z[LANES], size[LANES], (*ratios)[LANES];
+} Orders;
+
+static void step_order(Orders *at) {
+    const double wall = at->waves->flows[at->p].ratio;
+    EACH_LANE at->size[l] *= at->ratios[at->p][l] / wall;
+    at->p++;
 }
 
-/* Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3).
- *
- * first: the first order p. */
-EXPORT void wave_extensions(double k, double radius, const double *rho, int64_t first, double *out, int64_t n,
-                            int64_t orders) {
-    WallFlows flows[first + orders];
-    const Waves waves = {k, k * radius, first, first + orders, flows};
-    double lanes[LANES], found[LANES][9 * orders];
-    fill_wall_flows(waves.wall, waves.end, flows);
-    for (int64_t at = 0; at < n; at += LANES) {
-        const int some = (int)(n - at < LANES ? n - at : LANES);
-        EACH_LANE lanes[l] = rho[at + (l < some ? l : some - 1)];
-        fill_extensions(waves, lanes, found);
-        memcpy(out + at * 9 * orders, found, (size_t)some * sizeof found[0]);
+/* Begin with the first order; ratios: memory, (end + 2, LANES). */
+static Orders begin_orders(const Waves *waves, const double rho[LANES], double (*ratios)[LANES]) {
+    Orders at = {.waves = waves, .ratios = ratios};
+    EACH_LANE at.z[l] = larger(waves->k * rho[l], 1e-12 * waves->wall);
+    fill_bessel_ratios(at.z, waves->end + 2, ratios, at.size);
+    EACH_LANE at.size[l] *= exp(at.z[l] - waves->wall) / waves->flows[0].scaled;
+    while (at.p < waves->first) step_order(&at);
+    return at;
+}
+
+/* Velocities (X, u_rho, v) for unit velocities on the wall, (3, 3), of this order, and on to the next. */
+static void next_extension(Orders *at, double u[9][LANES]) {
+    const double *w = at->waves->flows[at->p].inverse;
+    double v[9][LANES];
+    fill_flows(at->p, at->z, at->waves->wall, at->ratios, v);
+    for (int i = 0; i < 9; i += 3) {
+        for (int j = 0; j < 3; j++) {
+            EACH_LANE u[i + j][l] = at->size[l] * (v[i][l] * w[j] + v[i + 1][l] * w[3 + j] + v[i + 2][l] * w[6 + j]);
+        }
+    }
+    step_order(at);
+}
+
+/* Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3). */
+EXPORT void wave_extensions(double k, double radius, const double *rho, double *out, int64_t n, int64_t orders) {
+    WallFlows flows[orders];
+    const Waves waves = {k, k * radius, 0, orders, flows};
+    double lanes[LANES], ratios[orders + 2][LANES], u[9][LANES];
+    fill_wall_flows(waves.wall, orders, flows);
+    for (int64_t first = 0; first < n; first += LANES) {
+        const int some = (int)(n - first < LANES ? n - first : LANES);
+        EACH_LANE lanes[l] = rho[first + (l < some ? l : some - 1)];
+        Orders at = begin_orders(&waves, lanes, ratios);
+        while (at.p < orders) {
+            double *here = out + (first * orders + at.p) * 9;
+            next_extension(&at, u);
+            for (int l = 0; l < some; l++)
+                for (int e = 0; e < 9; e++) here[l * orders * 9 + e] = u[e][l];
+        }
     }
 }
 
@@ -166,16 +179,11 @@ EXPORT void wall_layers(double z, double first, double *layers, int64_t orders) 
     }
 }
 
-/* Rows of numbers, one for each order and wall component (orders, 3), of the waves at one point. */
-enum { X, RHO, V, COS, SIN, POINT_ROWS };
-
 typedef struct {
     double cos, sin;
 } Angle;
 
 static Angle angle_of(double radians) { return (Angle){cos(radians), sin(radians)}; }
-
-static Angle sum_of(Angle a, Angle b) { return (Angle){a.cos * b.cos - a.sin * b.sin, a.sin * b.cos + a.cos * b.sin}; }
 
 /* A few points (x, y, z), of which the last one stands in all lanes that are free. */
 typedef struct {
@@ -196,144 +204,64 @@ static Points points_at(const double *points, int64_t at, int64_t n) {
     return found;
 }
 
-/* Fill the extensions X, u_rho, v and cos, sin of p theta. */
-static void fill_point(Waves waves, const double *restrict extensions, Angle theta,
-                       double rows[restrict POINT_ROWS][3 * (waves.end - waves.first)]) {
-    Angle turned = {1.0, 0.0};
-    if (waves.first) turned = angle_of((double)waves.first * atan2(theta.sin, theta.cos));
-    for (int64_t p = 0; p < waves.end - waves.first; p++) {
-        for (int64_t w = 0; w < 3; w++) {
-            for (int e = X; e <= V; e++) rows[e][3 * p + w] = extensions[9 * p + 3 * e + w];
-            rows[COS][3 * p + w] = turned.cos;
-            rows[SIN][3 * p + w] = turned.sin;
-        }
-        turned = sum_of(turned, theta);
-    }
-}
-
-/* Fill the amplitudes of u_x and of two components across, u_rho and u_theta turned by an angle.
- *
- * The even wave of order p has X and u_rho as cos(p theta), the odd one as -sin(p theta); u_x comes times i. */
-static void fill_wave(int64_t size, double rows[POINT_ROWS][size], bool is_odd, Angle turn,
-                      double wave[restrict 3][size]) {
-    const double *like = rows[is_odd ? SIN : COS], *other = rows[is_odd ? COS : SIN], sign = is_odd ? -1.0 : 1.0;
-    for (int64_t e = 0; e < size; e++) {
-        const double radial = rows[RHO][e] * (sign * like[e]), around = -rows[V][e] * other[e];
-        wave[0][e] = rows[X][e] * (sign * like[e]);
-        wave[1][e] = radial * turn.cos - around * turn.sin;
-        wave[2][e] = radial * turn.sin + around * turn.cos;
-    }
-}
-
-/* Velocities (x, rho, theta) of waves around a cylinder, in cylindrical components about its own, parallel axis.
- *
- * reference: its radius; offset: of its axis below the tube's; theta: angles about it.
- * out: even, odd; component; point; order; wall component. */
-EXPORT void circle_waves(double k, double radius, double reference, double offset, const double *theta, double *out,
-                         int64_t n, int64_t orders) {
-    const int64_t size = 3 * orders;
-    WallFlows flows[orders];
-    const Waves waves = {k, k * radius, 0, orders, flows};
-    double places[n][3], extensions[LANES][9 * orders], rows[POINT_ROWS][size], wave[3][size];
-    fill_wall_flows(waves.wall, orders, flows);
-    for (int64_t i = 0; i < n; i++) {
-        places[i][0] = 0.0;
-        places[i][1] = reference * cos(theta[i]) - offset;
-        places[i][2] = reference * sin(theta[i]);
-    }
-    for (int64_t at = 0; at < n; at += LANES) {
-        const Points points = points_at(&places[0][0], at, n);
-        fill_extensions(waves, points.rho, extensions);
-        for (int l = 0; l < points.some; l++) {
-            const Angle turn = sum_of(points.theta[l], angle_of(-theta[at + l]));
-            fill_point(waves, extensions[l], points.theta[l], rows);
-            for (int odd = 0; odd < 2; odd++) {
-                fill_wave(size, rows, odd, turn, wave);
-                for (int c = 0; c < 3; c++) {
-                    memcpy(out + ((3 * odd + c) * n + at + l) * size, wave[c], sizeof wave[c]);
-                }
-            }
-        }
-    }
-}
-
 enum { PARTS = 12 }; /* component; even, odd; real, imaginary part */
 
-/* Fill the velocities of waves along three axes at each of a few points, (lanes, PARTS, orders, wall component).
- *
- * axes: at each point, by rows (x, y, z). */
-static void fill_velocities(Waves waves, const Points *points, double axes[3][3][LANES],
-                            double (*out)[PARTS][3 * (waves.end - waves.first)]) {
-    const int64_t size = 3 * (waves.end - waves.first);
-    double cos_p[LANES], sin_p[LANES], real[LANES], imaginary[LANES], radial[3][LANES], around[3][LANES];
-    double values[PARTS][LANES];
-    double extensions[LANES][3 * size];
-    fill_extensions(waves, points->rho, extensions);
+/* Waves along three axes at a few points, order by order: exp(i p theta), exp(i k x), and the axes along x, rho, theta. */
+typedef struct {
+    Orders orders;
+    const Points *points;
+    Angle turned[LANES];
+    double real[LANES], imaginary[LANES], along[3][LANES], radial[3][LANES], around[3][LANES];
+} Velocities;
+
+/* axes: at each point, by rows (x, y, z); ratios: memory, (end + 2, LANES). */
+static Velocities begin_velocities(const Waves *waves, const Points *points, double axes[3][3][LANES],
+                                   double (*ratios)[LANES]) {
+    Velocities found = {.orders = begin_orders(waves, points->rho, ratios), .points = points};
     for (int l = 0; l < LANES; l++) {
-        const Angle theta = points->theta[l], along = angle_of(waves.k * points->x[l]);
-        Angle turned = {1.0, 0.0};
-        if (waves.first) turned = angle_of((double)waves.first * atan2(theta.sin, theta.cos));
-        cos_p[l] = turned.cos, sin_p[l] = turned.sin;
-        real[l] = along.cos, imaginary[l] = along.sin;
+        const Angle theta = points->theta[l], phase = angle_of(waves->k * points->x[l]);
+        found.turned[l]
+            = waves->first ? angle_of((double)waves->first * atan2(theta.sin, theta.cos)) : (Angle){1.0, 0.0};
+        found.real[l] = phase.cos;
+        found.imaginary[l] = phase.sin;
         for (int c = 0; c < 3; c++) {
-            radial[c][l] = axes[c][1][l] * theta.cos + axes[c][2][l] * theta.sin;
-            around[c][l] = axes[c][2][l] * theta.cos - axes[c][1][l] * theta.sin;
+            found.along[c][l] = axes[c][0][l];
+            found.radial[c][l] = axes[c][1][l] * theta.cos + axes[c][2][l] * theta.sin;
+            found.around[c][l] = axes[c][2][l] * theta.cos - axes[c][1][l] * theta.sin;
         }
     }
-    for (int64_t e = 0; e < size; e++) {
-        const int64_t at = 9 * (e / 3) + e % 3;
-        double x[LANES], rho[LANES], v[LANES];
-        for (int l = 0; l < LANES; l++) {
-            x[l] = extensions[l][at];
-            rho[l] = extensions[l][at + 3];
-            v[l] = extensions[l][at + 6];
-        }
-        for (int odd = 0; odd < 2; odd++) { /* X and u_rho go as cos(p theta) or -sin(p theta), u_x comes times i */
-            const double *like = odd ? sin_p : cos_p, *other = odd ? cos_p : sin_p, sign = odd ? -1.0 : 1.0;
-            for (int c = 0; c < 3; c++) {
-                double *re = values[4 * c + 2 * odd], *im = values[4 * c + 2 * odd + 1];
-                EACH_LANE {
-                    const double along = axes[c][0][l] * x[l] * (sign * like[l]);
-                    const double across = radial[c][l] * rho[l] * (sign * like[l]) - around[c][l] * v[l] * other[l];
-                    re[l] = across * real[l] - along * imaginary[l];
-                    im[l] = across * imaginary[l] + along * real[l];
-                }
-            }
-        }
-        for (int l = 0; l < LANES; l++) {
-            for (int i = 0; i < PARTS; i++) out[l][i][e] = values[i][l];
-        }
-        if (e % 3 == 2) {
-            EACH_LANE {
-                const double next = cos_p[l] * points->theta[l].cos - sin_p[l] * points->theta[l].sin;
-                sin_p[l] = sin_p[l] * points->theta[l].cos + cos_p[l] * points->theta[l].sin;
-                cos_p[l] = next;
-            }
-        }
-    }
+    return found;
 }
 
-/* Velocities (x, y, z) of waves at points.
+/* Velocities of this order, by parts and wall components, and on to the next.
  *
- * out: point; component; real, imaginary part; even, odd; order from the first one; wall component. */
-EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
-                        int64_t orders) {
-    const int64_t size = 3 * orders;
-    WallFlows flows[first + orders];
-    const Waves waves = {k, k * radius, first, first + orders, flows};
-    double found[LANES][PARTS][size], axes[3][3][LANES] = {{{0.0}}};
-    for (int c = 0; c < 3; c++) EACH_LANE axes[c][c][l] = 1.0;
-    fill_wall_flows(waves.wall, waves.end, flows);
-    for (int64_t at = 0; at < n; at += LANES) {
-        const Points points = points_at(places, at, n);
-        fill_velocities(waves, &points, axes, found);
-        for (int l = 0; l < points.some; l++) {
-            for (int c = 0; c < 3; c++) {
-                for (int part = 0; part < 4; part++, out += size) {
-                    memcpy(out, found[l][4 * c + 2 * (part % 2) + part / 2], (size_t)size * sizeof *out);
+ * X and u_rho go as cos(p theta) or -sin(p theta), v as the other; u_x comes times i. */
+static void next_velocities(Velocities *at, double out[PARTS][3][LANES]) {
+    double u[9][LANES];
+    next_extension(&at->orders, u);
+    for (int odd = 0; odd < 2; odd++) {
+        double like[LANES], other[LANES];
+        for (int l = 0; l < LANES; l++) {
+            like[l] = odd ? -at->turned[l].sin : at->turned[l].cos;
+            other[l] = odd ? at->turned[l].cos : at->turned[l].sin;
+        }
+        for (int c = 0; c < 3; c++) {
+            for (int w = 0; w < 3; w++) {
+                double *re = out[4 * c + 2 * odd][w], *im = out[4 * c + 2 * odd + 1][w];
+                EACH_LANE {
+                    const double along = at->along[c][l] * u[w][l] * like[l];
+                    const double across
+                        = at->radial[c][l] * u[3 + w][l] * like[l] - at->around[c][l] * u[6 + w][l] * other[l];
+                    re[l] = across * at->real[l] - along * at->imaginary[l];
+                    im[l] = across * at->imaginary[l] + along * at->real[l];
                 }
             }
         }
+    }
+    for (int l = 0; l < LANES; l++) {
+        const Angle here = at->turned[l], theta = at->points->theta[l];
+        at->turned[l].cos = here.cos * theta.cos - here.sin * theta.sin;
+        at->turned[l].sin = here.sin * theta.cos + here.cos * theta.sin;
     }
 }
 
@@ -347,27 +275,90 @@ static void fill_axes(const double *rotation, Angle theta, int lane, double axes
     }
 }
 
+/* Velocities (x, rho, theta) of waves around a cylinder, in cylindrical components about its own, parallel axis.
+ *
+ * reference: its radius; offset: of its axis below the tube's; theta: angles about it.
+ * out: even, odd; component; point; order; wall component. */
+EXPORT void circle_waves(double k, double radius, double reference, double offset, const double *theta, double *out,
+                         int64_t n, int64_t orders) {
+    static const double level[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    const int64_t size = 3 * orders;
+    WallFlows flows[orders];
+    const Waves waves = {k, k * radius, 0, orders, flows};
+    double places[LANES][3] = {{0.0}}, ratios[orders + 2][LANES], axes[3][3][LANES], found[PARTS][3][LANES];
+    fill_wall_flows(waves.wall, orders, flows);
+    for (int64_t first = 0; first < n; first += LANES) {
+        const int some = (int)(n - first < LANES ? n - first : LANES);
+        for (int l = 0; l < LANES; l++) {
+            const Angle about = angle_of(theta[first + (l < some ? l : some - 1)]);
+            places[l][1] = reference * about.cos - offset;
+            places[l][2] = reference * about.sin;
+            fill_axes(level, about, l, axes);
+        }
+        const Points points = points_at(&places[0][0], 0, LANES);
+        Velocities at = begin_velocities(&waves, &points, axes, ratios);
+        for (int64_t p = 0; p < orders; p++) {
+            next_velocities(&at, found);
+            for (int l = 0; l < some; l++)
+                for (int odd = 0; odd < 2; odd++)
+                    for (int c = 0; c < 3; c++) { /* u_x comes times i */
+                        double *here = out + ((3 * odd + c) * n + first + l) * size + 3 * p;
+                        for (int w = 0; w < 3; w++) here[w] = found[4 * c + 2 * odd + (c == 0)][w][l];
+                    }
+        }
+    }
+}
+
+/* Velocities (x, y, z) of waves at points.
+ *
+ * out: point; component; real, imaginary part; even, odd; order from the first one; wall component. */
+EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
+                        int64_t orders) {
+    const int64_t size = 3 * orders;
+    WallFlows flows[first + orders];
+    const Waves waves = {k, k * radius, first, first + orders, flows};
+    double ratios[waves.end + 2][LANES], axes[3][3][LANES] = {{{0.0}}}, found[PARTS][3][LANES];
+    for (int c = 0; c < 3; c++) EACH_LANE axes[c][c][l] = 1.0;
+    fill_wall_flows(waves.wall, waves.end, flows);
+    for (int64_t at = 0; at < n; at += LANES, out += LANES * PARTS * size) {
+        const Points points = points_at(places, at, n);
+        Velocities velocities = begin_velocities(&waves, &points, axes, ratios);
+        for (int64_t p = 0; p < orders; p++) {
+            next_velocities(&velocities, found);
+            for (int l = 0; l < points.some; l++)
+                for (int c = 0; c < 3; c++)
+                    for (int part = 0; part < 4; part++) {
+                        double *here = out + (l * PARTS + 4 * c + part) * size + 3 * p;
+                        for (int w = 0; w < 3; w++) here[w] = found[4 * c + 2 * (part % 2) + part / 2][w][l];
+                    }
+        }
+    }
+}
+
 /* To one of both arrays, the other one is NULL. */
 static void fill_rings(double k, double radius, const double *places, const double *around, const double *rotation,
                        int64_t first, double *out, float *single, int64_t angles, int64_t n, int64_t orders) {
     const int64_t size = 3 * orders;
     WallFlows flows[first + orders];
     const Waves waves = {k, k * radius, first, first + orders, flows};
-    double found[LANES][PARTS][size], axes[3][3][LANES];
+    double ratios[waves.end + 2][LANES], axes[3][3][LANES], found[PARTS][3][LANES];
     fill_wall_flows(waves.wall, waves.end, flows);
     for (int64_t at = 0; at < angles * n; at += LANES) {
         const Points points = points_at(places, at, angles * n);
         for (int l = 0; l < LANES; l++) {
             fill_axes(rotation, angle_of(around[(at + (l < points.some ? l : 0)) / n]), l, axes);
         }
-        fill_velocities(waves, &points, axes, found);
-        for (int l = 0; l < points.some; l++) {
-            for (int block = 0; block < 6; block++) {
-                const int64_t place = (block * angles * n + at + l) * 2 * size;
-                const double *values = found[l][2 * block];
-                if (out) memcpy(out + place, values, (size_t)(2 * size) * sizeof *values);
-                for (int64_t e = 0; single && e < 2 * size; e++) single[place + e] = (float)values[e];
-            }
+        Velocities velocities = begin_velocities(&waves, &points, axes, ratios);
+        for (int64_t p = 0; p < orders; p++) {
+            next_velocities(&velocities, found);
+            for (int l = 0; l < points.some; l++)
+                for (int part = 0; part < PARTS; part++) {
+                    const int64_t place = ((part / 2 * angles * n + at + l) * 2 + part % 2) * size + 3 * p;
+                    for (int w = 0; w < 3; w++) {
+                        if (out) out[place + w] = found[part][w][l];
+                        if (single) single[place + w] = (float)found[part][w][l];
+                    }
+                }
         }
     }
 }

@@ -24,10 +24,10 @@ WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
 """k R and order p."""
 
 
-def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0, first: int = 0) -> np.ndarray:
+def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0) -> np.ndarray:
     rho = np.asarray(rho, dtype=float)
-    out = np.empty((rho.size, orders - first, 3, 3))
-    wave_extensions(k, radius, rho, first, out)
+    out = np.empty((rho.size, orders, 3, 3))
+    wave_extensions(k, radius, rho, out)
     return out
 
 

@@ -118,16 +118,13 @@ def layer_blocks(
 
 
 @native("out")
-def wave_extensions(
-    k: float, radius: float, rho: Float64[Array, " n"], first: int, out: Float64[Array, "n orders 3 3"]
-) -> None:
+def wave_extensions(k: float, radius: float, rho: Float64[Array, " n"], out: Float64[Array, "n orders 3 3"]) -> None:
     """Fill in the velocities (X, u_rho, v) at rho for unit velocities at the radius.
 
     Args:
         k: wave number, above 0.
         radius: of the cylinder on which the waves are one.
         rho: where.
-        first: the first order p.
         out: to be filled.
     """
 

@@ -145,20 +145,12 @@ def summed(function: Callable[[range], _T], count: int) -> list[_T]:
     return each(function, [range(first, count, _THREADS) for first in range(min(_THREADS, count))])
 
 
-def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 0) -> Samples:
-    """Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders - first, 3, 3).
-
-    Args:
-        k: wave number, 1/m.
-        radius: of the cylinder, m.
-        rho: where, (n,), m.
-        orders: the order after the last.
-        first: the first order.
-    """
+def extensions(k: float, radius: float, rho: Samples, orders: int) -> Samples:
+    """Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3)."""
     from spirillum.kernels.stokes_flow import wave_extensions
 
-    found = np.empty((rho.size, orders - first, 3, 3))
-    wave_extensions(k, radius, rho, first, found)
+    found = np.empty((rho.size, orders, 3, 3))
+    wave_extensions(k, radius, rho, found)
     return found
 
 
