@@ -17,30 +17,31 @@ static const double ALL_OF_IT = 38.0; /* from where on 1 - exp(-x) is 1 */
 
 enum { POWERS = 6 }; /* squarings up to the 64th power */
 
+/* L^-1 S of a lower triangular matrix. */
+static void solve_lower(double l[6][6], const double s[6][6], double out[6][6]) {
+    for (int i = 0; i < 6; i++) {
+        const double over = 1.0 / l[i][i];
+        for (int j = 0; j < 6; j++) out[i][j] = s[i][j];
+        for (int k = 0; k < i; k++)
+            for (int j = 0; j < 6; j++) out[i][j] -= l[i][k] * out[k][j];
+        for (int j = 0; j < 6; j++) out[i][j] *= over;
+    }
+}
+
 /* Largest eigenvalue of F^-1 S of two symmetric matrices, F positive definite, S positive semi-definite, from above by
  * at most 3 %: the 64th root of the trace of the 64th power of L^-1 S L^-T, F = L L'. */
 static double largest_share(const double f[6][6], const double s[6][6]) {
-    double l[6][6] = {{0.0}}, m[2][6][6], traces[POWERS + 1], root = 1.0;
+    double l[6][6] = {{0.0}}, m[2][6][6], turned[6][6], traces[POWERS + 1], root = 1.0;
     for (int i = 0; i < 6; i++)
         for (int j = 0; j <= i; j++) {
             double left = f[i][j];
             for (int k = 0; k < j; k++) left -= l[i][k] * l[j][k];
             l[i][j] = i == j ? sqrt(left) : left / l[j][j];
         }
-    for (int i = 0; i < 6; i++) { /* L^-1 S */
-        const double over = 1.0 / l[i][i];
-        for (int j = 0; j < 6; j++) m[1][i][j] = s[i][j];
-        for (int k = 0; k < i; k++)
-            for (int j = 0; j < 6; j++) m[1][i][j] -= l[i][k] * m[1][k][j];
-        for (int j = 0; j < 6; j++) m[1][i][j] *= over;
-    }
-    for (int i = 0; i < 6; i++) { /* and of its transpose */
-        const double over = 1.0 / l[i][i];
-        for (int j = 0; j < 6; j++) m[0][i][j] = m[1][j][i];
-        for (int k = 0; k < i; k++)
-            for (int j = 0; j < 6; j++) m[0][i][j] -= l[i][k] * m[0][k][j];
-        for (int j = 0; j < 6; j++) m[0][i][j] *= over;
-    }
+    solve_lower(l, s, m[1]);
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++) turned[i][j] = m[1][j][i];
+    solve_lower(l, (const double (*)[6])turned, m[0]);
     for (int k = 0; k <= POWERS; k++) {
         const double (*here)[6] = (const double (*)[6])m[k % 2];
         double (*next)[6] = m[(k + 1) % 2];
