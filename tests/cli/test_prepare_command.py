@@ -82,7 +82,7 @@ def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
 def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[str], quiet: bool) -> None:
     """A line on standard error, also where no progress bar is shown."""
     with progress_bar(quiet=quiet) as progress:
-        progress(progress_message(60, 2, kept=0), 0, 60)
+        progress(progress_message(60, 2, 0, (10.0, 17.0)), 0, 60)
         progress("table of the tube", 1, 60)
     shown = capsys.readouterr()
     assert shown.out == ""
@@ -93,5 +93,5 @@ def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[
 
 def test_what_an_interrupted_preparation_has_kept_is_announced() -> None:
     """The time is that of the rest."""
-    said = progress_message(60, 2, kept=48)
+    said = progress_message(60, 2, 48, (10.0, 17.0))
     assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min" in said

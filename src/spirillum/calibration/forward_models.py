@@ -27,7 +27,7 @@ from spirillum.dynamics.tube_options import InTube
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.library import TabledTube, tables_of
-from spirillum.fluid.tube.progress_messages import TABLE_TAKES
+from spirillum.fluid.tube.stages import StageName
 from spirillum.kernels.native import thread_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement, gap_on_asperities
@@ -36,7 +36,7 @@ from spirillum.swimming.band import band_poses
 from spirillum.swimming.drawn_resistance import Draws, TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import passing_tables, prepare_all, table_for
+from spirillum.swimming.preparation import passing_tables, preparation_time, prepare_all, table_for
 
 if TYPE_CHECKING:
     from scipy.interpolate import RBFInterpolator
@@ -100,18 +100,21 @@ def _tables(
     lacking = [label for label, table in zip(experiment.labels(), found, strict=True) if table is None]
     if lacking and not prepare:
         otherwise = ", or model 'sbt', which leaves out the walls"
-        raise without_tables(experiment, lacking, "model 'tube' asks a table", otherwise)
+        raise without_tables(experiment, lacking, "model 'tube' asks a table", "straight", otherwise)
     made = passing_tables(experiment.robots, progress=on_progress) if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})
 
 
-def without_tables(experiment: Experiment, lacking: Sequence[str], need: str, otherwise: str = "") -> InputError:
-    """The error of a fit some of whose robots lack the table that it needs."""
+def without_tables(
+    experiment: Experiment, lacking: Sequence[str], need: str, stage: StageName, otherwise: str = ""
+) -> InputError:
+    """The error of a fit some of whose robots lack the stage of a table that it needs."""
+    first = experiment.robots[experiment.labels().index(lacking[0])]
     more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
     return InputError(
         f"{experiment.source}: {need} of every robot, and {len(lacking)} of {len(experiment.robots)} have none "
         f"({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
-        f"{TABLE_TAKES}{otherwise}"
+        f"{preparation_time(RobotBatch.of(first), stage)} on two cores{otherwise}"
     )
 
 
@@ -215,7 +218,7 @@ def _check_yaw_tables(experiment: Experiment, on_progress: Callable[[str, int, i
     known = [has_table(RobotBatch.of(robot), "yaw") for robot in experiment.robots]
     lacking = [label for label, has in zip(experiment.labels(), known, strict=True) if not has]
     if lacking and not prepare:
-        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses")
+        raise without_tables(experiment, lacking, "a trial asks a table with yawed poses", "yaw")
     if lacking:
         prepare_all(experiment.robots, stage="yaw", progress=on_progress)
 

@@ -19,7 +19,7 @@ from spirillum.dynamics.prediction import predict
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import WALLED, has_table
-from spirillum.swimming.preparation import prepare_all
+from spirillum.swimming.preparation import preparation_time, prepare_all
 from spirillum.swimming.released_motion import ReleasedMotion
 
 Progress = Callable[[str, int, int], None]
@@ -206,10 +206,6 @@ CONFIRMED = 3
 """Designs that are confirmed."""
 NEAR = 0.1
 """Designs that are compared differ from each other by at least this share of a range."""
-_NO_TABLE = (
-    "its tube has no table with yawed poses yet, which takes 2 to 5 minutes of two cores; use --confirm, or `spirillum "
-    "prepare` with its robot file"
-)
 
 
 @dataclass(frozen=True)
@@ -261,7 +257,9 @@ def confirmed(
 def _trial_of(robot: Robot) -> tuple[float, ReleasedMotion]:
     """Speed held at the pose, and the trial."""
     if robot.channel is not None and not has_table(RobotBatch.of(robot), "yaw"):
-        return float("nan"), ReleasedMotion(reason=_NO_TABLE)
+        takes = preparation_time(RobotBatch.of(robot), "yaw")
+        reason = f"its tube has no table with yawed poses yet; use --confirm, or `spirillum prepare`, in {takes}"
+        return float("nan"), ReleasedMotion(reason=reason)
     answer = predict(robot, model=WALLED, band=False)
     trial = answer.trial
     return answer.forward_velocity, ReleasedMotion(reason="it is in no tube") if trial is None else trial

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "30 to 70 s on two cores"
-"""What the table of one robot takes without yaw, measured on a fast and on a slow machine."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 LEVEL = "no table of this tube: the flow is solved for in some half a minute"
 """How a message begins that is to be read where the answer is not there at once."""
@@ -25,7 +23,7 @@ def _rounded(seconds: float) -> tuple[int, str]:
     return (max(round(seconds / 10.0), 1) * 10, "s") if seconds < 95.0 else (round(seconds / 60.0), "min")
 
 
-def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, float] = (10.0, 17.0)) -> str:
+def progress_message(poses: int, workers: int, kept: int, seconds: tuple[float, float]) -> str:
     """Return the announcement of a table that is made: from how many poses, and about how long it takes."""
     remaining = poses - kept
     before = f", {kept} of them saved before, {remaining} remaining" if kept else ""
