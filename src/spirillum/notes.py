@@ -304,12 +304,12 @@ class NoteKind(NamedTuple):
 
 
 _FIRST = ("posterior-unusable", "synthetic")
-"""What outweighs all that a video shows."""
+"""Codes that come before all flags of a video."""
 _LIGHT = (
     *("stray-frames", "pixels-not-square", "pixel-aspect-replaced", "pictures-turned", "slant-left-out"),
     *("sixteen-bit-images", "several-films", "by-hand", "corrected-by-hand", "imported", "no-video"),
 )
-"""What a video shows and hardly changes its numbers."""
+"""Codes of flags of a video that hardly change its numbers: they come last."""
 KINDS: dict[str, NoteKind] = {
     **{
         code: NoteKind("caution", (CAUTIONS | TRACKING)[code])

@@ -1,4 +1,4 @@
-"""What is kept of a command that was interrupted."""
+"""Interrupted commands: the sentence about their finished work."""
 
 from __future__ import annotations
 

@@ -207,7 +207,7 @@ class Evaluation:
         return found
 
     def scores(self, shares: Samples) -> DesignScores:
-        """What designs are worth, by shares of the ranges, (designs, variables); impossible ones are not evaluated."""
+        """Objective values of designs by shares of the ranges, (designs, variables); infeasible ones are skipped."""
         count = len(shares)
         excess = self.unbuildable(shares)
         cost = np.tile(REFUSED + excess, (len(self.objectives), 1))

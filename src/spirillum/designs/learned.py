@@ -188,7 +188,7 @@ def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:
 
 
 def _of_no_body(batch: RobotBatch) -> Samples:
-    """What replaces the drag on the rotation of a body, (3, 3), of a bare tail, that A may be definite."""
+    """Stand-in for the rotational drag of the body, (3, 3), of a bare tail: it keeps A positive definite."""
     return np.diag([0.0, float(batch.shape == "none"), 0.0])
 
 

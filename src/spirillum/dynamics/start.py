@@ -108,7 +108,7 @@ def turning_rate(steady: Prediction) -> float:
 
 
 def links_without_walls(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
-    """What a robot's rates follow from in unbounded fluid, with films between it and a channel's wall."""
+    """Inputs of a robot's rates in unbounded fluid, with lubrication films between it and a channel's wall."""
     effective = steady.effective_friction
     return two_links(
         steady.robot,

@@ -230,7 +230,7 @@ def _motor_rate(track: Track, body: Rate, tail: Rate, periodic: list[PeriodicErr
     if body.steady and tail.steady:
         return tail.less(body)
     difference = track.tail_phase - track.body_angle
-    for rate in (body, tail):  # what is left out of one angle is left out of their difference
+    for rate in (body, tail):  # outliers of one angle are left out of their difference
         if rate.residual.size == track.time.size:
             difference = np.where(np.isfinite(rate.residual), difference, np.nan)
     error = np.hypot(track.tail_phase_error, track.body_angle_error)

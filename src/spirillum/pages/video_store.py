@@ -62,7 +62,7 @@ class Uploads:
 
     @asynccontextmanager
     async def received(self, request: Request, largest: int) -> AsyncIterator[bytes]:
-        """What a request sends, counted until the block ends."""
+        """Yield the body of a request; its bytes count until the block ends."""
         size = stated_size(request)
         if size > largest:
             raise TooLargeError(f"{size} bytes are too much; allowed: {largest} bytes")

@@ -33,7 +33,7 @@ def gap_on_asperities(roughness: Samples | float) -> Samples:
 
 
 class Placement(Options):
-    """TubePose of a robot in its channel, for models that compute the walls; frozen, SI inside.
+    """Position and attitude of a robot in its channel, for models that compute the walls; frozen, SI inside.
 
     The channel is horizontal, the body's mid-length lies in the vertical plane through the channel's axis, and without
     yaw so does the robot's axis. What is None was left open: a model then takes its own default, or answers with a band

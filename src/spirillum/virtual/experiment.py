@@ -222,7 +222,7 @@ def virtual_experiment(
 
 
 def _answered_by(source: str, reason: str) -> dict[str, str]:
-    """What a robot's rates are from, and why where a model was chosen."""
+    """Source of a robot's rates, with the reason for its model where one was chosen."""
     return ({"model": source} if source else {}) | ({"model_reason": reason} if reason else {})
 
 

@@ -147,7 +147,7 @@ def built_tables(
 
 @dataclass(frozen=True)
 class _Request:
-    """All poses that are solved for to make one table; the dearest ones first."""
+    """All poses that are solved for to make one table; the most expensive ones first."""
 
     places: Places
     straight: list[NodeSolution]

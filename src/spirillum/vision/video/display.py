@@ -109,7 +109,7 @@ def stated_aspect(name: str, stated: float | None, given: float | None) -> float
 def display_flags(
     display: Display, stored: tuple[int, int], stated: float | None, given: float | None, slant: float = 0.0
 ) -> list[Flag]:
-    """What was done to the pictures, and on whose word."""
+    """Corrections of the pictures, and where each was stated."""
     flags, width = [], round(stored[0] * display.aspect)
     if given is not None and stated is not None and round(stored[0] * stated) != width:
         sentence = (
