@@ -136,7 +136,7 @@ def simulate(tube: str, bound: str, wait: str) -> Any:
 
 def print_means(run: Any) -> None:
     """Speed, body rate, gap and forces."""
-    speed, rate = (float(run[f"mean_{name}"]) for name in ("forward_velocity", "body_rotation_rate"))
+    speed, rate = (float(run[f"mean_{name}_on"]) for name in ("forward_velocity", "body_rotation_rate"))
     loads = ", ".join(
         f"{name} {1e3 * float(run[name].mean()):.1f} mN" for name in ("contact_force", "film_load", "lift")
     )
