@@ -88,7 +88,16 @@ _RELEASED = ("duration", "roughness", "in_tube")
         "in_tube.azimuth": "of the start of a run: settle and simulate",
     },
 )
-def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> None:
+def predict(
+    request: Request,
+    *,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Plot the speeds beside each other: .png, .pdf or .svg."),
+    ] = None,
+    all_of_it: All = False,
+    json: Json = False,
+) -> None:
     """Predict one robot: held at a pose, in a trial after release in its tube, and in the steady state.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
@@ -97,6 +106,7 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
     from spirillum.kernels.native import run_together
     from spirillum.papers.biorob2012.published import other_tube, published_beside
 
+    draw = renderer.picture(plot, "prediction.png", "spirillum.view.figures.prediction:prediction_figure")
     with renderer.progress_bar(quiet=json) as progress:
         result = request(progress=progress)
         asked = {
@@ -105,8 +115,9 @@ def predict(request: Request, *, all_of_it: All = False, json: Json = False) -> 
         beside = other_tube(result, asked)
         answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
         published = published_beside(result, beside)
+        files = {} if plot is None else {"plot": draw(result)}
     more = {"published": published} if published else {}
-    renderer.show({**answer, **more}, json=json, all_of_it=all_of_it)
+    renderer.show(renderer.with_files({**answer, **more}, **files), json=json, all_of_it=all_of_it)
 
 
 @from_function("spirillum.dynamics.comparison:compare_models", without=NO_FORM)

@@ -54,6 +54,7 @@ def prediction(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         yield from released_columns(answer)
     for item in answer.get("published", ()):
         yield _beside_published(item)
+    yield from files_of(answer, plot="plot")
     yield from placement_of(answer["placement"], RELEASED if "lying" in answer else "placement")
     if "lying" in answer:
         yield from resting_pose(answer["lying"])

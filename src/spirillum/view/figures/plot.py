@@ -32,6 +32,7 @@ from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.measurement import measurement_figures
+from spirillum.view.figures.prediction import prediction_figure
 from spirillum.view.figures.release import settling_figure
 from spirillum.view.figures.robot import robot_figure
 from spirillum.view.figures.style import DPI, save_as, styled
@@ -70,8 +71,8 @@ def plot(answer: Any) -> Plot:
     """Plot a result: the figure of its command, or the most informative one.
 
     Args:
-        answer: a robot (`sp.load`), a prediction (its robot in its pose, to scale), or what `compare_models`, `study`,
-            `simulate`, `magnetic_sweep`, `settle`, `design`, `flow`, `control`, `measure` or `calibrate` returns.
+        answer: a robot (`sp.load`), or what `predict`, `compare_models`, `study`, `simulate`, `magnetic_sweep`,
+            `settle`, `design`, `flow`, `control`, `measure` or `calibrate` returns.
 
     Raises:
         InputError: for anything else.
@@ -98,7 +99,7 @@ def _of_measurement(answer: Measurement) -> Figure:
 
 _FIGURES: dict[type, Callable[[Any], Figure]] = {
     Robot: robot_figure,
-    Prediction: lambda answer: robot_figure(answer.robot),
+    Prediction: prediction_figure,
     ModelComparison: comparison_figure,
     Settling: settling_figure,
     Design: design_figure,
