@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,16 @@ def test_stripes_that_repeat_after_half_a_turn_halve_the_limit(setup_file: Path,
     assert feasibility(setup_file, **{**RATES, "body_rate": rate}).feasible is feasible
     once = {"seal.stripes": ["red", "yellow", "green", "blue"]}
     assert feasibility(setup_file, **{**RATES, "body_rate": rate}, overrides=once).feasible
+
+
+def test_a_video_states_its_rate_and_length(setup_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = SimpleNamespace(rate=25.0, duration=3.0, size=(640, 480))
+    camera = SimpleNamespace(scale=SimpleNamespace(length_per_pixel=2.5e-4))
+    monkeypatch.setattr("spirillum.measurement.feasibility.opened", lambda *_: film)
+    monkeypatch.setattr("spirillum.measurement.feasibility.scale_of", lambda *_, **__: (camera, film))
+    expected = feasibility(setup_file, **RATES, video="trial.mp4").expected
+    assert (expected["frames_per_second"], expected["duration"]) == ((25.0, "video"), (3.0, "video"))
+    assert feasibility(setup_file, **RATES, video="trial.mp4", duration="5 s").expected["duration"] == (5.0, "given")
 
 
 def test_a_robot_without_stripes_cannot_show_its_rotation(setup_file: Path) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
@@ -17,9 +17,13 @@ from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
+from spirillum.vision.camera.camera import opened, scale_of
 from spirillum.vision.setup import Setup, load_setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.constants import UNWRAPPING
+
+if TYPE_CHECKING:
+    from spirillum.vision.video.frames import Video
 
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
@@ -151,8 +155,8 @@ def feasibility(
             `predict`, where it answers at once.
         body_rate: expected rate of the body, with its unit or a float in rad/s; None: predicted.
         speed: expected forward velocity, with its unit or a float in m/s; None: predicted.
-        duration: length of a trial, with its unit or a float in s; None: 20 s.
-        frames_per_second: frames a second; None: the setup's, or 30.
+        duration: length of a trial, with its unit or a float in s; None: the video's, or 20 s.
+        frames_per_second: frames a second; None: the setup's, the video's, or 30.
         view_width: width of the view at the robot's axis, with its unit or a float in m; None: from the setup's scale.
         picture_width: width of the picture, pixels; None: the video's, or 640.
         video: a video or folder of images from whose ruler the scale is fitted, in place of `view_width`.
@@ -167,20 +171,26 @@ def feasibility(
         beside = Path(setup).parent / chosen.robot.file
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
     expected, caution = _expected(robot, tail_rate, body_rate, speed)
-    rate, source_of_rate = chosen.camera.frames_per_second or _FRAMES_PER_SECOND, "assumed"
-    if frames_per_second is not None:
-        rate, source_of_rate = frames_per_second, "given"
-    elif chosen.camera.frames_per_second:
-        source_of_rate = "setup"
+    film = None if video is None else opened(video, chosen)
+    rate, source_of_rate = _first(
+        (frames_per_second, "given"),
+        (chosen.camera.frames_per_second, "setup"),
+        (film and film.rate, "video"),
+        (_FRAMES_PER_SECOND, "assumed"),
+    )
     check_range("fps", rate, 0.01, 1e5)
-    span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
+    span, source_of_span = _first(
+        (None if duration is None else parse_option("duration", duration, KINDS["time"]), "given"),
+        (film and film.duration, "video"),
+        (_DURATION, "assumed"),
+    )
     if not 0.0 < span <= _LONGEST:
         raise InputError(f"duration = {span:g} s; allowed: more than 0 s, at most {_LONGEST:g} s (a day)")
     width = _WIDTH if picture_width is None else picture_width
     check_range("width", width, 32, 100_000, " pixels")
-    pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, video)
+    pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, film)
     expected |= {
-        "duration": (span, "assumed" if duration is None else "given"),
+        "duration": (span, source_of_span),
         "frames_per_second": (rate, source_of_rate),
     }
     expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
@@ -198,6 +208,11 @@ def feasibility(
     intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
     warnings = (*_warnings(checks, expected, pixel, shares), *caution)
     return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, warnings)
+
+
+def _first(*values: tuple[float | None, str]) -> tuple[float, str]:
+    """Return the first value that there is, with its source."""
+    return next((value, source) for value, source in values if value is not None)
 
 
 def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
@@ -254,16 +269,14 @@ def _expected(
 
 
 def _pixel(
-    setup: Setup, folder: Path, view_width: str | float | None, width: int, video: str | Path | None
+    setup: Setup, folder: Path, view_width: str | float | None, width: int, video: Video | None
 ) -> tuple[float, str, int]:
     """Length per pixel at the height of the axis, m, its source, and the picture's width, pixels."""
     if view_width is not None:
         return parse_option("view-width", view_width, KINDS["length"]) / width, "view width", width
     if video is not None:
-        from spirillum.vision.track.assembly import scale_of
-
-        found, film = scale_of(video, setup, folder=folder)
-        return found.scale.length_per_pixel, "ruler in the video", film.size[0]
+        found, _ = scale_of(video, setup, folder=folder)
+        return found.scale.length_per_pixel, "ruler in the video", video.size[0]
     if setup.markers.length_per_pixel is not None:
         return setup.markers.length_per_pixel, "setup", width
     return math.nan, "", width
