@@ -85,6 +85,7 @@ OTHER: dict[str, list[str]] = {
     "--field-yaw": ["3deg"],
     "--field-pitch": ["3deg"],
     "--column": ["single"],
+    "--panels": ["all"],
     "--draws": ["30"],
     "--rate": ["8Hz"],
     "--fineness": ["0.5"],

@@ -55,7 +55,9 @@ _FullModel = Annotated[
 def simulate(
     request: Request,
     *,
-    output: Output,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
+    ] = None,
     model: _FullModel = "auto",
     on: Annotated[
         list[str] | None,
@@ -76,6 +78,10 @@ def simulate(
     plot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
+    ] = None,
+    panels: Annotated[
+        str | None,
+        typer.Option(help="With --plot: main (speed and gap) or all; else main.", rich_help_panel=_PICTURES),
     ] = None,
     column: Annotated[
         str | None,
@@ -101,21 +107,23 @@ def simulate(
     from spirillum.cli import renderer
     from spirillum.dynamics.integration import INTERRUPTED
     from spirillum.dynamics.run_summary import run_answer
-    from spirillum.errors import InputError
+    from spirillum.errors import InputError, check_choice
     from spirillum.files import PICTURES, guard_inputs, netcdf_target, output_target, write_dataset
 
     over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
     files_read = (request.typed.get(name) for name in ("in_tube.continued", "posterior", "calibration", "timing.duty"))
     with guard_inputs(*files_read, flow if over_time else None):
-        target = netcdf_target(output)
+        target = None if output is None else netcdf_target(output)
         picture = None if plot is None else output_target(plot, PICTURES, "run.png")
-    width = column or "double"
+    look = {name: word for name, word in (("column", column), ("panels", panels)) if word is not None}
     if picture is not None:
-        from spirillum.view.figures.trajectory import check_column
+        from spirillum.view.figures.trajectory import COLUMNS, PANELS
 
-        check_column(width)
-    elif column is not None:
-        raise InputError(f"column = {column[:40]!r} without a plot, whose width it is; allowed: with --plot")
+        for name, allowed in (("column", COLUMNS), ("panels", PANELS)):
+            check_choice(name, look.get(name, next(iter(allowed))), allowed)
+    elif look:
+        name, word = next(iter(look.items()))
+        raise InputError(f"{name} = {word[:40]!r} without a plot, whose look it is; allowed: with --plot")
     if movie is not None:
         check_movie(movie)
     if on:
@@ -124,12 +132,14 @@ def simulate(
         request.typed["in_tube.flow" if over_time else "placement.flow"] = flow
     with renderer.progress_bar(quiet=json) as progress:
         dataset = request(model=model, progress=progress)
-        write_dataset(dataset, target)
-        files, warnings = _drawn(dataset, picture, width, movie, progress)
+        if target is not None:
+            write_dataset(dataset, target)
+        look = {"panels": "main", **look}
+        files, warnings = _drawn(dataset, picture, look, movie, progress, written=target is not None)
     found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
-    renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
+    renderer.show(renderer.with_files(found, file=None if output is None else str(output), **files), json=json)
     if any(event["what"] == INTERRUPTED for event in found["events"]):
-        raise KeyboardInterrupt(f"the run until then is kept in {output}")
+        raise KeyboardInterrupt("" if output is None else f"the run until then is kept in {output}")
 
 
 def check_movie(movie: Path) -> None:
@@ -144,7 +154,7 @@ def check_movie(movie: Path) -> None:
 
 
 def _drawn(
-    dataset: xr.Dataset, picture: Path | None, column: str, movie: Path | None, progress: Any
+    dataset: xr.Dataset, picture: Path | None, look: dict[str, str], movie: Path | None, progress: Any, *, written: bool
 ) -> tuple[dict[str, str], list[str]]:
     """Draw and film a run; the files by what they are, and the film's warnings."""
     files: dict[str, str] = {}
@@ -153,27 +163,27 @@ def _drawn(
         from spirillum.view.figures.style import save_as
         from spirillum.view.figures.trajectory import trajectory_figure
 
-        with _after_the_run("plot"):
-            save_as(trajectory_figure(dataset, column), picture)
+        with _after_the_run("plot", written=written):
+            save_as(trajectory_figure(dataset, **look), picture)
         files["plot"] = str(picture)
     if movie is not None:
         from spirillum.view.scene3d.film import film
 
-        with _after_the_run("film"):
+        with _after_the_run("film", written=written):
             warnings += film(dataset, movie, progress=progress).warnings
         files["movie"] = str(movie)
     return files, warnings
 
 
 @contextmanager
-def _after_the_run(what: str) -> Iterator[None]:
-    """Report that something cannot be plotted and that the run itself is kept."""
+def _after_the_run(what: str, *, written: bool) -> Iterator[None]:
+    """Report that something cannot be plotted, and whether the run itself is kept."""
     from spirillum.errors import InputError
 
     try:
         yield
     except InputError as error:
-        raise InputError(f"the run is written, the {what} is not: {error}") from error
+        raise InputError(f"the run is {'' if written else 'not '}written, the {what} is not: {error}") from error
 
 
 @from_function(

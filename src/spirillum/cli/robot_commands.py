@@ -170,6 +170,11 @@ def export(
         refuse_conflicts(context, "recording")
         renderer.show(export_run(str(request.named_robot), target, film=film, speed=speed).to_dict(), json=json)
         return
+    if Path(str(request.named_robot)).suffix == ".nc":
+        raise InputError(
+            f"{request.named_robot} is a run, which has no shape to write as {target.suffix or 'a file'}; allowed: "
+            ".mcap for a run, or a robot (preset or file) for the other formats"
+        )
     refuse_conflicts(context, "no recording", ending=target.suffix or "no ending")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")

@@ -152,6 +152,8 @@ class Steady(Controller):
 
 _DURATION = 40.0
 """Of a run, s."""
+_FAR = 3.0
+"""Multiple of the speed of the held robot that no run reaches."""
 _STEP = 0.5
 """Step of the runs by which the open loop is found, s."""
 _SPEED_OVER = 2.0
@@ -192,6 +194,11 @@ class _CourseTask(Task):
         duration = _DURATION if self.duration is None else self.duration
         speed, full_duty = float(plant.steady.forward_velocity), plant.state.command
         way = float(np.sign(speed))
+        if asked > _FAR * abs(speed):  # before the robot is followed, which takes seconds
+            raise InputError(
+                f"task.speed = {show(asked, 'mm/s')}; allowed: below {show(abs(speed), 'mm/s')}, the robot's speed "
+                "held at its pose"
+            )
         fastest = way * _mean_speed(plant, full_duty, duration, progress)
         if not asked < fastest:
             raise InputError(

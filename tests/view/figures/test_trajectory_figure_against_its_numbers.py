@@ -254,3 +254,11 @@ def test_run_without_data_is_named(run: Any) -> None:
         trajectory_figure(run.isel(time=[0]))
     with pytest.raises(sp.InputError, match="no variable to draw"):
         trajectory_figure(run[["time"]])
+
+
+@pytest.mark.usefixtures("unplaced")
+def test_short_figure_has_speed_and_gap(tube_run: Any) -> None:
+    shown = [axes.get_ylabel().partition(" (")[0] for axes in trajectory_figure(tube_run, panels="main").axes]
+    assert shown == ["velocity $U_x$", "gap"]
+    with pytest.raises(sp.InputError, match="panels = 'some'; allowed: main, all"):
+        trajectory_figure(tube_run, panels="some")

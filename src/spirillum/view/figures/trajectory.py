@@ -19,6 +19,7 @@ from spirillum.dynamics.run_file import check_increasing, robot_of
 from spirillum.errors import InputError, check_choice
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
+from spirillum.units import show_height
 from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
@@ -146,13 +147,22 @@ _LINE_OF: dict[str, Any] = {
 }
 
 
-def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
-    """A run in time. Panels without data are left out; events are numbered on the time axes and named below."""
-    check_column(column)
+_MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")
+"""Panels of the short figure, the first two that a run has."""
+PANELS = ("main", "all")
+"""Which panels a figure has: speed and gap, or everything."""
+
+
+def trajectory_figure(dataset: xr.Dataset, column: str = "double", panels: str = "all") -> Figure:
+    """A run in time, `PANELS` of it without those that lack data; events are numbered on the time axes, named below."""
+    check_choice("column", column, COLUMNS)
+    check_choice("panels", panels, PANELS)
     time = _time_of(dataset)
     path = _path_of(dataset, time)
     tube = _tube_robot(dataset, path)
     shown = [panel for panel in (_PANELS if tube is None else _IN_TUBE) if _has(dataset, panel, time)]
+    if short := panels == "main":
+        shown = sorted((one for one in shown if one.label in _MAIN), key=lambda one: _MAIN.index(one.label))[:2]
     if path is None and not shown:
         raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
     events = events_of(dataset, time)
@@ -160,7 +170,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
     beside = 2 if column == "double" else 1
     with styled():
         paths, section, panel_height = _HEIGHTS[column]
-        heads = 0 if path is None else 2 if tube is None else 1
+        heads = 0 if path is None or short else 2 if tube is None else 1
         drawn = heads + len(shown)
         first = [paths if tube is None else section] * -(-heads // beside)
         rows = [*first, *[panel_height] * (-(-drawn // beside) - len(first))]
@@ -173,15 +183,17 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
             notes=[*(["black: means over a turn of the tail"] if turn else []), *event_words(events)],
             sharey=False,
         )
-        panels = list(sheet.panels.flat)
-        for axes in panels[drawn:]:
+        every = list(sheet.panels.flat)
+        for axes in every[drawn:]:
             axes.remove()
-        if path is not None and tube is not None:
-            draw_cross_section(panels[0], dataset, tube, path)
-        elif path is not None:
-            for axes, (name, across) in zip(panels, (("side", 2), ("from above", 1)), strict=False):
+        if path is None or short:
+            pass
+        elif tube is not None:
+            draw_cross_section(every[0], dataset, tube, path)
+        else:
+            for axes, (name, across) in zip(every, (("side", 2), ("from above", 1)), strict=False):
                 _draw_path(axes, path, across, name)
-        over_time = panels[heads:drawn]
+        over_time = every[heads:drawn]
         for number, (axes, panel) in enumerate(zip(over_time, shown, strict=True)):
             _draw_panel(axes, dataset, panel, time, beside, turn)
             mark_events(axes, events, time, numbered=number < beside)
@@ -192,13 +204,8 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
                 axes.set_xlabel("time (s)")
         for axes in over_time[1:]:
             axes.sharex(over_time[0])
-        add_letters(panels[:drawn])
+        add_letters(every[:drawn])
         return sheet.finished()
-
-
-def check_column(column: str) -> None:
-    """Refuse a width that no page has."""
-    check_choice("column", column, COLUMNS)
 
 
 def _tube_robot(dataset: xr.Dataset, path: Samples | None) -> Robot | None:
@@ -240,7 +247,7 @@ def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
             for name, words in (("ends", "ends"), ("friction_coefficient", "dry friction"))
             if name in attrs
         ]
-        found += [f"roughness {1e6 * float(attrs['roughness']):.3g} µm"] if "roughness" in attrs else []
+        found += [f"roughness {show_height(float(attrs['roughness']))}"] if "roughness" in attrs else []
         found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
     if "draws" in attrs:
         found.append(f"the median of {attrs['draws']} draws")
