@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.view.figures.comparison import effects_figure
@@ -57,3 +58,9 @@ def test_the_figure_shows_the_speeds(compared: sp.ModelComparison) -> None:
     assert [float(words[2]) for words in factors[1:]] == pytest.approx(
         np.divide(speeds[1:], speeds[:-1]).tolist(), abs=5e-3
     )
+
+
+def test_a_figure_without_a_trial_says_why() -> None:
+    figure = effects_figure(sp.compare_models("biorob2012-wide", tail_rate="1.2 Hz"))
+    words = " ".join(text.get_text() for text in figure.findobj(Text)).replace("\n", " ")
+    assert "No trial: a tail rate is prescribed" in words

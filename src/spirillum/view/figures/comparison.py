@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
 from spirillum.arrays import Values
 from spirillum.display import percent
@@ -19,6 +19,7 @@ from spirillum.dynamics.comparison import RELEASED_EFFECT, ModelComparison, esti
 from spirillum.dynamics.trial import ASSUMPTION
 from spirillum.errors import InputError
 from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
+from spirillum.swimming.model_choice import WALLED
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters
@@ -293,7 +294,7 @@ def effects_figure(comparison: ModelComparison) -> Figure:
             columns=1,
             notes=[
                 "Each line keeps the effects above it; factor: speed over that of the line above.",
-                *([_TRIAL] if effects[-1].name == RELEASED_EFFECT else []),
+                _TRIAL if effects[-1].name == RELEASED_EFFECT else _why_no_trial(comparison),
             ],
         )
         axes = sheet.panels[0, 0]
@@ -303,6 +304,15 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
+
+
+def _why_no_trial(comparison: ModelComparison) -> str:
+    """Return why the waterfall ends before the trial, in a sentence."""
+    held = comparison.predictions.get(WALLED)
+    why = comparison.refusals.get(WALLED, f"model '{WALLED}' is not among those that are compared")
+    if held is not None:
+        why = held.trial.reason if held.trial is not None else "it was not requested"
+    return f"No trial: {plain(why, 300)}."
 
 
 _TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
@@ -317,6 +327,7 @@ def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:
     logarithmic = bool(np.all(speeds > 0.0))
     if logarithmic:
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlim(float(speeds.min()) / 1.3, float(speeds.max()) * _ROOM_OF_AXIS)
