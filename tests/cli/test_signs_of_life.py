@@ -22,6 +22,19 @@ def test_work_is_named_at_a_terminal_only(
     assert not shown.out
 
 
+@pytest.mark.parametrize(("terminal", "told"), [(True, True), (False, False)])
+def test_work_that_is_silent_shows_that_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], terminal: bool, told: bool
+) -> None:
+    monkeypatch.setattr("rich.console.Console.is_terminal", terminal)
+    monkeypatch.setattr(renderer, "_SOON", 0.0)
+    with renderer.progress_bar(quiet=False):
+        time.sleep(0.3)
+    shown = capsys.readouterr()
+    assert ("at work" in shown.err) == told
+    assert not shown.out
+
+
 @pytest.mark.parametrize("quiet", [True, False])
 @pytest.mark.parametrize(("soon", "told"), [(0.0, 1), (60.0, 0)])
 def test_a_tube_without_a_table_is_named_where_its_answer_takes_a_while(

@@ -243,7 +243,7 @@ def _print_line(line: str) -> None:
 
 
 _SOON = 2.0
-"""Time after which it is said why an answer is not there at once, s."""
+"""Time after which progress is shown, and why an answer is not there at once, s."""
 
 
 @contextmanager
@@ -316,6 +316,7 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     before: list[int | None] = [0, 0]
 
     def tell(what: str, done: int, total: int | None) -> None:
+        silent.cancel()
         if what.startswith((*lines, SPEED_OF)):
             bar.console.print(wrapped(what), highlight=False)
             what, done, total = "at work", 0, None  # without an end, but with the time that goes by
@@ -325,7 +326,11 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         before[:] = done, total
         bar.update(task, description=escape(what), completed=done, total=total)
 
+    silent = Timer(_SOON, tell, ("at work", 0, None))  # no work has been told of: a sign of life
+    silent.daemon = True
+    silent.start()
     try:
         yield tell
     finally:
+        silent.cancel()
         bar.stop()

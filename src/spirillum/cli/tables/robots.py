@@ -132,7 +132,7 @@ def preparation(answer: Answer) -> Blocks:
     for index in range(len(valid["gap"]["value"])):
         ranges.add_row(*(in_unit(values[index], "m" if unit == "mm" else "rad", unit) for values, unit in columns))
     yield ranges
-    yield f"{answer['places']} places in {answer['seconds']['value']:.0f} s"
+    yield f"the table has {answer['places']} poses and took {answer['seconds']['value']:.0f} s to compute"
 
 
 def preparations(answer: Answer) -> Blocks:

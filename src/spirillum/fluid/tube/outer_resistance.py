@@ -103,10 +103,14 @@ def _solutions(
     """As `solutions`, node by node."""
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
-    tell(what, 0, len(places))
-    numbered, kept = list(enumerate(places)), "; completed nodes are saved"
-    answers = imap_unordered(_solve_numbered, numbered, workers, besides=kept, single=True)
-    for done, ((number, _), answer) in enumerate(answers, start=1):
+    numbered, saved = list(enumerate(places)), "; completed nodes are saved"
+    known = [number for number, place in numbered if all_kept([place])]  # they take no time, and tell of no pace
+    for number in known:
+        found[number] = _solve(places[number])
+    tell(what, len(known), len(places))
+    missing = [one for one in numbered if one[0] not in known]
+    answers = imap_unordered(_solve_numbered, missing, workers, besides=saved, single=True)
+    for done, ((number, _), answer) in enumerate(answers, start=len(known) + 1):
         found[number] = answer
         tell(what, done, len(places))
     return found
