@@ -47,8 +47,8 @@ CAUTIONS = {
         "model `tube` without a calibration."
     ),
     "friction-unset": (
-        "The effective friction B_eff of equation (18) is not given: rates, and the speeds that follow, are upper "
-        "bounds. Set `friction.effective`, or calibrate with observed rates."
+        "The effective friction B_eff of equation (18) is not given: rates and speeds are upper bounds. Set "
+        "`friction.effective`, or calibrate with observed rates."
     ),
     "friction-negative": (
         "The inferred effective friction is negative: the torque that the model predicts exceeds that of the motor. "

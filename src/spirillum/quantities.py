@@ -55,7 +55,7 @@ _STEADY = (
         "eq. (18)",
     ),
     Quantity(
-        "motor_residual_torque", "", "N m", "motor torque that the friction reading leaves unexplained", "eq. (18)"
+        "motor_residual_torque", "", "N m", "motor torque that the friction model leaves unexplained", "eq. (18)"
     ),
     Quantity("electrical_power", "P_e", "W", "electrical power at the battery's terminals", "Table II"),
     Quantity("shaft_power", "P_s", "W", "drive_torque times motor rate", "eq. (18)"),

@@ -350,6 +350,11 @@ def show(value: float, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
+def show_height(value: float) -> str:
+    """Text of a gap or of the height of asperities, m: in mm from 0.1 mm on, else in um."""
+    return show(value, "mm" if value >= 1e-4 else "um")
+
+
 def as_given(value: object, unit: str) -> str:
     """Text of a quantity as a caller gave it: words as they are, clipped, and a number with its SI unit."""
     if not is_number(value):

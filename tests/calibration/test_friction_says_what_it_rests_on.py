@@ -237,4 +237,4 @@ def test_the_friction_of_one_tail_is_shown_with_its_interval() -> None:
     answer = {"friction": "rotor", "tails": [{"effective_friction": friction}]}
     for tails, said in ((1, "1.235e-05 (1.087e-05 to 1.42e-05) N m s/rad"), (2, "1.235e-05 N m s/rad")):
         first, *_ = _friction({**answer, "tails": tails * answer["tails"]})
-        assert f"(friction reading rotor): {said}, tail by tail" in first
+        assert f"(friction model rotor): {said}, tail by tail" in first

@@ -55,7 +55,7 @@ def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
     assert "(" in found.message
     words = best_in_words(fastest.to_dict(), "1 mm/s")
     assert words.startswith(f"fastest: {fastest.robot.name}, 1 mm/s, ")
-    assert words.endswith(", at 3 of 4 places")
+    assert words.endswith(", at 3 of 4 poses")
     for name in (*names, *(f"{name}_at_place" for name in names)):  # a robot without any answer takes no place away
         dataset[name][{"wavelength": 0, "amplitude": 0}] = np.nan
     assert ranking_of(dataset).best[0].of_places == 4
@@ -181,3 +181,11 @@ def test_the_order_of_a_datasets_dimensions_changes_no_ranking() -> None:
 )
 def test_a_study_that_was_changed_prints_what_it_can(changed: Callable[[xr.Dataset], xr.Dataset]) -> None:
     assert str(changed(sp.study({**GRID, "models": ["rft"]})))
+
+
+def test_a_ranking_of_robots_held_in_a_tube_says_so() -> None:
+    held = ranking_of(sp.study({"robots": ["biorob2012-wide"], "models": ["tube"]}))
+    assert held.held
+    assert held.message.startswith("fastest held: biorob2012-wide, 0.5349 mm/s")
+    assert best_in_words(held.best[0].to_dict(), held=held.held).startswith("fastest held: biorob2012-wide")
+    assert not ranking_of(sp.study({"robots": ["biorob2012-wide"], "models": ["rft"]})).held

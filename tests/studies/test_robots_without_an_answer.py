@@ -34,7 +34,7 @@ def test_drive_without_a_steady_motion_is_told_by_its_readings() -> None:
     found = sp.study(question, overrides={"friction.effective": "1 N m s/rad"})
     assert found["outside"].values.ravel().tolist() == [0, REASONS.index("other")]
     assert (
-        "1 of 1 robots have no answer (rft), the first: no steady motion under 1 of 2 readings of the friction"
+        "1 of 1 robots have no answer (rft), the first: no steady motion under 1 of 2 friction models"
         in (found.attrs["warnings"])
     )
 

@@ -1,4 +1,4 @@
-"""Steady swimming against the balances of force, torque and energy, for every drive and reading of the friction.
+"""Steady swimming against the balances of force, torque and energy, for every drive and friction model.
 
 The balances are written out here from the unknowns (U, Omega, omega, tau), the model's axial matrix and the friction
 torques of each reading; nothing is taken from the code that eliminates the speed and solves for the rates.

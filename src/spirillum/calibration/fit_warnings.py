@@ -36,7 +36,7 @@ _BEYOND_TRIALS = 2.0 * ERROR_SCALE
 _IMPLAUSIBLE_FACTOR = 10.0
 """Median misfit, as a factor, beyond which observations and model must differ in robot or units."""
 _PRINTED = 0.1
-"""Relative difference of the body's rates beyond which a friction reading contradicts the observations."""
+"""Relative difference of the body's rates beyond which a friction model contradicts the observations."""
 _IMPLAUSIBLE_DISTANCE = 5.0
 """Standard deviations from the median of a wide prior beyond which a fit is refused."""
 _WIDE = 0.5

@@ -202,9 +202,7 @@ def optional_robot(text: str) -> Any:
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
 Settings = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
-    ),
+    typer.Option("--set", metavar="PATH=VALUE", help="Set a field of the robot, such as body.mass=8g; repeatable."),
 ]
 All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]

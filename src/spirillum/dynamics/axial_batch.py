@@ -156,7 +156,7 @@ class AxialBatch:
                 `torque-speed` drive.
             count: how many.
             model: a hydrodynamic model, or `auto`.
-            friction: reading of the friction; None: the robot's own.
+            friction: friction model; None: the robot's own.
             calibration: calibration file whose factors replace the robot's.
             placement: where they are held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
             ranges: what they are sampled from: `friction` and `viscosity`, low and high factor of the robot's own,

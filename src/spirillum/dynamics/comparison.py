@@ -132,7 +132,7 @@ class ModelComparison(DisplayMixin):
     robot: Robot
     """The robot."""
     friction: FrictionReading
-    """Reading of the friction, the same for all models."""
+    """Friction model, the same for all models."""
     models: tuple[str, ...]
     """Names of the models, in the order of the question."""
     predictions: Mapping[str, Prediction]
@@ -277,7 +277,7 @@ def compare_models(
         models: names of models; None: all that make a robot swim.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides, and the models differ in their rates too.
-        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        friction: friction model, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
             factors that represent walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.

@@ -140,7 +140,7 @@ class Plant:
         Args:
             robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
             model: `tube`, `slender` or `rft`; or `auto`: `tube` for a robot in a channel, else `slender`.
-            friction: reading of the friction; None: the robot's own.
+            friction: friction model; None: the robot's own.
             calibrated: apply the robot's calibration factors for this model.
             calibration: calibration file, or a fit read from one, whose factors replace the robot's.
             placement: `gap` or `eccentricity`, and `pitch`; with `tube` also yaw, ends and an imposed flow.

@@ -61,7 +61,7 @@ def predict(  # noqa: PLR0913 - the options of the command
             else `tube` in a channel and `slender` without.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the robot's
             drive decides.
-        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        friction: friction model, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose values replace the robot's.
         posterior: file of a calibration's posterior, for intervals.

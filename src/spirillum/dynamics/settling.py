@@ -248,7 +248,7 @@ def settle(
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
-        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        friction: friction model, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
         placement: where it is released: `gap` or `eccentricity`, `pitch`, `yaw`; `ends` of the channel, or a `flow`.
         weight: let weight and buoyancy act, if the masses are known.

@@ -80,7 +80,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` or
             `torque-speed` drive. None: `free`, but `held` where the model is that of a posterior or
             calibration and has the axial entries only, or was fitted to one pose in the tube without dry friction.
-        friction: reading of the friction; None: the robot's own.
+        friction: friction model; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
         posterior: posterior of a calibration: its median replaces the robot's values, and mean speed and rates

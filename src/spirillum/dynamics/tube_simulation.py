@@ -32,7 +32,7 @@ from spirillum.swimming.cautions import NO_WEIGHT
 from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.swimming.preparation import check_usual_resolution
 from spirillum.swimming.reynolds import check_stokes_flow, flow_limit, in_stokes_flow, motion_limits
-from spirillum.units import show
+from spirillum.units import show, show_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -347,4 +347,4 @@ def _from(time: Samples | None, first: int) -> str:
 
 
 def _length(value: float) -> str:
-    return show(float(f"{value:.2g}"), "mm" if value >= 1e-4 else "um")
+    return show_height(float(f"{value:.2g}"))

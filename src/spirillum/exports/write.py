@@ -288,7 +288,7 @@ def export(
         sidecar: whether to write the resistance beside the file; None: with `.urdf` and `.mjcf` only.
         model: whose resistance, `slender` or `rft`; of an `.fmu` any model; None: `slender`, of an `.fmu` `auto`.
         motion: of an `.fmu`, `held` (axial motion) or `free` (released in the tube, without a wait); else `held`.
-        friction: of an `.fmu`, reading of the friction; None: the robot's own.
+        friction: of an `.fmu`, friction model; None: the robot's own.
         calibration: of an `.fmu`, calibration file whose factors replace the robot's.
         placement: of an `.fmu` with `tube`, where the robot is held or starts; with a `flow`, also 0, the flow is an
             input.

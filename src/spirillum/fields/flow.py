@@ -238,7 +238,7 @@ def flow(
         model: `slender` (unbounded fluid), `tube` (in the channel), or `auto`: `tube` for a robot in a channel.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
-        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        friction: friction model, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors to the motion. They represent walls that are not in the flow, which
             then pulls at the robot; without them it swims free of force.
         resolution: of the model: `accuracy`, and with `tube` also `tolerance` and `phases`; None: the robot's own, but

@@ -263,7 +263,7 @@ class Fit:
         if own is not None and own > 0:
             return []
         if own is not None:
-            words = "the calibrated B_eff of this tail is negative: zero is used, and the rates are upper bounds"
+            words = "the calibrated B_eff of this tail is negative; zero is used: rates and speeds are upper bounds"
             return [Note("friction-negative", words, ("friction.effective",))]
         if not others:
             return []

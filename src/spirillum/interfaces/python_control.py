@@ -73,7 +73,7 @@ def control_system(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` or
             `torque-speed` drive.
         model: a hydrodynamic model, or `auto`.
-        friction: reading of the friction; None: the robot's own.
+        friction: friction model; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
         placement: where the robot is held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
@@ -135,7 +135,7 @@ def linear_system(
         duty: duty of the point, 0 to 1; None: the drive's own.
         flow: mean flow of the point, with its unit or a float in m/s; None: that of the placement.
         model: a hydrodynamic model, or `auto`.
-        friction: reading of the friction; None: the robot's own.
+        friction: friction model; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
         placement: where the robot is held, for `tube`; with a `flow`, also 0, the imposed flow is an input.

@@ -94,7 +94,7 @@ class TaskEnvironment(ABC):
             count: how many.
             robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
             model: a hydrodynamic model, or `auto`; only `tube` knows the pulse of flow.
-            friction: reading of the friction; None: the robot's own.
+            friction: friction model; None: the robot's own.
             placement: where the robots are held, for `tube`.
             lab: camera, meter, remote, pulse, and how unknown the friction is, as for `sp.control`.
             ranges: what robots are drawn from besides, see `AxialBatch`; a range of `friction` instead of the lab's.

@@ -26,18 +26,19 @@ from spirillum.studies.ranking import (
     StudyRanking,
     best_in_words,
     can_be_ranked,
+    order_in_words,
     ranking_of,
     unit_of_ranked,
 )
 from spirillum.units import among, display_unit, in_unit
 
 FRICTION_MEANINGS = {
-    "none": "no friction: the tail turns against the fluid alone, so that a motor's rates and speeds are upper bounds",
+    "none": "no friction: the tail turns against the fluid alone, so that rates and speeds are upper bounds",
     "rotor": "B_eff acts inside the joint, which gives (18); the body feels the tail's hydrodynamic torque only",
     "body": "the channel's wall brakes the body's rotation; (18) alone cannot find how much",
     "paper": "as (19) is printed: B_eff brakes the tail from outside, and the body feels the whole motor torque",
 }
-"""A line of meaning for each reading of the friction."""
+"""A line of meaning for each friction model."""
 
 MOST_RANKED = 10
 MOST_CALIBRATIONS = 40
@@ -53,12 +54,12 @@ def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, A
     first = ranking.robots[:most]
     return {
         "message": ranking.message,
-        "basis": f"model {ranking.model}, friction reading {ranking.friction}"
+        "basis": f"model {ranking.model}, friction {ranking.friction}"
         + (", the channel's walls not computed" if ranking.walls else "")
         + (f"; {SETTLED_BASIS}" if ranking.settled else ""),
-        "first": "Fastest once settled first" if ranking.settled else "Fastest first",
+        "first": order_in_words(settled=ranking.settled, held=ranking.held).capitalize(),
         "ends": ENDS.get(ranking.kind, ""),
-        "best": [best_in_words(best.to_dict(), _size(best)) for best in ranking.best],
+        "best": [best_in_words(best.to_dict(), _size(best), held=ranking.held) for best in ranking.best],
         "header": ["robot", *(RANKED[name].heading(unit) for name, unit in units.items())],
         "rows": [[robot.name, *(_ranked_cell(robot, name, units[name]) for name in units)] for robot in first],
         "more": len(ranking.robots) - len(first),
@@ -121,7 +122,7 @@ def _question(dataset: xr.Dataset) -> str:
         found = [counted(sizes[name], name) for name in ("channel", "wavelength", "amplitude")]
     else:
         found = [counted(sizes["robot"], "robot")]
-    found += [counted(sizes["model"], "model"), counted(sizes["friction"], "friction reading")]
+    found += [counted(sizes["model"], "model"), counted(sizes["friction"], "friction model")]
     if "assumed_motor_rate" in sizes:
         found.append(counted(sizes["assumed_motor_rate"], "assumed motor rate"))
     return " × ".join(found)

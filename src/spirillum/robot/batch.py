@@ -121,7 +121,7 @@ class RobotBatch:
     """Robots as a struct of arrays, SI units.
 
     Every array has one axis: as long as there are robots, or of length 1 where all robots share the value.
-    What is not a number (outline of the body, model options, drive, friction reading) is shared by the batch, and so
+    What is not a number (outline of the body, model options, drive, friction model) is shared by the batch, and so
     is the placement.
     An unset number is NaN, an absent channel has infinite size, a tail without taper an infinite `taper`.
     """
@@ -184,7 +184,7 @@ class RobotBatch:
             raise InputError("robots = []; allowed: one robot, or several")
         if len({_shared(robot) for robot in items}) != 1:
             raise InputError(
-                "robots of one batch have to share body shape, model options, drive and friction reading; "
+                "robots of one batch have to share body shape, model options, drive and friction model; "
                 "use spirillum.robot.batches for a mixed list"
             )
         first = items[0]

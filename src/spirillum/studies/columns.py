@@ -73,7 +73,7 @@ class BandTask(OneModel):
         return set(AT_POSES)
 
     def answer(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> Part:
-        """Compute steady swimming at this pose, (robots, friction readings); NaN where there is none."""
+        """Compute steady swimming at this pose, (robots, friction models); NaN where there is none."""
         model = find_swimmer_model(self.model)
         there = [_quickly(robot, model) for robot in self.robots]
         found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in loaded.study.friction]
@@ -165,13 +165,13 @@ def with_band(
     """Quantities at all poses, and the least and largest of all poses and the reference pose.
 
     Args:
-        flat: the answers at the reference pose, (models, robots, friction readings).
+        flat: the answers at the reference pose, (models, robots, friction models).
         answers: those at the poses of the band.
         models: names of the models, in their order.
 
     Returns:
-        `<quantity>_at_place`, (models, robots, friction readings, places), `<quantity>_low` and `<quantity>_high`,
-        (models, robots, friction readings); NaN for models without a band.
+        `<quantity>_at_place`, (models, robots, friction models, places), `<quantity>_low` and `<quantity>_high`,
+        (models, robots, friction models); NaN for models without a band.
     """
     pairs = list(answers)
     poses = max(task.pose for task, _ in pairs) + 1

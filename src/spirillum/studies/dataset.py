@@ -367,13 +367,13 @@ def _refusals(task: ModelTask, part: Part) -> list[Caution]:
     left &= ~np.any(part["outside"] == REASONS.index("beyond-stokes"), axis=-1)
     if left.any():
         lacking = np.count_nonzero(part["outside"][int(np.argmax(left))])
-        sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} readings of the friction"
+        sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} friction models"
         found.append(Caution(task.model, "other", int(np.count_nonzero(left)), sentence, refused=True))
     return found
 
 
 def _beyond_stokes(task: ModelTask, part: Part, left: Flags) -> list[Caution]:
-    """The refusal of robots that move far outside Stokes flow, under the first reading of the friction that has one."""
+    """The refusal of robots that move far outside Stokes flow, under the first friction model that has one."""
     code = REASONS.index("beyond-stokes")
     refused = left & np.any(part["outside"] == code, axis=-1)
     if not refused.any():

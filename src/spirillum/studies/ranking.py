@@ -1,6 +1,6 @@
 """Which robot of a study is best: fastest, most efficient, with the least current, and how surely.
 
-One model and one reading of the friction rank all robots: the model that computes the channel's walls where the study
+One model and one friction model rank all robots: the model that computes the channel's walls where the study
 has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
 study has it. Robots that are released too (`settled`) are ordered by their speed in steady motion. Bands and intervals
 are those of the study. A band goes over poses that robots may share, such as a gap: at how many of them the fastest
@@ -150,9 +150,11 @@ class StudyRanking:
     model: str
     """The model that ranks them."""
     friction: str
-    """The reading of the friction with which it does."""
+    """The friction model with which it does."""
     walls: bool
     """Whether the walls of a channel that robots are in are left out."""
+    held: bool
+    """Whether they are ordered by the speed held at a pose in a tube, in which a released robot swims otherwise."""
     kind: str
     """What low and high are: `band`, `interval`, or empty where there are none."""
     robots: tuple[RankedRobot, ...]
@@ -170,7 +172,8 @@ class StudyRanking:
         speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
-        return f"{RANKED[by].superlative}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
+        held = " held" if self.held else ""
+        return f"{RANKED[by].superlative}{held}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
 
     @property
     def settled(self) -> bool:
@@ -188,6 +191,7 @@ class StudyRanking:
             "model": self.model,
             "friction": self.friction,
             "walls_left_out": self.walls,
+            "held": self.held,
             "low_and_high": self.kind or "none",
             **({"settled": SETTLED_BASIS} if self.settled else {}),
             "best": [best.to_dict() for best in self.best],
@@ -195,11 +199,17 @@ class StudyRanking:
         }
 
 
-def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
-    """Which robot is the best by a quantity, and how surely."""
+def order_in_words(*, settled: bool, held: bool) -> str:
+    """Return by which speed robots are ordered."""
+    return "fastest once settled first" if settled else "fastest held first" if held else "fastest first"
+
+
+def best_in_words(best: Mapping[str, Any], size: str = "", *, held: bool = False) -> str:
+    """Return which robot is the best by a quantity, and how surely; `held` is said of the model's own speed."""
+    what = f"{best['what']}{' held' if held and best['quantity'] == 'forward_velocity' else ''}"
     if best["alike"]:
-        return f"{best['what']}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
-    sure = f"at {best['places']} of {best['of_places']} places" if "places" in best else ""
+        return f"{what}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
+    sure = f"at {best['places']} of {best['of_places']} poses" if "places" in best else ""
     some = best["robots"] < best["of_robots"]
     among = f"among {best['robots']} of {best['of_robots']} robots, the others have no such value" if some else ""
     ties = best.get("ties", [])
@@ -207,7 +217,7 @@ def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
     equal = f"no better than {'; '.join(ties[:_NAMED])}{more}" if ties else ""
     lead, error = (best.get(name, {"value": 0.0})["value"] for name in ("lead", "model_error"))
     within = "" if lead >= error or ties else f"by {percent(lead)}, within the model's error of {percent(error)}"
-    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, within, equal, sure, among)))
+    return ", ".join(filter(None, (f"{what}: {best['robot']}", size, within, equal, sure, among)))
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
@@ -252,8 +262,11 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     }
     judged = sorted(known, key=(HELD, TRIAL).__contains__)  # the columns beside the model's own last
     best = tuple(_best(chosen, name, values[name], ranked) for name in judged if np.isfinite(values[name][order]).any())
-    left_out = walled and not SWIMMER_MODELS[model].placed
-    return StudyRanking(model, reading, left_out, kind if ranked else "", tuple(ranked.values()), best)
+    placed, settled = SWIMMER_MODELS[model].placed, STEADY_SPEED in beside
+    held = walled and placed and not settled
+    return StudyRanking(
+        model, reading, walled and not placed, held, kind if ranked else "", tuple(ranked.values()), best
+    )
 
 
 def _model(names: list[str]) -> str:

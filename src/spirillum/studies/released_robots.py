@@ -41,7 +41,7 @@ from spirillum.studies.work import OneRobot, Part, gathered
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.released_motion import State
 from spirillum.swimming.steady import swim
-from spirillum.units import show
+from spirillum.units import show_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -330,7 +330,7 @@ def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) 
 
 def settled_basis(contact: Contact) -> Note:
     """What settled speeds are, and rest on."""
-    height = "1e-4 of its radius" if contact.roughness is None else show(contact.roughness, "um")
+    height = "1e-4 of its radius" if contact.roughness is None else show_height(contact.roughness)
     words = (
         f"settled speeds assume asperities of {height} and a friction coefficient of {contact.friction_coefficient:g}; "
         "a trial of some turns does not reach them"

@@ -165,10 +165,7 @@ def warnings_of(loaded: LoadedStudy) -> list[Note]:
     """What to be careful about in the question."""
     warnings = _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
-        words = (
-            "friction.effective is unset: robots feel no friction beyond B_m, and rates and speeds are upper "
-            "bounds; set it"
-        )
+        words = "friction.effective is unset: only B_m acts: rates and speeds are upper bounds; set it, or calibrate"
         warnings.append(Note("friction-unset", words, ("friction.effective",)))
     if any(robot.drive is not None and robot.drive.kind == "torque" for robot in loaded.robots):
         warnings.append(CONSTANT_TORQUE)

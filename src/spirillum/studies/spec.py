@@ -1,8 +1,9 @@
-"""The form of `STUDY.toml`: which robots, which models, which readings of the friction."""
+"""The form of `STUDY.toml`: which robots, which models, which friction models."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -16,12 +17,12 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
-from spirillum.units import Hz, show
+from spirillum.units import Hz, show, show_height
 
 _MOST_ROBOTS = 100_000
 """Most robots that are loaded one by one."""
 LARGEST_STORED = 500_000_000
-"""Most results of a study (robots times models times friction readings times rates), written into a store in pieces."""
+"""Most results of a study (robots times models times friction models times rates), written into a store in pieces."""
 _Name = Annotated[Text, Field(min_length=1, max_length=200)]
 
 
@@ -59,19 +60,19 @@ class LaidDown(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         problems = []
-        units = {"gap": "mm", "wait": "s", "roughness": "um"}
+        texts = {"gap": show_height, "wait": partial(show, unit="s"), "roughness": show_height}
         for name in ("gap", "pitch", "wait", "roughness", "friction_coefficient"):
             low, high = getattr(self, name)
             if low >= high:
-                words = " to ".join(show(value, units.get(name, "1")) for value in (low, high))
+                words = " to ".join(texts.get(name, "{:.4g}".format)(value) for value in (low, high))
                 problems.append(f"laid_down.{name} goes from {words}; allowed: a low level below the high one")
         for name, value, least, most in (("duration", self.duration, 1.0, 600.0), ("wait", self.wait[1], 0.0, 3600.0)):
             if not least <= value <= most:
                 problems.append(f"laid_down.{name} = {value:g} s; allowed: {least:g} s to {most:g} s")
         if self.roughness[1] >= 2.0 * self.gap[0]:
             problems.append(
-                f"laid_down.roughness goes up to {show(self.roughness[1], 'um')} with a gap from "
-                f"{show(self.gap[0], 'um')}: asperities would carry more than the weight; allowed: a roughness below "
+                f"laid_down.roughness goes up to {show_height(self.roughness[1])} with a gap from "
+                f"{show_height(self.gap[0])}: asperities would carry more than the weight; allowed: a roughness below "
                 "twice the gap"
             )
         if problems:
@@ -94,7 +95,7 @@ _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 
 
 class Study(Section):
-    """A study: a grid or a list of robots, answered by some models under some friction readings."""
+    """A study: a grid or a list of robots, answered by some models under some friction models."""
 
     title: _Name = "Study"
     """Title of report and figures."""
@@ -104,7 +105,7 @@ class Study(Section):
     """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` for robots in channels (missing
     tables are made first), and `slender` for robots without."""
     friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
-    """Readings of the friction."""
+    """Friction models."""
     claims: Literal["none", "biorob2012"] = "none"
     """Whose statements to hold the results against."""
     assumed_motor_rates: Annotated[tuple[Rate, ...], Field(max_length=1000)] = ()

@@ -37,7 +37,7 @@ from spirillum.swimming.model_choice import AUTO, IN_CHANNEL, UNBOUNDED, WALLED,
 from spirillum.units import show_apart
 
 LARGEST_STUDY = 5_000_000
-"""Most results (robots times models times friction readings times rates) of one study."""
+"""Most results (robots times models times friction models times rates) of one study."""
 _LARGEST_WITH_INTERVALS = 10_000
 """Most robots of a study with a posterior, each of which swims a thousand times."""
 _WHAT = "a study file (TOML, see `spirillum schema study`)"

@@ -87,7 +87,7 @@ QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
 """Parts of a batch, their indices in it, and the model of each."""
 
 Part = dict[str, Values]
-"""Arrays of one task: (robots, friction readings) or (robots, friction readings, rates)."""
+"""Arrays of one task: (robots, friction models) or (robots, friction models, rates)."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class StudyTask(ABC):
         return self.needed
 
     def leading(self, _readings: int) -> tuple[int, ...]:
-        """Return the sizes of the first axes of all arrays, for a number of friction readings."""
+        """Return the sizes of the first axes of all arrays, for a number of friction models."""
         return (self.size,)
 
     def job(self, loaded: LoadedStudy, _observed: ObservedArrays | None, /) -> StudyJob:
@@ -172,7 +172,7 @@ def one_thread_each(*models: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class OneModel(StudyTask):
-    """A task of one model, for all friction readings."""
+    """A task of one model, for all friction models."""
 
     model: str
 
@@ -182,7 +182,7 @@ class OneModel(StudyTask):
         return (self.model,)
 
     def leading(self, readings: int) -> tuple[int, ...]:
-        """Return the sizes of the first axes of all arrays: robots, friction readings."""
+        """Return the sizes of the first axes of all arrays: robots, friction models."""
         return self.size, readings
 
 
@@ -217,7 +217,7 @@ class ModelTask(OneModel):
         return StudyJob(replace(self, indices=np.arange(self.size, dtype=np.intp)), small, seen)
 
     def answer(self, loaded: LoadedStudy, observed: ObservedArrays | None, /) -> Part:
-        """Compute steady swimming, (robots, friction readings), and the flag `outside` of robots without an answer."""
+        """Compute steady swimming, (robots, friction models), and the flag `outside` of robots without an answer."""
         study = loaded.study
         readings = study.friction
         quick = quick_parts(self.batch, self.model)

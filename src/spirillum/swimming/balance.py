@@ -1,4 +1,4 @@
-"""The axial force balance, for every model, drive and reading of the friction.
+"""The axial force balance, for every model, drive and friction model.
 
 Unknowns are U (the whole robot, along x), Omega (body) and omega (rotor, in the lab). No axial force acts
 from outside but the fluid's, F = -R V + L, so the force row gives U, and two torque rows are left:

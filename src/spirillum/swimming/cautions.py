@@ -154,13 +154,13 @@ def _against_the_drive(robot: Robot, result: Swimming) -> bool:
 
 def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[Note]:
     if reading == "none":
-        words = "friction 'none' lets the motor turn faster than any real one: rates are upper bounds; use 'rotor'"
+        words = "friction 'none' leaves out that of the motor: rates and speeds are upper bounds; use 'rotor'"
         return [Note("friction-unset", words, ("friction.reading",))]
     if robot.friction.effective is not None or robot.motor is None:
         return []
     name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
     own = f"{name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
-    words = f"friction.effective is unset: only {own} acts, and rates are upper bounds; set it, or calibrate"
+    words = f"friction.effective is unset: only {own} acts: rates and speeds are upper bounds; set it, or calibrate"
     if reading == "body":
         words = f"friction.effective is unset: the body has no wall friction, the joint {own}; set it, or calibrate"
     return [Note("friction-unset", words, ("friction.effective",))]

@@ -97,7 +97,7 @@ class Scenario:
         if problem := stokes_flow_problem(self.batch, limits):
             return problem
         if self.tail_rate is not None:
-            paper = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x"
+            paper = ", and with friction model 'paper' not so slow that B_eff exceeds E_x"
             return (
                 f"tail-rate = {self.tail_rate:.4g} rad/s: motor and battery have no steady state there; allowed: a "
                 "rate at which (17) has a root with a positive battery voltage"
@@ -107,7 +107,7 @@ class Scenario:
             limit = calibrated_balance(self.batch, self.model, calibrated=self.calibrated).bb[0]
             return (
                 f"friction.effective = {self.batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
-                f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
+                f"E_x = {limit:.4g} N m s/rad with friction model 'paper', which would turn the tail backwards"
             )
         return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
 

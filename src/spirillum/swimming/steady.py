@@ -187,7 +187,7 @@ def swim(
         tail_rate: prescribed lab rates of the tail, rad/s; without them the robots' drive decides. With a
             DC-motor the current then follows from (17) and the effective friction from (18).
         motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
-        friction: reading of the friction; None: the robots' own.
+        friction: friction model; None: the robots' own.
         calibrated: apply the robots' calibration factors for this model.
         motion: `held` (lateral motion and tilt constrained) or `free` (released; without weight).
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from rich.box import SIMPLE_HEAVY
 from rich.markup import escape
 from rich.table import Table
 
 from spirillum.display import percent, rows_of
+from spirillum.swimming.released_motion import END_STATES
 from spirillum.units import display_unit, in_unit, speed_unit
 
 Answer = Mapping[str, Any]
@@ -68,8 +70,8 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
     rows = {name: row for name in (answer if only is None else only) for row in rows_of(answer, [name])}
     ends = ("low", "high") if any(row.low for row in rows.values()) else ()
     table = grid(title, "quantity", "held", *ends, *RELEASED_COLUMNS)
-    if ends:
-        table.padding = (0, 1, 0, 0)  # six columns at 80 characters
+    if ends:  # six columns at 80 characters: spaces between them, no lines
+        table.box, table.padding, table.pad_edge = SIMPLE_HEAVY, (0, 0, 0, 1), False
     for name, row in rows.items():
         released = (answer[column].get(name) for column in RELEASED_COLUMNS)
         cells = ["-" if item is None else in_unit(item["value"], item["unit"], row.unit or "1") for item in released]
@@ -99,7 +101,7 @@ def released_columns(answer: Answer) -> Iterator[Block]:
     if "steady" in there and "steady" not in missing:
         constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
         after = f", approached with a time constant of {constant:.2g} s" if constant else ""
-        yield f"steady: {answer['steady']['state']}{after}; {answer['steady']['assumption']}"
+        yield f"steady: {END_STATES[answer['steady']['state']]}{after}; {answer['steady']['assumption']}"
 
 
 def _without_value(motion: Answer) -> Iterator[tuple[str, str]]:

@@ -20,7 +20,8 @@ from spirillum.cli.tables.parts import (
 )
 from spirillum.designs.design_result import ALTERNATIVES
 from spirillum.display import counted, percent
-from spirillum.studies.ranking import ENDS, RANKED, STEADY_SPEED, best_in_words
+from spirillum.notes import notes_in_answer
+from spirillum.studies.ranking import ENDS, RANKED, STEADY_SPEED, best_in_words, order_in_words
 from spirillum.units import display_unit, in_unit
 
 
@@ -28,10 +29,10 @@ def study(answer: Answer, *, rows: int = 10) -> Blocks:
     """The ranking of `study` first, verdicts on a paper's statements last."""
     sizes = answer["dimensions"]
     robots = sizes["robot"] if "robot" in sizes else sizes["channel"] * sizes["wavelength"] * sizes["amplitude"]
-    sizes_in_words = ((robots, "robot"), (sizes["model"], "model"), (sizes["friction"], "reading"))
+    sizes_in_words = ((robots, "robot"), (sizes["model"], "model"), (sizes["friction"], "friction model"))
     extent = ", ".join(counted(number, word) for number, word in sizes_in_words)
-    yield f"{answer['title']}: {extent} of the friction"
-    yield from _ranking(answer["ranking"], rows)
+    yield f"{answer['title']}: {extent}"
+    yield from _ranking(answer, rows)
     yield from reason_of({"model": answer["ranking"]["model"], **answer})
     yield from _empty_results(answer)
     yield f"observations: {answer['observations']}"
@@ -65,11 +66,13 @@ _WHOLE = 24
 """Length of names that are not wrapped."""
 
 
-def _ranking(ranking: Answer, rows: int) -> Blocks:
+def _ranking(answer: Answer, rows: int) -> Blocks:
     """The robots, the fastest first, and which of them is the best by what."""
+    ranking = answer["ranking"]
     robots = ranking["robots"]
     if not robots:
-        yield "no robot has an answer"
+        why = [str(note) for note in notes_in_answer(answer) if note.code == "without-answer"]
+        yield f"no robot has an answer{': ' if why else ''}{'; '.join(why)}"
         return
     columns = [column for name in robots[0] if name != "robot" for column in _columns(robots, name)]
     found = grid(_basis(ranking), "", "robot")
@@ -82,7 +85,7 @@ def _ranking(ranking: Answer, rows: int) -> Blocks:
     yield found
     if len(robots) > rows:
         yield f"and {len(robots) - rows} more: --rows, ranking.csv"
-    yield from map(best_in_words, ranking["best"])
+    yield from (best_in_words(best, held=ranking["held"]) for best in ranking["best"])
     if "settled" in ranking:
         yield Detail(ranking["settled"])
     if ranking["low_and_high"] in ENDS:
@@ -92,8 +95,8 @@ def _ranking(ranking: Answer, rows: int) -> Blocks:
 
 def _basis(ranking: Answer) -> str:
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    first = "fastest once settled first" if "settled" in ranking else "fastest first"
-    return f"{first}: model {ranking['model']}, friction {ranking['friction']}{walls}"
+    order = order_in_words(settled="settled" in ranking, held=ranking["held"])
+    return f"{order}: model {ranking['model']}, friction {ranking['friction']}{walls}"
 
 
 def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:

@@ -285,9 +285,7 @@ def _rotation_errors(evidence: Evidence) -> Claim:
         worst[model] = float(np.nanmax(np.abs(found / seen - 1.0)))
     words = ", ".join(f"{label(model)} up to {100 * error:.0f} %" for model, error in worst.items())
     verdict: Verdict = "agrees" if max(worst.values()) <= BODY_ROTATION_ERROR else "disagrees"
-    return Claim(
-        claim, paper, words, verdict, "models at the observed tail rates, friction reading 'rotor' or the first"
-    )
+    return Claim(claim, paper, words, verdict, "models at the observed tail rates, friction model 'rotor' or the first")
 
 
 def _at_observed(evidence: Evidence, name: str, model: str) -> Values:

@@ -15,7 +15,7 @@ from spirillum.arrays import Values
 from spirillum.dynamics.settling import Settling
 from spirillum.quantities import unit_of
 from spirillum.studies.ranking import StudyRanking, robot_dims
-from spirillum.units import Hz
+from spirillum.units import Hz, show_height
 from spirillum.view.figures.sheet import Picture, Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
 
@@ -36,7 +36,7 @@ def settling_figure(settling: Settling) -> Figure:
         sheet = Sheet(
             f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
-            f"roughness {1e6 * settling.roughness:.3g} µm · friction {settling.friction_coefficient:.3g} · "
+            f"roughness {show_height(settling.roughness)} · friction {settling.friction_coefficient:.3g} · "
             "computed, no measured data",
             width=PAGE,
             heights=[1.9],

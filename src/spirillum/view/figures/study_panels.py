@@ -70,7 +70,7 @@ class StudyView:
 
     @cached_property
     def readings(self) -> tuple[str, ...]:
-        """All readings of the friction."""
+        """All friction models."""
         return tuple(str(name) for name in self.whole["friction"].values)
 
     @cached_property
