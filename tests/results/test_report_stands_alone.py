@@ -226,3 +226,12 @@ def test_progress_runs_to_its_end(tmp_path: Path) -> None:
     assert [done for _, done, _ in steps] == list(range(len(steps)))
     assert steps[-1][1] == steps[-1][2]
     assert all(what for what, _, _ in steps)
+
+
+def test_a_study_without_figures_gets_them_by_a_rerun(tmp_path: Path) -> None:
+    study = {"robots": ["biorob2012-wide"], "models": ["rft"]}
+    sp.study(study, output=tmp_path / "out", figures=False)
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"dataset.nc", "claims.json", "ranking.csv"}
+    assert not (tmp_path / "out" / "report.html").exists()
+    sp.study(study, output=tmp_path / "out")
+    assert (tmp_path / "out" / "report.html").exists()

@@ -85,6 +85,7 @@ RULES: dict[str, tuple[Rule, ...]] = {
     ),
     "study": (
         Rule("store", ("rows",), "{rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)"),
+        Rule("store", ("figures",), "with --store, which draws none; allowed: a folder of results (-o DIR)"),
     ),
 }
 """Rules by command, in the order in which they are checked."""

@@ -79,19 +79,23 @@ _LARGEST_SVG = 2_000_000
 """A larger vector picture is embedded as pixels, bytes."""
 
 
-def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
-    """Write `figures/` (PNG and SVG), `claims.json`, `ranking.csv` and a self-contained `report.html`."""
+def write_report(
+    dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None], *, figures: bool = True
+) -> None:
+    """Write `claims.json` and `ranking.csv`; with `figures` also `figures/` (PNG and SVG) and `report.html`."""
+    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
+    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(folder / "claims.json", text + "\n", replace="any")
+    ranking = ranking_of(dataset)
+    write_text(folder / "ranking.csv", _ranking_rows(ranking), replace="any")
+    if not figures:
+        return
     pictures = _pictures(dataset)
     steps = len(pictures) + 1
     embedded = draw_pictures(
         pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
     )
     on_progress("report", len(pictures), steps)
-    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
-    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(folder / "claims.json", text + "\n", replace="any")
-    ranking = ranking_of(dataset)
-    write_text(folder / "ranking.csv", _ranking_rows(ranking), replace="any")
     names = {
         "ranking": shown_ranking(ranking),
         "pictures": embedded,
@@ -150,6 +154,7 @@ def study(  # noqa: PLR0913 - the options of the command
     store: str | Path | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
+    figures: bool = True,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Run a study of many robots.
@@ -179,6 +184,7 @@ def study(  # noqa: PLR0913 - the options of the command
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
             model have 95 % intervals.
+        figures: draw figures and write the report.
         progress: called as the work goes on.
 
     Returns:
@@ -227,7 +233,7 @@ def study(  # noqa: PLR0913 - the options of the command
             dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
-        write_report(dataset, folder, on_progress)
+        write_report(dataset, folder, on_progress, figures=figures)
     return StudyDataset.of(dataset)
 
 

@@ -42,7 +42,10 @@ def study(answer: Answer, *, rows: int = 10) -> Blocks:
     if any(answer["claims"].values()):
         counts = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
         yield f"statements of the paper: {counts}"
-    yield f"open {answer['folder']}/report.html"
+    if "report.html" in answer["files"]:
+        yield f"open {answer['folder']}/report.html"
+    else:
+        yield f"dataset.nc and ranking.csv in {answer['folder']}; without --no-figures a rerun draws figures and report"
 
 
 def study_store(answer: Answer) -> Blocks:
