@@ -442,7 +442,7 @@ def validation_case(name: str) -> str:
 
 _COMPARED = (
     *("Quantity", "Rows", "Published", "Ours", "Difference", "Stated error", "Assumptions"),
-    *("Covered by error", "by assumptions"),
+    *("Covered", "if assumed"),
 )
 
 

@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, Json, starting
+from spirillum.cli.shared_options import PANELS, TEXTS, Json, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -106,16 +106,16 @@ def control(
         ),
     ] = None,
     model: Annotated[str, typer.Option(help="Hydrodynamic model: tube, slender, rft; or auto.")] = "auto",
-    roughness: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Roughness of the wall, else 1e-4 of the body's radius.")
-    ] = None,
+    roughness: Annotated[str | None, typer.Option(metavar="LENGTH", help=TEXTS["roughness"])] = None,
     plot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
     ] = None,
     movie: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`).", rich_help_panel=_PICTURES),
+        typer.Option(
+            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -174,13 +174,18 @@ _FRICTION = (
     "Friction model. none; rotor: in the joint, between body and tail; body: between body and "
     "wall; paper: as eq. (19) is printed, on the tail from outside."
 )
+_TAIL_RATE = "Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive decides."
 TEXTS = {
     "calibration": "Calibration file whose factors replace the robot's.",
     "posterior": "Posterior of a calibration: its median replaces the robot's values, and the answer has intervals.",
     "friction": _FRICTION,
     "motion.friction": _FRICTION,
     "degradation.glare_moves": "The glare stands still instead of moving with the body.",
+    "roughness": "Height of the asperities, such as 20um; else 1e-4 of the body's radius.",
     "seed": "Seed of all random numbers.",
+    "tail_rate": _TAIL_RATE,
+    "motion.tail_rate": _TAIL_RATE,
+    "weight": "Do not let weight and buoyancy act, if the masses are known.",
     "task.at": "stop-at: x of the body's mid-length at which to stop, such as 5mm.",
     "task.law": "keep-axis: `position` (feedback of the position) or `aim` (at a point of the axis ahead).",
     "task.rate": "keep-axis: rate of the field, such as 1Hz; else the robot's.",

@@ -78,10 +78,9 @@ def predict(  # noqa: PLR0913 - the options of the command
             see `InTube`.
         duration: of the trial: time with the motor on, over which its values are means, with its unit or a float in s;
             None: 20 s.
-        interval: of the trial, the 90 % interval over its unknowns (waiting time, roughness, dry friction, weight,
-            centre of mass, effective friction, cavitation pressure): 64 runs.
-        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia dominates and these models
-            are wrong, as the robot's option `model.beyond_stokes`.
+        interval: of the trial, the 90 % interval over its unknowns, from 64 runs.
+        beyond_stokes: answer at Reynolds numbers above 10 too, where these models are wrong, as the robot's option
+            `model.beyond_stokes`.
         progress: called with stage, number done, and total.
 
     Raises:

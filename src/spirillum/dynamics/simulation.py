@@ -78,8 +78,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`; or `auto`: what the posterior or the
             calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` or
-            `torque-speed` drive. None: `free`, but `held` where the model is that of a posterior or
-            calibration and has the axial entries only, or was fitted to one pose in the tube without dry friction.
+            `torque-speed` drive. None: `free`, but `held` where a posterior or calibration is of held motion.
         friction: friction model; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.

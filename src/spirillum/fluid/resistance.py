@@ -109,8 +109,7 @@ def resistance(
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked), alone in the fluid: 6x6; or `both`, body
-            and rotor beside each other with motions of their own, about the same point: 12x12. None: the robot, or what
-            the model knows.
+            and rotor with motions of their own: 12x12. None: the robot, or what the model knows.
         model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.

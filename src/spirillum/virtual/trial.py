@@ -245,8 +245,8 @@ def render(
         robot: a preset's name, a robot file, its tables, or a loaded robot; None: that of the run.
         path: the video (`.mp4`), or a new folder of PNG files (without an ending).
         motion: `MotionOptions`: the model of steady swimming, and prescribed rates.
-        run: instead of steady swimming at a held pose, a run of `spirillum.simulate` or its file; or `trial`: the run
-            of a trial of the robot in its tube, as `predict` and `simulate` have it by their defaults.
+        run: instead of steady swimming at a held pose, a run of `spirillum.simulate` or its file; or `trial`: that of
+            the robot's trial in its tube.
         trial: `TrialOptions`: duration, and the robot's pose at the first frame.
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...

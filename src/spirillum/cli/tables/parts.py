@@ -10,7 +10,6 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.display import percent, rows_of
-from spirillum.swimming.released_motion import END_STATES
 from spirillum.units import display_unit, in_unit, speed_unit
 
 Answer = Mapping[str, Any]
@@ -99,6 +98,8 @@ def released_columns(answer: Answer) -> Iterator[Block]:
         yield from _over_unknowns(answer["trial"])
         yield from (Detail(f"no {names} of a trial: {reason}") for names, reason in _without_value(answer["trial"]))
     if "steady" in there and "steady" not in missing:
+        from spirillum.swimming.released_motion import END_STATES  # brings the models
+
         constant = answer["steady"]["time_constant"]["value"]  # it hangs on where the approach is looked at
         after = f", approached with a time constant of {constant:.2g} s" if constant else ""
         yield f"steady: {END_STATES[answer['steady']['state']]}{after}; {answer['steady']['assumption']}"
