@@ -79,25 +79,17 @@ _LARGEST_SVG = 2_000_000
 """A larger vector picture is embedded as pixels, bytes."""
 
 
-def write_report(
-    dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None], *, figures: bool = True
-) -> None:
-    """Write `claims.json` and `ranking.csv`; with `figures` also `figures/` (PNG and SVG) and `report.html`."""
-    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
-    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(folder / "claims.json", text + "\n", replace="any")
-    ranking = ranking_of(dataset)
-    write_text(folder / "ranking.csv", _ranking_rows(ranking), replace="any")
-    if not figures:
-        return
+def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
+    """Write `figures/` (PNG and SVG), a self-contained `report.html`, and the files of `write_tables`."""
     pictures = _pictures(dataset)
     steps = len(pictures) + 1
     embedded = draw_pictures(
         pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
     )
     on_progress("report", len(pictures), steps)
+    claims, predictions = write_tables(dataset, folder)
     names = {
-        "ranking": shown_ranking(ranking),
+        "ranking": shown_ranking(ranking_of(dataset)),
         "pictures": embedded,
         "claims": claims,
         "predictions": predictions,
@@ -105,6 +97,15 @@ def write_report(
     }
     write_text(folder / "report.html", page("report.html.jinja", **names))
     on_progress("report", steps, steps)
+
+
+def write_tables(dataset: xr.Dataset, folder: Path) -> tuple[list[dict[str, Any]], ...]:
+    """Write `claims.json` and `ranking.csv`; return the claims and those decided by released robots."""
+    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
+    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(folder / "claims.json", text + "\n", replace="any")
+    write_text(folder / "ranking.csv", _ranking_rows(ranking_of(dataset)), replace="any")
+    return claims, predictions
 
 
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
@@ -233,7 +234,10 @@ def study(  # noqa: PLR0913 - the options of the command
             dataset = computed_study(loaded, observed, fingerprint, parts, on_progress, pool)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
-        write_report(dataset, folder, on_progress, figures=figures)
+        if figures:
+            write_report(dataset, folder, on_progress)
+        else:
+            write_tables(dataset, folder)
     return StudyDataset.of(dataset)
 
 
