@@ -175,13 +175,13 @@ def feasibility(
     rate, source_of_rate = _first(
         (frames_per_second, "given"),
         (chosen.camera.frames_per_second, "setup"),
-        (film and film.rate, "video"),
+        (None if film is None else film.rate, "video"),
         (_FRAMES_PER_SECOND, "assumed"),
     )
     check_range("fps", rate, 0.01, 1e5)
     span, source_of_span = _first(
         (None if duration is None else parse_option("duration", duration, KINDS["time"]), "given"),
-        (film and film.duration, "video"),
+        (None if film is None else film.duration, "video"),
         (_DURATION, "assumed"),
     )
     if not 0.0 < span <= _LONGEST:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -17,7 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.tables import FrictionReading
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
-from spirillum.units import Hz, show, show_height
+from spirillum.units import Hz, show_height
 
 _MOST_ROBOTS = 100_000
 """Most robots that are loaded one by one."""
@@ -60,7 +60,11 @@ class LaidDown(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         problems = []
-        texts = {"gap": show_height, "wait": partial(show, unit="s"), "roughness": show_height}
+        texts: dict[str, Callable[[float], str]] = {
+            "gap": show_height,
+            "wait": "{:g} s".format,
+            "roughness": show_height,
+        }
         for name in ("gap", "pitch", "wait", "roughness", "friction_coefficient"):
             low, high = getattr(self, name)
             if low >= high:

@@ -13,7 +13,7 @@ to agree, one that holds in none to disagree. Otherwise it depends on the factor
 from __future__ import annotations
 
 import json
-from functools import partial
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.studies.columns import reference_pose
 from spirillum.studies.released_robots import READ, WINDOWS, levels_of_readings, main_effects
-from spirillum.units import Hz, show, show_height
+from spirillum.units import Hz, show_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,7 +168,7 @@ _CLOSE = 0.05
 _AS_MUCH = 0.8
 """A factor is named beside the first if it moves a statement this much of what the first does."""
 _WORDS = {"friction_coefficient": "friction coefficient", "wait": "waiting time", "window": "time read over"}
-_TEXTS = {"gap": show_height, "wait": partial(show, unit="s"), "roughness": show_height}
+_TEXTS: dict[str, Callable[[float], str]] = {"gap": show_height, "wait": "{:g} s".format, "roughness": show_height}
 
 
 class Judgement(NamedTuple):

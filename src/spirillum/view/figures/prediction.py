@@ -63,9 +63,9 @@ def prediction_figure(prediction: Prediction) -> Figure:
 def _rows(prediction: Prediction) -> Iterator[_Row]:
     """The motions that have a speed."""
     over = prediction.band or prediction.intervals
-    ends = {} if over is None else over.of(_SPEED)
+    band = {} if over is None else over.of(_SPEED)
     label = "held at a pose" if prediction.motion == "held" else "free motion"
-    low, high = (float(ends.get(end, np.nan)) for end in ("low", "high"))
+    low, high = (float(band.get(end, np.nan)) for end in ("low", "high"))
     yield _Row(label, COLOURS["blue"], prediction.forward_velocity, low, high)
     for name, words, colour in (("trial", "trial", "vermillion"), ("steady", "steady motion", "green")):
         motion = getattr(prediction, name)
