@@ -109,7 +109,8 @@ def test_lines_come_at_a_rate_that_can_be_read() -> None:
         progress("table", done, 100)
     assert lines[0] == "no table of this tube yet"
     assert lines[1] == "table: 40 of 100, 15 s elapsed"
-    assert "table: 41 of 100, 30 s elapsed, about 30 min left" in lines
+    assert "table: 41 of 100, 30 s elapsed" in lines  # several processes start together: one step tells no pace
+    assert "table: 42 of 100, 45 s elapsed, about 19 min left" in lines
     assert any(re.search(r"elapsed, about \d min \d\d s left$", line) for line in lines)
     assert 25 < len(lines) < 60  # a line every 15 s, later every twentieth of the time
     assert clock.now == 1200.0

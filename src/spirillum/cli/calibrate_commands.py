@@ -76,6 +76,10 @@ def calibrate(
     from spirillum.swimming.released_motion import RELEASED
 
     typed = request.typed
+    if tables := [name for name in robot if name.endswith((".csv", ".parquet"))]:
+        raise InputError(
+            f"{tables[0]} is a second observations file; allowed: one, as `spirillum observations join` makes of several"
+        )
     robots = [loaded_robot(name, settings) for name in robot]
     released = typed.get("answer") == RELEASED
     check_not_set(set_fields(overrides_from(settings)), typed.get("free"), typed.get("model", AUTO), released=released)

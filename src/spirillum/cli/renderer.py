@@ -31,6 +31,8 @@ _SHARE = 0.05
 """Least time between two lines over the time since the start, so that a long log stays readable."""
 _AT_ONCE = 1.0
 """Work that is done within this time from the start of a stage was cached and does not enter the pace, s."""
+_FEWEST = 2
+"""Steps from which on a time left is stated."""
 _LOOK = 1.0
 """Time between two looks whether a line is due, s: a step may take minutes."""
 
@@ -53,6 +55,39 @@ def progress_lines(write: Callable[[str], object], announcements: tuple[str, ...
         thread.join()
 
 
+class Pace:
+    """How far the present stage of some work is, and the time that the rest takes at the pace of its steps."""
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        """No work yet."""
+        self.what, self.done = "", 0
+        self.total: int | None = None
+        self._clock, self._first = clock, 0
+        self._start = self._last = clock()
+
+    def step(self, what: str, done: int, total: int | None) -> None:
+        """Take note of progress; what is done within `_AT_ONCE` was cached, and does not enter the pace."""
+        now = self._clock()
+        if (what, total) != (self.what, self.total) or done < self.done:
+            self.what, self.total, self.done, self._first = what, total, done, done
+            self._start = self._last = now
+        if now - self._start < _AT_ONCE:
+            self._first = done
+        if done > self.done:
+            self._last = now
+        self.done = done
+
+    @property
+    def left(self) -> float | None:
+        """Time until the stage is done, s; None before a second step, for the first ones start together."""
+        steps = self.done - self._first
+        if not self.total or steps < min(_FEWEST, self.total - self._first):
+            return None
+        since = self._clock() - self._last
+        each = max((self._last - self._start) / max(steps, 1), since)
+        return max(each * (self.total - self.done) - since, 0.0)
+
+
 class ProgressLines:
     """A progress callback that prints a line from time to time: what is done, of how much, and the time left."""
 
@@ -61,9 +96,8 @@ class ProgressLines:
     ) -> None:
         """No work yet."""
         self._write, self._announcements, self._clock, self._lock = write, announcements, clock, Lock()
-        self._begin = self._printed = self._start = clock()
-        self._stage: tuple[str, int | None] = ("", None)
-        self._first = self._done = 0
+        self._begin = self._printed = clock()
+        self._pace = Pace(clock)
 
     def __call__(self, what: str, done: int, total: int | None) -> None:
         """Take note of progress."""
@@ -71,29 +105,22 @@ class ProgressLines:
             self._write(what)
             return
         with self._lock:
-            now = self._clock()
-            if (what, total) != self._stage or done < self._done:
-                self._stage, self._start, self._first = (what, total), now, done
-            if now - self._start < _AT_ONCE:
-                self._first = done
-            self._done = done
+            self._pace.step(what, done, total)
         self.look()
 
     def look(self) -> None:
         """Print a line if there is work and one is due."""
         with self._lock:
             now = self._clock()
-            if self._stage[0] and now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
+            if self._pace.what and now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
                 self._printed = now
                 self._write(self._line(now))
 
     def _line(self, now: float) -> str:
-        (what, total), steps = self._stage, self._done - self._first
-        of = f" of {total}" if total else ""
-        left = ""
-        if total and steps > 0:
-            left = f", about {_duration((now - self._start) / steps * (total - self._done))} left"
-        return f"{what}: {self._done}{of}, {_duration(now - self._begin)} elapsed{left}"
+        pace = self._pace
+        of = f" of {pace.total}" if pace.total else ""
+        left = "" if pace.left is None else f", about {_duration(pace.left)} left"
+        return f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
 _FINE = 10.0
@@ -107,10 +134,6 @@ def _duration(seconds: float) -> str:
     if minutes < _FINE:
         return "{} min {:02} s".format(*divmod(round(seconds), 60))
     return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
-
-
-_PACE = 900.0
-"""Time over which the pace of work is averaged, s: a pose of a table takes half a minute."""
 
 
 class _PipedConsole(Console):
@@ -298,22 +321,29 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         BarColumn,
         MofNCompleteColumn,
         Progress,
+        ProgressColumn,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
+
+    pace = Pace()
+
+    class TimeLeft(ProgressColumn):
+        """The time left, as the lines have it."""
+
+        def render(self, _task: object) -> Text:
+            """Return the text of the column."""
+            return Text("" if pace.left is None else f"about {_duration(pace.left)} left")
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        TimeLeft(),
     )
-    bar = Progress(*columns, console=console, transient=True, speed_estimate_period=_PACE)
+    bar = Progress(*columns, console=console, transient=True)
     task = bar.add_task("starting", total=None)
-    before: list[int | None] = [0, 0]
 
     def tell(what: str, done: int, total: int | None) -> None:
         silent.cancel()
@@ -321,9 +351,9 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             bar.console.print(wrapped(what), highlight=False)
             what, done, total = "at work", 0, None  # without an end, but with the time that goes by
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen
-        if total != before[1] or done < (before[0] or 0):  # other work has another pace
+        if total != pace.total or done < pace.done:  # other work
             bar.reset(task)
-        before[:] = done, total
+        pace.step(what, done, total)
         bar.update(task, description=escape(what), completed=done, total=total)
 
     silent = Timer(_SOON, tell, ("at work", 0, None))  # no work has been told of: a sign of life

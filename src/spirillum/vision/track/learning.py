@@ -100,9 +100,8 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
     u, v = low[0] + 0.5 * (columns.min() + columns.max()), low[1] + 0.5 * (rows.min() + rows.max())
     size = f"{np.ptp(columns) + 1} by {np.ptp(rows) + 1} pixels"
     sentence = (
-        f"glare stands still on the robot's way, about column {u:.0f} and row {v:.0f} of the picture ({size}): it "
-        "shifts edges of the body that pass there, so that the interval of the speed is wider; move the lamp or soften "
-        "its light until none lies there"
+        f"glare stands still at column {u:.0f}, row {v:.0f} ({size}): it shifts edges of the body, and the interval "
+        "of the speed is wider; move or soften the lamp"
     )
     return Glare(GLARE.drift, (Flag("standing-glare", sentence),))
 
@@ -130,10 +129,8 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
     there, beside = float(along[place]), float(sides[0].mean())
     u, v = seen(np.array([[there, beside, 0.0]]), middle, body.optics)[0]
     sentence = (
-        f"a reflection stands still on the robot's way: its edge is about column {u:.0f} and row {v:.0f} of the "
-        f"picture, {size:.0f} of 255 brighter than what is beside it: edges of the body and the wire are hidden or "
-        "shifted there, so that the interval of the speed is wider; move the lamp or soften its light until none lies "
-        "there"
+        f"a reflection ({size:.0f} of 255 brighter) stands still at column {u:.0f}, row {v:.0f}: it hides edges, and "
+        "the interval of the speed is wider; move or soften the lamp"
     )
     return Glare(GLARE.veil_drift, (Flag("standing-glare", sentence),))
 
