@@ -78,7 +78,7 @@ def calibrate(
     typed = request.typed
     if tables := [name for name in robot if name.endswith((".csv", ".parquet"))]:
         raise InputError(
-            f"{tables[0]} is a second observations file; allowed: one, as `spirillum observations join` makes of several"
+            f"{tables[0]} is a second observations file; allowed: one, which `spirillum observations join` makes"
         )
     robots = [loaded_robot(name, settings) for name in robot]
     released = typed.get("answer") == RELEASED
