@@ -18,7 +18,6 @@ from spirillum.cli.shared_options import (
     TIMING_PANEL,
     Json,
     Output,
-    Picture,
     complete_auto_models,
     complete_models,
 )
@@ -218,7 +217,15 @@ def magnetic_sweep(
 @from_function(
     "spirillum.dynamics.settling:settle", without={**NO_START, "placement.tail_drop": "no rigid tail moves with it"}
 )
-def settle(request: Request, *, output: Picture = None, json: Json = False) -> None:
+def settle(
+    request: Request,
+    *,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", "--plot", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg."),
+    ] = None,
+    json: Json = False,
+) -> None:
     """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.
 
     Example: `spirillum settle biorob2012-wide --gap 0.5mm --roughness 20um`

@@ -55,7 +55,7 @@ def progress_lines(write: Callable[[str], object], announcements: tuple[str, ...
         thread.join()
 
 
-class Pace:
+class StagePace:
     """How far the present stage of some work is, and the time that the rest takes at the pace of its steps."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
@@ -97,7 +97,7 @@ class ProgressLines:
         """No work yet."""
         self._write, self._announcements, self._clock, self._lock = write, announcements, clock, Lock()
         self._begin = self._printed = clock()
-        self._pace = Pace(clock)
+        self._pace = StagePace(clock)
 
     def __call__(self, what: str, done: int, total: int | None) -> None:
         """Take note of progress."""
@@ -326,7 +326,7 @@ def _progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         TimeElapsedColumn,
     )
 
-    pace = Pace()
+    pace = StagePace()
 
     class TimeLeft(ProgressColumn):
         """The time left, as the lines have it."""

@@ -114,7 +114,8 @@ class Robot(RobotTables):
     @property
     def with_tail(self) -> str:
         """Its name and its tail, which tell it apart from the others of a study."""
-        return f"{self.name}, tail {self._tail_size} mm"
+        size = f"{self._tail_size} mm"
+        return self.name if self.name.endswith(size) else f"{self.name}, tail {size}"
 
     def derived(self) -> dict[str, Derived]:
         """Derived quantities: lengths, volumes, weight, centre of mass.
