@@ -79,12 +79,12 @@ class StagePace:
 
     @property
     def left(self) -> float | None:
-        """Time until the stage is done, s; None before a second step, for the first ones start together."""
+        """Time until the stage is done, s; None then, and before a second step, for the first ones start together."""
         steps = self.done - self._first
-        if not self.total or steps < min(_FEWEST, self.total - self._first):
+        if not self.total or self.done >= self.total or steps < min(_FEWEST, self.total - self._first):
             return None
         since = self._clock() - self._last
-        each = max((self._last - self._start) / max(steps, 1), since)
+        each = max((self._last - self._start) / steps, since)
         return max(each * (self.total - self.done) - since, 0.0)
 
 

@@ -49,7 +49,14 @@ def prediction_figure(prediction: Prediction) -> Figure:
             axes.plot(speed, number, "o", color=row.colour, markersize=6.5)
             words = f"{speed:.3g}" if np.isnan(low) else f"{speed:.3g} ({low:.3g} to {high:.3g})"
             end = np.nanmax([speed, high])
-            axes.annotate(words, (end, number), xytext=(7, 0), textcoords="offset points", va="center", size=8)
+            axes.annotate(
+                words.replace("-", "\N{MINUS SIGN}"),
+                (end, number),
+                xytext=(7, 0),
+                textcoords="offset points",
+                va="center",
+                size=8,
+            )
         ends = np.array([(row.speed, row.low, row.high) for row in rows]) / scale.factor
         least, most = min(float(np.nanmin(ends)), 0.0), max(float(np.nanmax(ends)), 0.0)
         axes.set_xlim(_ROOM * least, most + (_ROOM - 1.0) * (most - least))
@@ -64,7 +71,8 @@ def _rows(prediction: Prediction) -> Iterator[_Row]:
     """The motions that have a speed."""
     over = prediction.band or prediction.intervals
     band = {} if over is None else over.of(_SPEED)
-    label = "held at a pose" if prediction.motion == "held" else "free motion"
+    held = "held at a pose" if prediction.model.placed else "axial motion"
+    label = held if prediction.motion == "held" else "free motion"
     low, high = (float(band.get(end, np.nan)) for end in ("low", "high"))
     yield _Row(label, COLOURS["blue"], prediction.forward_velocity, low, high)
     for name, words, colour in (("trial", "trial", "vermillion"), ("steady", "steady motion", "green")):
