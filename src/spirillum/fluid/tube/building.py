@@ -31,8 +31,10 @@ from spirillum.fluid.tube.outer_resistance import (
     even_phases,
     factor_of,
     fourier,
+    is_positive_definite,
     matrices_at,
     mirrored,
+    outer_resistance,
     rest_at,
     seen_in_mirror,
     solutions,
@@ -140,7 +142,8 @@ def built_tables(
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
     films.join()
-    tables = [_table(request, [next(found) for _ in request.poses]) for request in requests]
+    solved = [[next(found) for _ in request.poses] for request in requests]
+    tables = [_table(one, _definite(one, some, workers)) for one, some in zip(requests, solved, strict=True)]
     seconds = (time.perf_counter() - start) / len(tables)
     return [replace(table, seconds=seconds) for table in tables]
 
@@ -195,6 +198,31 @@ def _table(request: _Request, found: Sequence[Sequence[Samples]]) -> TubeTable:
     error = _largest_errors(packed, request.yawed, found[level:count]) if request.yawed else without
     nodes, stage = len(request.nodes), places.stage.name
     return TubeTable(places.geometry, places.radius, packed, error, without, nodes, 0.0, _wire(places), stage)
+
+
+def _definite(request: _Request, found: list[list[Samples]], workers: int) -> list[list[Samples]]:
+    """Solutions at all poses; nodes whose outer resistance is not positive definite are solved for more finely."""
+    places, first = request.places, len(request.poses) - len(request.nodes)
+    film, nodes = _film_of_table(places), (*_level(places), *_yawed(places))
+    weak = [n for n, node in enumerate(nodes) if not _is_definite(film, node, found[first + n])]
+    finer = [
+        request.nodes[n]._replace(fineness=places.fineness(nodes[n].t, nodes[n].pose, stage=FINE, check=True))
+        for n in weak
+    ]
+    found = found.copy()
+    for n, answers in zip(weak, solutions(finer, "nodes that need a finer resolution", None, workers), strict=True):
+        found[first + n] = answers
+    return found
+
+
+def _is_definite(film: Samples, node: _Place, answers: Sequence[Samples]) -> bool:
+    """Whether the outer resistance is positive definite at a node, of the robot and, with yaw, of its mirror image."""
+    pose = node.pose
+    image = [(seen_in_mirror(some), replace(pose, yaw=-pose.yaw)) for some in answers[1:]]
+    return all(
+        is_positive_definite(outer_resistance(some, _film_of(film, at), node.t))
+        for some, at in [(answers[0], pose), *image]
+    )
 
 
 def _wire(places: Places) -> float | None:
@@ -364,7 +392,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[NodeSolution]:
         phases = tuple(first + phase for phase in even_phases(_CHECKED_PHASES))
         clear = places.tail_clearance(pose) > places.least_clearance
         if clear and pose.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
-            chosen.append(NodeSolution(((places.geometry, phases),), pose, places.fineness_of_check(pose)))
+            chosen.append(NodeSolution(((places.geometry, phases),), pose, places.fineness(t, pose, check=True)))
     return chosen
 
 

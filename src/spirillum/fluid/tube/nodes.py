@@ -34,8 +34,6 @@ _SWEPT = 121
 """Points along the tail at which its clearance from the wall is computed."""
 _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
-_SPACED = 0.38
-"""Least logarithm of the ratio of the first of these to the last of those, over that of `Stage.growth`."""
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most nodes the wall limits the tail to a smaller one."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
@@ -108,11 +106,9 @@ class Places:
                 f"of a tube with channel.diameter = {show(2.0 * self.radius, 'mm')}; allowed: a smaller amplitude, or "
                 "single poses without a table"
             )
-        found = []
-        while thin * self.stage.growth**_SPACED < self.stage.upper[0]:
-            found.append(thin)
-            thin *= self.stage.growth
-        return np.array([*found, *self.stage.upper])
+        ratio = self.stage.upper[0] / thin
+        count = max(round(np.log(ratio) / np.log(self.stage.growth)), 2 if ratio > 2.0 else 1)
+        return np.array([*thin * ratio ** (np.arange(count) / count), *self.stage.upper])
 
     @property
     def up(self) -> Samples:
@@ -140,7 +136,7 @@ class Places:
     def yaw_gaps(self) -> Samples:
         """Coordinates t of the nodes with yaw."""
         last = len(self.gaps) - 1
-        return self.gaps[sorted({0, min(2, last - 1), last - 1, last})]
+        return self.gaps[sorted({0, last // 2, last - 1, last})]
 
     @property
     def yaw_pitches(self) -> Samples:
@@ -154,15 +150,10 @@ class Places:
         x, pitches = np.array([(pose.offset / self.radius, pose.pitch) for pose in poses]).T
         return yaw_limit_of(x, pitches, np.array([self._widest(pose) for pose in poses]), LARGEST_YAW)
 
-    def fineness(self, t: float, pose: TubePose) -> Fineness:
-        """Resolution of the flow at a place."""
+    def fineness(self, t: float, pose: TubePose, *, check: bool = False, stage: Stage | None = None) -> Fineness:
+        """Resolution of the flow at a node, or at a check pose, of this stage or of another one."""
         gap = t * contact_offset(self.rings, self.radius, 0.0)
-        found = self.stage.fineness(gap, 0.5 * self.geometry.body_diameter, pose)
-        return replace(found, wire=finest_wire(self.geometry))
-
-    def fineness_of_check(self, pose: TubePose) -> Fineness:
-        """Resolution of the flow at a check pose."""
-        found = self.stage.fineness_of_check(0.5 * self.geometry.body_diameter, pose)
+        found = (stage or self.stage).fineness(gap, 0.5 * self.geometry.body_diameter, pose, check=check)
         return replace(found, wire=finest_wire(self.geometry))
 
     @cached_property

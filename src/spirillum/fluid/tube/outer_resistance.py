@@ -186,6 +186,25 @@ def seen_in_mirror(matrices: Samples) -> Samples:
     return found
 
 
+def outer_resistance(matrices: Samples, film: Samples, t: float) -> Samples:
+    """The outer part of resistances, (phases, 8, 8).
+
+    Args:
+        matrices: (phases, 8, 8).
+        film: of the body at that pose, (6, 6).
+        t: of the place.
+    """
+    rest = matrices.copy()
+    rest[:, :6, :6] -= cut_of_film(t) * film
+    found: Samples = 0.5 * (rest + np.swapaxes(rest, 1, 2))
+    return found
+
+
+def is_positive_definite(matrices: Samples) -> bool:
+    """Whether all of some symmetric matrices are, (n, 8, 8)."""
+    return bool(np.linalg.eigvalsh(matrices).min() > 0.0)
+
+
 def rest_at(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: int = 1) -> Samples:
     """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36).
 
@@ -196,7 +215,5 @@ def rest_at(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: 
         pose: named where the rest is not positive definite.
         starts: wires of the tail.
     """
-    rest = matrices.copy()
-    rest[:, :6, :6] -= cut_of_film(t) * film
     where = f"at an offset of {show(pose.offset, 'mm')} and a pitch of {show(pose.pitch, 'deg')}"
-    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES, starts)
+    return fourier(factor_of(outer_resistance(matrices, film, t), where), PHASES, starts)
