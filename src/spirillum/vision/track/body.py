@@ -195,7 +195,7 @@ class BodyFinder:
         """Fit the pose to the edges of the seal alone, near a guess good to five pixels, before anything is learnt."""
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
-    def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
+    def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose], *, rough: bool = False) -> float:
         """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides."""
         assert self.seal is not None  # noqa: S101 - checked by the caller
         found = []
@@ -203,7 +203,7 @@ class BodyFinder:
             part = self._part(image, pose)
             if part.colours is not None:
                 pixels, normals = self._seal_places(pose)
-                found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels))
+                found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels, rough=rough))
         return float(np.nanmedian(found)) if 2 * np.count_nonzero(np.isfinite(found)) > len(found) else np.nan
 
     @property

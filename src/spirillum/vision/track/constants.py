@@ -94,9 +94,13 @@ class SealConstants:
     """Relative difference of its length and its width from which on a block of colour is no whole seal."""
     size_tolerance: float = 0.02
     """Relative difference of its size up to which it is as expected: compression shifts edges of colours."""
+    one_way: float = 0.03
+    """Relative difference of its length or its width alone beyond which it is not as expected, whatever the other."""
+    size_error: float = 0.005
+    """Change of another size that was found up to which it is not sought any longer."""
     largest_difference: float = 0.1
     """Relative difference from the stated size beyond which it is no seal of this robot at this scale."""
-    sizes: int = 3
+    sizes: int = 4
     """Most sizes at which it is fitted, each the one that the one before has found."""
     outline_share: float = 0.6
     """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""

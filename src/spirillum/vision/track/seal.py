@@ -141,18 +141,25 @@ class SealEdges:
                 if mine.size > SEAL.fewest_of_kind:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
-    def size(self, seen: SealShifts, pixels: Samples) -> float:
-        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ."""
-        found, distances = [], []
-        for first, last in ((0, 3), (1, 2)):
-            sides = [self._sides[side] for side in (first, last)]
+    def size(self, seen: SealShifts, pixels: Samples, *, rough: bool = False) -> float:
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
+
+        Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the silhouette,
+        or nothing is: `rough` takes its length or its width alone where that differs.
+        """
+        found, distances = np.full(2, np.nan), np.zeros(2)
+        for way, ends in enumerate(((0, 3), (1, 2))):
+            sides = [self._sides[side] for side in ends]
             known = [side[seen.known[side]] for side in sides]
             if min(len(side) for side in known) < SEAL.fewest_of_side:
-                return np.nan
+                continue
             middles = [np.median(pixels[side], axis=0) for side in sides]
-            distances.append(float(np.hypot(*(middles[1] - middles[0]))))
-            found.append(sum(float(np.median(seen.shifts[side])) for side in known) / distances[-1])
-        if abs(found[1] - found[0]) > SEAL.proportions:
+            distances[way] = np.hypot(*(middles[1] - middles[0]))
+            found[way] = sum(np.median(seen.shifts[side]) for side in known) / distances[way]
+        most = float(found[np.argmax(np.abs(np.nan_to_num(found)))])
+        if rough and SEAL.one_way < abs(most) < SEAL.proportions:
+            return 1.0 + most
+        if not abs(found[1] - found[0]) < SEAL.proportions:
             return np.nan
         return 1.0 + float(np.average(found, weights=distances))
 
