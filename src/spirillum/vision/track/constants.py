@@ -94,8 +94,8 @@ class SealConstants:
     """Relative difference of its length and its width from which on a block of colour is no whole seal."""
     size_tolerance: float = 0.02
     """Relative difference of its size up to which it is as expected: compression shifts edges of colours."""
-    one_way: float = 0.03
-    """Relative difference of its length or its width alone beyond which it is not as expected, whatever the other."""
+    one_way: float = 1.3
+    """Difference of its length or its width alone beyond which it is not as expected, whatever the other, pixels."""
     size_error: float = 0.005
     """Change of another size that was found up to which it is not sought any longer."""
     largest_difference: float = 0.1

@@ -156,9 +156,9 @@ class SealEdges:
             middles = [np.median(pixels[side], axis=0) for side in sides]
             distances[way] = np.hypot(*(middles[1] - middles[0]))
             found[way] = sum(np.median(seen.shifts[side]) for side in known) / distances[way]
-        most = float(found[np.argmax(np.abs(np.nan_to_num(found)))])
-        if rough and SEAL.one_way < abs(most) < SEAL.proportions:
-            return 1.0 + most
+        way = int(np.argmax(np.abs(np.nan_to_num(found))))
+        if rough and abs(found[way]) < SEAL.proportions and abs(found[way]) * distances[way] > SEAL.one_way:
+            return 1.0 + float(found[way])
         if not abs(found[1] - found[0]) < SEAL.proportions:
             return np.nan
         return 1.0 + float(np.average(found, weights=distances))
