@@ -68,6 +68,10 @@ class SealConstants:
     """Least standard error of an edge at the ends and at the silhouettes, pixels."""
     noise: float = 6.0
     """Standard deviation of the noise of a colour, of 255."""
+    ground: float = 12.0
+    """Distance from a silhouette up to which the colours of the ground are learnt, pixels: a period of a grid."""
+    along_line: float = 4.0
+    """Variance of colours beside a silhouette over that of the ground: a line that covers a fifth may lie along it."""
     distinct: float = 2.0
     """Least distance of a stripe's colour from its surroundings, standard deviations."""
     strengths: tuple[float, float] = (0.4, 2.0)
@@ -102,6 +106,8 @@ class SealConstants:
     """Relative difference from the stated size beyond which it is no seal of this robot at this scale."""
     sizes: int = 4
     """Most sizes at which it is fitted, each the one that the one before has found."""
+    swings: float = 0.8
+    """Scatter of the seal's steps across an edge from which on one that stays is no edge of the body, pixels."""
     outline_share: float = 0.6
     """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""
     nose_share: float = 0.8

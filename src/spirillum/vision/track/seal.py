@@ -74,6 +74,7 @@ class SealEdges:
         from scipy.special import erf
 
         self._palette: Samples | None = None
+        self._ground = np.tile(SEAL.noise**2 * np.eye(3), (2, 1, 1))
         self._template: Samples = -0.5 * erf(self._offsets / (np.sqrt(2.0) * SEAL.edge_blur))
         self._take(self._template)
         self._bias = np.zeros((len(_SIDES), self._classes))
@@ -116,6 +117,7 @@ class SealEdges:
         cv2 = import_optional("cv2", "measuring a video", "video")
         flanks = np.concatenate(self._sides[1:3])
         inside = self._offsets <= -1.0
+        self._learn_ground(parts, places)
         colours = [
             self._colours(part, *place)[:, flanks][:, :, inside] for part, place in zip(parts, places, strict=True)
         ]
@@ -131,6 +133,19 @@ class SealEdges:
             middle = np.median(shares, axis=0)
             self._template = 0.5 * (middle - middle[::-1])
         self._take(self._template)
+
+    def _learn_ground(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
+        """Learn how colours vary beside the silhouettes: a line of a grid that lies along one is no stripe's edge."""
+        flanks = np.concatenate(self._sides[1:3])
+        offsets, found = np.arange(SEAL.beside, SEAL.ground, 1.0), []
+        for part, (pixels, normals) in zip(parts, places, strict=True):
+            colours = np.empty((3, flanks.size, offsets.size))
+            profiles_across(part.picture, part.origin, pixels[flanks], normals[flanks], offsets, colours)
+            found.append(colours.reshape(3, -1))
+        seen = np.concatenate(found, axis=1)
+        seen = seen[:, np.isfinite(seen).all(axis=0)]
+        if seen.shape[1] > SEAL.fewest_of_kind:
+            self._ground[1] = SEAL.noise**2 * np.eye(3) + SEAL.along_line * np.cov(seen)
 
     def learn_bias(self, residuals: Samples, kinds: np.ndarray) -> None:
         """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently."""
@@ -178,8 +193,8 @@ class SealEdges:
             self._offsets,
             self._ends,
             np.empty((0, 3)) if self._palette is None else self._palette,
+            self._ground,
             SEAL.beside,
-            SEAL.noise,
             SEAL.distinct,
             STRIPES.white,
             SEAL.fewest_of_kind,
