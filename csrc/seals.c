@@ -77,9 +77,9 @@ static void invert(const double a[COLOURS][COLOURS], double inverse[COLOURS][COL
         for (int j = 0; j < COLOURS; j++) inverse[i][j] /= determinant;
 }
 
-/* Inverse covariance of what lies beside the edges of a side, with the noise of a colour. */
-static void whitening(const Profiles *p, const int64_t *side, const double *middle, double noise,
-                      double inverse[COLOURS][COLOURS]) {
+/* Inverse covariance of what lies beside the edges of a side, with noise and what the ground has farther out. */
+static void whitening(const Profiles *p, const int64_t *side, const double *middle,
+                      const double ground[COLOURS][COLOURS], double inverse[COLOURS][COLOURS]) {
     double spread[COLOURS][COLOURS] = {{0.0}}, count = 0.0;
     for (int64_t i = side[FIRST]; i < side[END]; i++) {
         for (int64_t k = 0; k < p->samples; k++) {
@@ -93,7 +93,7 @@ static void whitening(const Profiles *p, const int64_t *side, const double *midd
         }
     }
     for (int a = 0; a < COLOURS; a++)
-        for (int b = 0; b < COLOURS; b++) spread[a][b] = spread[a][b] / count + (a == b ? squared(noise) : 0.0);
+        for (int b = 0; b < COLOURS; b++) spread[a][b] = spread[a][b] / count + ground[a][b];
     invert(spread, inverse);
 }
 
@@ -132,7 +132,8 @@ static void add_share(const Profiles *p, int64_t edge, const double middle[COLOU
 }
 
 EXPORT void seal_shares(const double *colours, const double *offsets, const int64_t (*sides)[3],
-                        const double (*palette)[COLOURS], double beside, double noise, double distinct, double white,
+                        const double (*palette)[COLOURS], const double (*ground)[COLOURS][COLOURS], double beside,
+                        double distinct, double white,
                         int64_t fewest, int64_t pooled, double *work, double *share, double *distance, int64_t *kind,
                         int64_t edges, int64_t samples, int64_t count, int64_t kinds) {
     const Profiles p = {colours, offsets, edges, samples, beside};
@@ -145,7 +146,7 @@ EXPORT void seal_shares(const double *colours, const double *offsets, const int6
     for (int64_t s = 0; s < count; s++) {
         const bool is_flank = sides[s][FLANK] != 0;
         if (!surroundings(&p, sides[s], fewest, pooled, work, middle)) continue;
-        whitening(&p, sides[s], middle, noise, inverse);
+        whitening(&p, sides[s], middle, ground[is_flank], inverse);
         for (int64_t i = sides[s][FIRST]; i < sides[s][END]; i++) {
             double inner[COLOURS], here[COLOURS], step[COLOURS], towards[COLOURS], *line = share + i * samples;
             mean_between(&p, i, is_flank ? -beside : -2.0 * beside, is_flank ? -1.0 : -beside, inner);

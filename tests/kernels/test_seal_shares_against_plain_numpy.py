@@ -8,7 +8,9 @@ from spirillum.kernels.edges import seal_shares, seal_shifts
 
 OFFSETS = np.arange(-6.0, 7.0)
 SIDES = np.array([[0, 12, 0], [12, 30, 1], [30, 36, 0]])
-BESIDE, NOISE, DISTINCT, WHITE, FEWEST, POOLED = 3.0, 6.0, 2.0, 235.0, 8, 2
+BESIDE, DISTINCT, WHITE, FEWEST, POOLED = 3.0, 2.0, 235.0, 8, 2
+GROUND = np.array([36.0 * np.eye(3), 36.0 * np.eye(3) + np.outer([9.0, 7.0, 2.0], [9.0, 7.0, 2.0])])
+"""Of the ends, and of the silhouettes over a grid."""
 
 
 def side_by_numpy(
@@ -23,7 +25,7 @@ def side_by_numpy(
     away = here - middle[:, :, None]
     rest = away[:, :, beside].reshape(3, -1)
     rest = rest[:, np.isfinite(rest).all(axis=0)]
-    spread = rest @ rest.T / rest.shape[1] + NOISE**2 * np.eye(3)
+    spread = rest @ rest.T / rest.shape[1] + GROUND[int(is_flank)]
     low, high = (-BESIDE, -1.0) if is_flank else (-2.0 * BESIDE, -BESIDE)
     inner = here[:, :, (low <= OFFSETS) & (high >= OFFSETS)].mean(axis=2)
     steps = np.stack(
@@ -50,8 +52,8 @@ def test_shares_are_those_of_plain_numpy(kinds: int, hidden: float) -> None:
     colours[:, rng.uniform(size=(count, OFFSETS.size)) < hidden / OFFSETS.size] = np.nan
     palette = rng.uniform(0.0, 255.0, (kinds, 3))
     share, distance, kind = np.empty((count, OFFSETS.size)), np.empty(count), np.empty(count, dtype=np.int64)
-    limits = BESIDE, NOISE, DISTINCT, WHITE, FEWEST, POOLED
-    seal_shares(colours, OFFSETS, SIDES, palette, *limits, np.empty((2, 3, count)), share, distance, kind)
+    limits = BESIDE, DISTINCT, WHITE, FEWEST, POOLED
+    seal_shares(colours, OFFSETS, SIDES, palette, GROUND, *limits, np.empty((2, 3, count)), share, distance, kind)
     for first, end, is_flank in SIDES[:2].tolist():
         expected = side_by_numpy(colours[:, first:end].copy(), palette, is_flank=bool(is_flank))
         for found, true in zip((share, distance, kind), expected, strict=True):

@@ -88,6 +88,18 @@ def test_the_speed_over_a_grid_is_the_robots(film, tmp_path, clear):
     assert track.cues["tail"].share > 0.9
 
 
+def test_a_swing_across_the_lines_is_the_robots(film, tmp_path):
+    swing = 1e-3 * np.cos(2.0 * np.pi * 1.7 * film.times)
+    setup = written(film, tmp_path, clear=0.9)
+    for index, (time, off) in enumerate(zip(film.times, swing, strict=True)):
+        moved = replace(film, start=(film.start[0], film.start[1] + float(off)))
+        cv2.imwrite(str(tmp_path / "film" / f"{index:02d}.png"), on_paper(moved, time, clear=0.9)[:, :, ::-1])
+    track = follow(tmp_path / "film", *load_setup(setup))
+    seen = np.polyfit(swing, track.position[:, 1], 1)[0]
+    assert seen == pytest.approx(1.0, abs=0.15)  # the lines would hold it
+    assert np.std(track.body_angle - film.truth(track.time)["body_angle"]) < 0.06  # a pixel across the seal
+
+
 def test_a_live_robot_of_glass_over_a_grid_is_followed_by_its_seal(film, tmp_path):
     setup = written(film, tmp_path, clear=0.9)
     tracker = LiveTracker(setup, learn_from=tmp_path / "film")

@@ -180,8 +180,8 @@ def seal_shares(
     offsets: Float64[Array, "samples"],
     sides: Int64[Array, "count 3"],
     palette: Float64[Array, "kinds 3"],
+    ground: Float64[Array, "2 3 3"],
     beside: float,
-    noise: float,
     distinct: float,
     white: float,
     fewest: int,
@@ -201,8 +201,8 @@ def seal_shares(
         offsets: distances of the samples outward from an edge, pixels.
         sides: first edge of each side, the one after its last, and whether the side is a silhouette.
         palette: known colours at the silhouette; none at first.
+        ground: covariance of colours, by noise and by what lies farther out, at ends and at silhouettes, of 255.
         beside: distance from an edge from which on colours are those of one side, pixels.
-        noise: standard deviation of a colour's noise, of 255.
         distinct: least distance of a stripe from its surroundings, standard deviations.
         white: brightness of glare, of 255, which hides an edge.
         fewest: fewest edges of a side in view.

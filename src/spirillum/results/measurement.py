@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,7 +184,17 @@ def measure(
     with results_folder(output) as path, guard_inputs(*inputs):
         folder = _Folder(path, annotated=annotated, figures=figures)
         folder.check(asked)
+        Thread(target=_import_ahead, kwargs={"figures": figures}, daemon=True).start()
         return _measured(asked, folder, on_progress)
+
+
+def _import_ahead(*, figures: bool) -> None:
+    """Import what the camera's fit and the figures need, while the video is decoded and compiled loops run."""
+    with suppress(ImportError):
+        import scipy.optimize  # noqa: F401
+
+        if figures:
+            import spirillum.view.figures.measurement  # noqa: F401
 
 
 _ENDINGS = ("nc", "movement.nc")

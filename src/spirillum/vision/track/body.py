@@ -195,7 +195,7 @@ class BodyFinder:
         """Fit the pose to the edges of the seal alone, near a guess good to five pixels, before anything is learnt."""
         return self._place(self._part(image, guess), guess, seal_only=True, rough=SEAL.rough_steps)
 
-    def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose]) -> float:
+    def size_by_seal(self, images: Sequence[np.ndarray], poses: Sequence[BodyPose], *, rough: bool = False) -> float:
         """Apparent size of the seal over that of the robot's; NaN unless most frames show all its sides."""
         assert self.seal is not None  # noqa: S101 - checked by the caller
         found = []
@@ -203,7 +203,7 @@ class BodyFinder:
             part = self._part(image, pose)
             if part.colours is not None:
                 pixels, normals = self._seal_places(pose)
-                found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels))
+                found.append(self.seal.size(self.seal.shifts(part.colours, pixels, normals), pixels, rough=rough))
         return float(np.nanmedian(found)) if 2 * np.count_nonzero(np.isfinite(found)) > len(found) else np.nan
 
     @property
@@ -268,11 +268,12 @@ class BodyFinder:
 
     def _learn_biases(self, parts: list[_Part], found: list[PoseFit], most: tuple[float, float] = SEAL.follows) -> None:
         """Learn the bias of each edge and the scatter about it, as glare shifts edges."""
-        residuals = []
+        residuals, across = [], []
         for part, one in zip(parts, found, strict=True):
             if one.known:
                 shifts, known, _ = self._shifts(part, one.pose)
                 residuals.append(np.where(known, shifts, np.nan))
+                across.append(self._places(part, one.pose)[3][:, 1:] @ one.pose[1:])
         if len(residuals) < 6:
             return
         middle, spread, enough = _usual(residuals)
@@ -280,7 +281,12 @@ class BodyFinder:
         self._scatter = np.where(enough, np.hypot(self.contour.floor, spread), 0.5)
         if self.seal is not None:
             bound = np.hypot(*(self.contour.normals * np.array(most)).T)
-            self._scatter[~enough | (self._scatter > bound)] = np.inf
+            moved = np.array(across) - np.median(across, axis=0)
+            fixed = _usual([some + by for some, by in zip(residuals, moved, strict=True)])[1]
+            stays, swings = fixed < spread, mad_scale(np.diff(moved, axis=0), axis=0) > SEAL.swings
+            # The seal shows a swing across, but drifts as stripes pass its silhouettes: then what stays is believed.
+            self._scatter[stays & ~swings & enough] = np.hypot(self.contour.floor, fixed)[stays & ~swings & enough]
+            self._scatter[~enough | (self._scatter > bound) | (stays & swings)] = np.inf
             self._learn_seal_biases(parts, found)
 
     def _learn_seal_biases(self, parts: list[_Part], found: list[PoseFit]) -> None:

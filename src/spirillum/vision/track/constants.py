@@ -68,6 +68,10 @@ class SealConstants:
     """Least standard error of an edge at the ends and at the silhouettes, pixels."""
     noise: float = 6.0
     """Standard deviation of the noise of a colour, of 255."""
+    ground: float = 12.0
+    """Distance from a silhouette up to which the colours of the ground are learnt, pixels: a period of a grid."""
+    along_line: float = 4.0
+    """Variance of colours beside a silhouette over that of the ground: a line that covers a fifth may lie along it."""
     distinct: float = 2.0
     """Least distance of a stripe's colour from its surroundings, standard deviations."""
     strengths: tuple[float, float] = (0.4, 2.0)
@@ -94,10 +98,16 @@ class SealConstants:
     """Relative difference of its length and its width from which on a block of colour is no whole seal."""
     size_tolerance: float = 0.02
     """Relative difference of its size up to which it is as expected: compression shifts edges of colours."""
+    one_way: float = 1.3
+    """Difference of its length or its width alone beyond which it is not as expected, whatever the other, pixels."""
+    size_error: float = 0.005
+    """Change of another size that was found up to which it is not sought any longer."""
     largest_difference: float = 0.1
     """Relative difference from the stated size beyond which it is no seal of this robot at this scale."""
-    sizes: int = 3
+    sizes: int = 4
     """Most sizes at which it is fitted, each the one that the one before has found."""
+    swings: float = 0.8
+    """Scatter of the seal's steps across an edge from which on one that stays is no edge of the body, pixels."""
     outline_share: float = 0.6
     """Share of the outline's edges that have to move with the seal before the body is followed by its outline."""
     nose_share: float = 0.8

@@ -248,11 +248,12 @@ def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _
         if len(seen) < SEAL.clear_share * len(frames):
             return None
         poses = [one.pose for one in placed if one is not None and one.known]
-        off = finder.size_by_seal([frames[k].image for k in seen], poses)
+        stated = finder.optics is body.optics
+        off = finder.size_by_seal([frames[k].image for k in seen], poses, rough=stated)
         size *= off
         if not abs(np.log(size)) < SEAL.largest_difference:
             return None
-        if abs(off - 1.0) < SEAL.size_tolerance:
+        if abs(off - 1.0) < (SEAL.size_tolerance if stated else SEAL.size_error):
             break
         finder = resized(finder, off)
         search = SealSearch(body.robot, finder.optics, body.bounds)

@@ -74,6 +74,7 @@ class SealEdges:
         from scipy.special import erf
 
         self._palette: Samples | None = None
+        self._ground = np.tile(SEAL.noise**2 * np.eye(3), (2, 1, 1))
         self._template: Samples = -0.5 * erf(self._offsets / (np.sqrt(2.0) * SEAL.edge_blur))
         self._take(self._template)
         self._bias = np.zeros((len(_SIDES), self._classes))
@@ -116,6 +117,7 @@ class SealEdges:
         cv2 = import_optional("cv2", "measuring a video", "video")
         flanks = np.concatenate(self._sides[1:3])
         inside = self._offsets <= -1.0
+        self._learn_ground(parts, places)
         colours = [
             self._colours(part, *place)[:, flanks][:, :, inside] for part, place in zip(parts, places, strict=True)
         ]
@@ -132,6 +134,19 @@ class SealEdges:
             self._template = 0.5 * (middle - middle[::-1])
         self._take(self._template)
 
+    def _learn_ground(self, parts: Sequence[ColourPart], places: Sequence[tuple[Samples, Samples]]) -> None:
+        """Learn how colours vary beside the silhouettes: a line of a grid that lies along one is no stripe's edge."""
+        flanks = np.concatenate(self._sides[1:3])
+        offsets, found = np.arange(SEAL.beside, SEAL.ground, 1.0), []
+        for part, (pixels, normals) in zip(parts, places, strict=True):
+            colours = np.empty((3, flanks.size, offsets.size))
+            profiles_across(part.picture, part.origin, pixels[flanks], normals[flanks], offsets, colours)
+            found.append(colours.reshape(3, -1))
+        seen = np.concatenate(found, axis=1)
+        seen = seen[:, np.isfinite(seen).all(axis=0)]
+        if seen.shape[1] > SEAL.fewest_of_kind:
+            self._ground[1] = SEAL.noise**2 * np.eye(3) + SEAL.along_line * np.cov(seen)
+
     def learn_bias(self, residuals: Samples, kinds: np.ndarray) -> None:
         """Learn by how much each colour shifts an edge: compression blurs colours and brightness differently."""
         for number, side in enumerate(self._sides):
@@ -141,18 +156,25 @@ class SealEdges:
                 if mine.size > SEAL.fewest_of_kind:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
-    def size(self, seen: SealShifts, pixels: Samples) -> float:
-        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ."""
-        found, distances = [], []
-        for first, last in ((0, 3), (1, 2)):
-            sides = [self._sides[side] for side in (first, last)]
+    def size(self, seen: SealShifts, pixels: Samples, *, rough: bool = False) -> float:
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
+
+        Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the silhouette,
+        or nothing is: `rough` takes its length or its width alone where that differs.
+        """
+        found, distances = np.full(2, np.nan), np.zeros(2)
+        for way, ends in enumerate(((0, 3), (1, 2))):
+            sides = [self._sides[side] for side in ends]
             known = [side[seen.known[side]] for side in sides]
             if min(len(side) for side in known) < SEAL.fewest_of_side:
-                return np.nan
+                continue
             middles = [np.median(pixels[side], axis=0) for side in sides]
-            distances.append(float(np.hypot(*(middles[1] - middles[0]))))
-            found.append(sum(float(np.median(seen.shifts[side])) for side in known) / distances[-1])
-        if abs(found[1] - found[0]) > SEAL.proportions:
+            distances[way] = np.hypot(*(middles[1] - middles[0]))
+            found[way] = sum(np.median(seen.shifts[side]) for side in known) / distances[way]
+        way = int(np.argmax(np.abs(np.nan_to_num(found))))
+        if rough and abs(found[way]) < SEAL.proportions and abs(found[way]) * distances[way] > SEAL.one_way:
+            return 1.0 + float(found[way])
+        if not abs(found[1] - found[0]) < SEAL.proportions:
             return np.nan
         return 1.0 + float(np.average(found, weights=distances))
 
@@ -171,8 +193,8 @@ class SealEdges:
             self._offsets,
             self._ends,
             np.empty((0, 3)) if self._palette is None else self._palette,
+            self._ground,
             SEAL.beside,
-            SEAL.noise,
             SEAL.distinct,
             STRIPES.white,
             SEAL.fewest_of_kind,

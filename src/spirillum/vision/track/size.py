@@ -197,12 +197,13 @@ def _doubtful_outline(scale: Scale, size: float, off: float, tail: float, *, rul
     """What follows where nothing but the body's outline contradicts the scale."""
     if ruler:
         why = f"the tail is as long as it should be within {100 * abs(tail - 1.0):.1f} %"
+        remedy = "correct body.length and body.diameter of the robot file only where it lies on the body"
     else:
         why = "the tail says nothing of it" if np.isnan(tail) else "the tail agrees with neither"
+        remedy = "where it lies on the body, measure spacing, heights and body again"
     sentence = (
         f"the outline looks {_told(size)}, and {why}: it may follow the rim or the contents of a glass cover, or a "
-        "grid behind it: look at the annotated video, and correct body.length and body.diameter of the robot file only "
-        "where it lies on the body; "
+        f"grid behind it: look at the annotated video, and {remedy}; "
     )
     wider = scale if ruler else with_source(scale, "size of the body", off)
     if off > (SIZE.largest_difference if ruler else SIZE.unconfirmed):
