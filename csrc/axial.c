@@ -234,3 +234,7 @@ EXPORT void contact_drag(const double *resistances, const double *force, const d
         out[n] = sqrt(low * high);
     }
 }
+
+#if defined(__clang__) && defined(__AVX2__)
+#pragma clang attribute pop
+#endif

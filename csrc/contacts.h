@@ -78,8 +78,8 @@ static inline void turn_normal(double turn, double *y, double *z) {
     *z = (*z + turn * here) * over;
 }
 
-double asperity_load(double gap, double height, double load);
-double asperity_energy(double gap, double height, double load);
+EXPORT double asperity_load(double gap, double height, double load);
+EXPORT double asperity_energy(double gap, double height, double load);
 Nearest site_nearest(const Site *site, const State *y, const double rotation[3][3], double radius);
 bool tail_reaches(const Wire *wire, const State *y, const double rotation[3][3], double radius, double height);
 Nearest wire_nearest(const Wire *wire, const Station *stations, const State *y, const double rotation[3][3],

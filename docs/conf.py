@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import jaxtyping  # noqa: F401 - shapes of arrays are then read as such
+from sphinx.pycode.parser import Parser
 
 from spirillum import __version__, arrays
 from spirillum.robot import fields as robot_fields
@@ -31,8 +33,12 @@ extensions = [
     "sphinx.ext.napoleon",
     "for_the_pages",
 ]
-if not tags.has("check"):  # noqa: F821 - Sphinx gives it; listings take longest and can hold no warning
+smartquotes = not tags.has("check")  # noqa: F821 - Sphinx gives it
+if smartquotes:
     extensions.append("sphinx.ext.viewcode")
+else:  # listings take longest, quotes and debug messages a tenth: none of them can hold a warning
+    Parser.parse_definition = lambda _parser: None  # where definitions stand is for listings alone
+    logging.disable(logging.DEBUG)
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
 
@@ -54,6 +60,7 @@ default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": False, "exclude-members": "model_config"}
 autodoc_typehints_format = "short"
+autodoc_use_type_comments = False  # the sources would be parsed function by function for what none of them has
 _FIELD_TYPES = [name for name, value in vars(robot_fields).items() if get_origin(value) is Annotated]
 autodoc_type_aliases = {name: name for name in (*arrays.__annotations__, *_FIELD_TYPES, "Switch", "Taper")}
 napoleon_google_docstring = True

@@ -89,9 +89,9 @@ def test_lines_end_between_words_at_80_columns(run: Callable[..., Any], monkeypa
 @pytest.mark.parametrize(
     ("overrides", "options", "reason"),
     [
-        pytest.param({"body.mass": "9 g"}, {}, "", id="light"),
-        pytest.param({"body.mass": "7.82 g"}, {}, "", id="neutral"),
-        pytest.param({"body.mass": "7 g"}, {}, "", id="rising"),
+        pytest.param({"body.mass": "9 g"}, {"duration": "3 s"}, "", id="light"),
+        pytest.param({"body.mass": "7.82 g"}, {"duration": "3 s"}, "", id="neutral"),
+        pytest.param({"body.mass": "7 g"}, {"duration": "3 s"}, "", id="rising"),
         pytest.param({}, {"placement": {"flow": "1 mm/s"}}, "", id="imposed flow"),
         pytest.param({}, {"placement": {"ends": "closed"}}, "", id="closed ends"),
         pytest.param({}, {"tail_rate": "1.2 Hz"}, "a tail rate is prescribed", id="prescribed tail rate"),

@@ -32,6 +32,17 @@ def test_the_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: 
     assert all(path.stat().st_size > 10_000 for path in made)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", runpy.run_path(str(BUILD))["TARGETS"])
+def test_zig_compiles_for_every_platform(
+    build: dict[str, Any], platform: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where no compiler is installed, and for wheels; its clang knows other pragmas than gcc."""
+    pytest.importorskip("ziglang")
+    monkeypatch.setenv("SPIRILLUM_WHEEL", platform)
+    assert len(build["compile_all"](tmp_path)) == (2 if platform.endswith(("x86_64", "amd64")) else 1)
+
+
 def test_a_result_of_another_type_or_order_is_refused() -> None:
     with pytest.raises(TypeError, match="out must be a contiguous array of float64"):
         spline_weights(0.5, 0.0, 1.0, 4, np.empty(4, dtype=np.float32))
