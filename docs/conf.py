@@ -13,7 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import jaxtyping  # noqa: F401 - shapes of arrays are then read as such
-from sphinx.pycode.parser import Parser
 
 from spirillum import __version__, arrays
 from spirillum.robot import fields as robot_fields
@@ -36,8 +35,7 @@ extensions = [
 smartquotes = not tags.has("check")  # noqa: F821 - Sphinx gives it
 if smartquotes:
     extensions.append("sphinx.ext.viewcode")
-else:  # listings take longest, quotes and debug messages a tenth: none of them can hold a warning
-    Parser.parse_definition = lambda _parser: None  # where definitions stand is for listings alone
+else:  # listings take longest; none of these can hold a warning
     logging.disable(logging.DEBUG)
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
