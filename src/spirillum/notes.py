@@ -103,11 +103,6 @@ CAUTIONS = {
         "resistances of the paper's level robot are within 2.1 % of direct solutions, in films of micrometres within "
         "1.1 % of exact ones of long cylinders, 4 % of Reynolds' equation under short ones."
     ),
-    "tail-on-glass": (
-        "Crests of the wire that touch the glass have no lubrication film, only asperities with dry friction. A film "
-        "would brake them like a coefficient of friction of 0.4 to 0.6: in trials of 20 s of the paper's robot the "
-        "speed then changes by 0 to 7 % where it is light, by three quarters where its tail is heavy."
-    ),
     "held-by-friction": (
         "Dry friction is larger than the thrust: the speed that is left comes from the smoothing of the friction "
         "law, and means no motion."

@@ -176,7 +176,6 @@ def run_in_tube(
         turning=0.5 * robot.body.diameter * float(dataset["mean_body_rotation_rate_steady"]),
         contact_force=float(dataset["contact_force"][-1]),
     )
-    notes += tail_notes(links, dataset["tail_gap"].values)
     error = in_stokes_flow(table.speed_error_at(1.0), *limits)
     notes += stuck or (checked.notes if np.isfinite(error) else [])
     return dataset.assign_attrs(
@@ -337,18 +336,6 @@ def sticking_notes(robot: TubeRobot, *, forward: float, turning: float, contact_
         f"{show(smoothed, 'um/s')}, where the friction law is smoothed, and has no error estimate"
     )
     return [Note("held-by-friction", words, ("in_tube.friction_coefficient", "forward_velocity"))]
-
-
-def tail_notes(robot: TubeRobot, gaps: Samples) -> list[Note]:
-    """A sentence on a tail that touches the glass, at gaps over time, m; NaN: far from it."""
-    share = float(np.mean(gaps < float(robot.tube[kernel.ROUGHNESS])))
-    if not share > 0.0:
-        return []
-    words = (
-        f"the tail touches the glass for {100.0 * share:.2g} % of the time: no film brakes its crests; compare with "
-        "in_tube.friction_coefficient = 0.4"
-    )
-    return [Note("tail-on-glass", words, ("in_tube.friction_coefficient", "forward_velocity"))]
 
 
 def _falls(time: Samples | None, first: int) -> str:
