@@ -198,21 +198,13 @@ static void add_dyad(double c, const double r[RATES], double matrix[RATES][RATES
         for (int j = 0; j < RATES; j++) matrix[i][j] += c * r[i] * r[j];
 }
 
-/* The station from which on the wire's centreline holds at xi. */
-static const Station *segment_at(const Crest *c, double xi) {
-    const Station *found = c->at;
-    while (found > c->first && found->xi > xi) found--;
-    while (found + 1 < c->last && found[1].xi < xi) found++;
-    return found;
-}
-
 /* A slice across the wire at xi, in a lane; its film spans `length`, m, along the wire.
  *
  * V is that of the gap, less the slope along the wire times the mean of both surfaces' velocities along it; u is that
  * across the wire, as seen from the contact line, which the wire's axis takes along. */
 static void add_slice_of_wire(const Crest *c, double xi, double span, double reach, Slices *s, int n,
                               double matrix[RATES][RATES]) {
-    const WirePoint p = wire_point(c->wire, segment_at(c, xi), c->y, c->rotation, xi);
+    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, xi);
     const double b = c->wire->radius, *x = c->rotation[0];
     const double distance = sqrt(p.square), gap = larger(c->radius - distance - b, LEAST_FILM * b);
     if (gap >= reach) return;
@@ -259,7 +251,7 @@ bool add_crest_film(const Crest *c, const Nearest *nearest, Slices *slices, int 
     const double reach = CREST_REACH * c->wire->radius, gap = larger(nearest->gap, LEAST_FILM * c->wire->radius);
     if (gap >= reach) return false;
     const double from = c->first->xi, to = c->last->xi;
-    const WirePoint p = wire_point(c->wire, segment_at(c, nearest->xi), c->y, c->rotation, nearest->xi);
+    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, nearest->xi);
     /* The gap along the wire: a parabola, with a slope at an end of it. */
     const double distance = sqrt(p.square), slope = fabs(p.first) / distance;
     const double bend = larger(-p.second / distance, LEAST_FILM * reach / squared(to - from));
