@@ -1,7 +1,8 @@
 """How accurate is the model `tube`, and how long does it take?
 
 Sphere, annulus, capsule and open ends against `tube_reference.json` and closed forms; the lying capsule and the whole
-robot against themselves, resolved more finely; the paper's 16 tails in both channels; memory. Seconds are of the wall
+robot against themselves, resolved more finely; the robot near the glass against its table; the paper's 16 tails in both
+channels; memory. Seconds are of the wall
 and of the processor, and over those of two LU factorisations of the size of the equations (one for each parity), which
 are measured next to them. Kernels are compiled before anything is timed, and answers on disk are not used.
 
@@ -26,8 +27,10 @@ from tube_reference import annulus_axial_drag, annulus_axial_drag_no_flux, annul
 import spirillum as sp
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.library import tables_of
+from spirillum.fluid.tube.outer_resistance import matrix_of
 from spirillum.fluid.tube.solids import Fineness, Solids
-from spirillum.fluid.tube.tube import END_LOSS
+from spirillum.fluid.tube.tube import END_LOSS, solved
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.batch import RobotBatch
@@ -260,6 +263,32 @@ def wire_rows(*, quick: bool) -> list[Row]:
     return rows
 
 
+def film_rows(*, quick: bool) -> list[Row]:
+    """The whole robot, level and near the glass, against its table: largest differences of its resistances.
+
+    Relative to the geometric mean of the diagonal entries. A table is a film with an extrapolated rest there.
+    """
+    cases = {1e-4: (1e-2, 1e-3)} if quick else {1e-4: (1e-2, 1e-3), 5e-5: (2e-3, 1e-3)}
+    rows = []
+    for channel in CHANNELS:
+        table: Any = tables_of(RobotBatch.of(sp.load(f"biorob2012-{channel}")))[0]
+        for gap, tolerances in cases.items():
+            pose = TubePose.at_gap(table.geometry.body, table.radius, gap)
+            own, _ = table.at(pose.offset, 0.0, 0.0, FILM_PHASE)
+            size = np.sqrt(np.diag(own))
+            for tolerance in tolerances:
+                question = table.geometry, pose, Fineness(tolerance=tolerance, order=6, growth=1.2), FILM_PHASE
+                run = timed(lambda question=question: matrix_of(solved(*question)))
+                off = (run.value - own) / np.outer(size, size)
+                found = dict(zip(FILM_MOTIONS, np.diag(off).tolist(), strict=False))
+                found["others"] = float(np.abs(off - np.diag(np.diag(off))).max())
+                rows.append({"channel": channel, "gap_mm": 1e3 * gap, "tolerance": tolerance, **found})
+                rows[-1] |= {"s": run.wall, "cpu_s": run.processor}
+    return rows
+
+
+FILM_PHASE, FILM_MOTIONS = 0.3, ("forward", "sideways", "normal", "roll", "pitch", "yaw")
+"""Phase of the tail, rad, and motions of the body."""
 CASES = {
     "sphere": sphere_rows,
     "annulus": annulus_rows,
@@ -268,6 +297,7 @@ CASES = {
     "robot": robot_rows,
     "tails": tail_rows,
     "wire": wire_rows,
+    "film": film_rows,
 }
 
 

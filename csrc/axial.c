@@ -148,7 +148,8 @@ static void close_step(const Block *b, int64_t k, const AxialRobot *p, AxialStat
                        double rest) {
     const double i = b->current[k], charge = b->charge[k] + i * rest, squares = b->squares[k] + i * i * rest;
     const double loss = b->heat[k] + resistance(b, k, i) * i * i * rest; /* all resistance times I^2, over L */
-    const double impulse = p->motor.torque_constant * charge, emf = p->motor.back_emf * (p->tail - p->body) * p->motor.torque_constant;
+    const double impulse = p->motor.torque_constant * charge,
+                 emf = p->motor.back_emf * (p->tail - p->body) * p->motor.torque_constant;
     state->current = i;
     state->position += p->speed * impulse + p->speed_flow * carried;
     state->tail_angle += p->tail * impulse + p->tail_flow * carried;
@@ -173,8 +174,8 @@ EXPORT void advance_axial(const double *parameters, double *states, double dt, c
 }
 
 /* The same of robots whose motor has a curve, its torque in place of the current: it is constant over a step. */
-EXPORT void advance_on_curve(const double *parameters, double *states, double dt, const double *duty, const double *flow,
-                             const double *curve, int64_t count) {
+EXPORT void advance_on_curve(const double *parameters, double *states, double dt, const double *duty,
+                             const double *flow, const double *curve, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
         const AxialRobot *p = (const AxialRobot *)parameters + n;
         AxialState *state = (AxialState *)states + n;

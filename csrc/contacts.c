@@ -33,6 +33,8 @@ EXPORT double asperity_energy(double gap, double height, double load) {
 }
 
 /* Direction (y, z) across the tube in body axes. */
+static const double LEAST_FILM = 1e-5; /* of the wire's radius: where a trial is inside the wall */
+
 static void set_normal(Nearest *at, const double rotation[3][3], double y, double z) {
     for (int i = 0; i < 3; i++) at->j[i] = at->normal[i] = rotation[1][i] * y + rotation[2][i] * z;
 }
@@ -105,9 +107,9 @@ static void line_at(const Station *s, double phase, double xi, double at[3][3]) 
     }
 }
 
-/* A point of the centreline: in body axes, across the tube, d^2, and d(d^2/2)/dxi once and twice. */
+/* A point of the centreline and its derivative in body axes; across the tube, d^2, and d(d^2/2)/dxi once and twice. */
 typedef struct {
-    double point[3], side, up, square, first, second;
+    double point[3], tangent[3], side, up, square, first, second;
 } WirePoint;
 
 static WirePoint wire_point(const Wire *wire, const Station *stations, const State *state, const double rotation[3][3],
@@ -117,7 +119,7 @@ static WirePoint wire_point(const Wire *wire, const Station *stations, const Sta
         helix_at(wire, state->phase + stations->turn, xi, at);
     else
         line_at(stations + (xi > stations[1].xi), state->phase, xi, at);
-    WirePoint found = {.point = {at[0][0], at[0][1], at[0][2]}};
+    WirePoint found = {.point = {at[0][0], at[0][1], at[0][2]}, .tangent = {at[1][0], at[1][1], at[1][2]}};
     for (int n = 0; n < 2; n++) {
         const double *row = rotation[n + 1];
         double d[3];
@@ -157,22 +159,111 @@ Nearest wire_nearest(const Wire *wire, const Station *stations, const State *y, 
     at.j[4] = point[2] * n[0] - point[0] * n[2];
     at.j[5] = point[0] * n[1] - point[1] * n[0];
     for (int i = 0; i < 3; i++) at.point[i] = point[i] + wire->radius * n[i];
+    at.xi = xi;
     return at;
+}
+
+/* Velocity of a point along a direction as a row against the seven rates. */
+static void set_row(const double point[3], const double d[3], double rotor, double out[RATES]) {
+    for (int i = 0; i < 3; i++) out[i] = d[i];
+    out[3] = point[1] * d[2] - point[2] * d[1];
+    out[4] = point[2] * d[0] - point[0] * d[2];
+    out[5] = point[0] * d[1] - point[1] * d[0];
+    out[6] = rotor * out[3];
 }
 
 /* Sliding velocities at a contact as rows against the seven rates: along the tube, and around it. */
 void sliding_rows(const Nearest *at, const double rotation[3][3], double rotor, double rows[2][RATES]) {
     const double *x = rotation[0], *n = at->normal, *point = at->point;
     const double around[3] = {x[1] * n[2] - x[2] * n[1], x[2] * n[0] - x[0] * n[2], x[0] * n[1] - x[1] * n[0]};
-    for (int row = 0; row < 2; row++) {
-        const double *d = row == 0 ? x : around;
-        double *out = rows[row];
-        for (int i = 0; i < 3; i++) out[i] = d[i];
-        out[3] = point[1] * d[2] - point[2] * d[1];
-        out[4] = point[2] * d[0] - point[0] * d[2];
-        out[5] = point[0] * d[1] - point[1] * d[0];
-        out[6] = rotor * out[3];
+    set_row(point, x, rotor, rows[0]);
+    set_row(point, around, rotor, rows[1]);
+}
+
+void forget_cavities(Slices *slices) {
+    for (int n = 0; n < MOST_SLICES; n++) slices->edges[n][0] = slices->edges[n][1] = NAN;
+}
+
+void clear_slices(Slices *s) {
+    for (int n = 0; n < MOST_SLICES / LANES; n++) s->lanes[n] = (SliceLanes){.gap = {0.0}};
+    for (int n = 0; n < MOST_SLICES; n++) {
+        s->length[n] = 0.0;
+        s->scale[n] = (FilmScale){0};
     }
+}
+
+/* Add c r r' to a matrix. */
+static void add_dyad(double c, const double r[RATES], double matrix[RATES][RATES]) {
+    for (int i = 0; i < RATES; i++)
+        for (int j = 0; j < RATES; j++) matrix[i][j] += c * r[i] * r[j];
+}
+
+/* A slice across the wire at xi, in a lane; its film spans `length`, m, along the wire.
+ *
+ * V is that of the gap, less the slope along the wire times the mean of both surfaces' velocities along it; u is that
+ * across the wire, as seen from the contact line, which the wire's axis takes along. */
+static void add_slice_of_wire(const Crest *c, double xi, double span, double reach, Slices *s, int n,
+                              double matrix[RATES][RATES]) {
+    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, xi);
+    const double b = c->wire->radius, *x = c->rotation[0];
+    const double distance = sqrt(p.square), gap = larger(c->radius - distance - b, LEAST_FILM * b);
+    if (gap >= reach) return;
+    Nearest at;
+    set_normal(&at, c->rotation, p.side / distance, p.up / distance);
+    const double *normal = at.normal;
+    double lean = 0.0, size = 0.0, t[3], surface[3], turn = 0.0;
+    for (int i = 0; i < 3; i++) lean += p.tangent[i] * normal[i];
+    for (int i = 0; i < 3; i++) size += squared(t[i] = p.tangent[i] - lean * normal[i]);
+    for (int i = 0; i < 3; i++) t[i] /= sqrt(size);
+    const double e[3] = {normal[1] * t[2] - normal[2] * t[1], normal[2] * t[0] - normal[0] * t[2],
+                         normal[0] * t[1] - normal[1] * t[0]};
+    for (int i = 0; i < 3; i++) {
+        surface[i] = p.point[i] + b * normal[i];
+        turn += e[i] * x[i];
+    }
+    const double around = 1.0 - turn * turn; /* squared share of `e` around the tube */
+    const double bend = 1.0 / (1.0 / b - around / c->radius), of_axis = 1.0 + around * b / (c->radius - b);
+    double v[RATES], u[RATES], axis[RATES], along[RATES], across[RATES];
+    set_row(p.point, normal, 1.0, v);
+    set_row(p.point, e, 1.0, axis);
+    set_row(surface, e, 1.0, across);
+    set_row(surface, t, 1.0, along);
+    SliceLanes *lanes = s->lanes + n / LANES;
+    for (int i = 0; i < RATES; i++) {
+        v[i] = -v[i] + 0.5 * along[i] * lean / sqrt(size); /* the gap falls along the wire where it leans to the wall */
+        u[i] = 0.5 * across[i] - of_axis * axis[i];
+        lanes->opening[i][n % LANES] = v[i];
+        lanes->entrainment[i][n % LANES] = u[i];
+    }
+    /* what the film has more than at its reach, where the table's resistance of the wire holds */
+    const double viscosity = c->viscosity * (1.0 - sqrt(gap / reach)), length = span * sqrt(size);
+    const double width = sqrt(2.0 * bend * gap), unit = PI * viscosity * length * width / gap;
+    lanes->gap[n % LANES] = gap;
+    s->length[n] = length;
+    s->scale[n] = film_scale(gap, bend, viscosity, c->bound);
+    add_dyad(3.0 * unit * bend / gap, v, matrix);
+    add_dyad(4.0 * unit, u, matrix);
+    add_dyad(unit, along, matrix);
+    add_dyad(unit, across, matrix);
+}
+
+bool add_crest_film(const Crest *c, const Nearest *nearest, Slices *slices, int first, double matrix[RATES][RATES]) {
+    const double reach = CREST_REACH * c->wire->radius, gap = larger(nearest->gap, LEAST_FILM * c->wire->radius);
+    if (gap >= reach) return false;
+    const double from = c->first->xi, to = c->last->xi;
+    const WirePoint p = wire_point(c->wire, c->at, c->y, c->rotation, nearest->xi);
+    /* The gap along the wire: a parabola, with a slope at an end of it. */
+    const double distance = sqrt(p.square), slope = fabs(p.first) / distance;
+    const double bend = larger(-p.second / distance, LEAST_FILM * reach / squared(to - from));
+    const double width = 1.0 / (1.0 / sqrt(2.0 * gap / bend) + slope / gap);
+    const double far = asinh(1.0 / (1.0 / sqrt(2.0 * (reach - gap) / bend) + slope / (reach - gap)) / width);
+    for (int n = 0; n < LANES; n++) {
+        const double at = far * ((2.0 * n + 1.0) / LANES - 1.0), span = width * cosh(at) * far * 2.0 / LANES;
+        const double xi = nearest->xi + width * sinh(at);
+        const double low = larger(xi - 0.5 * span, from), high = smaller(xi + 0.5 * span, to);
+        if (low < high) add_slice_of_wire(c, clamped(xi, from, to), high - low, reach, slices, first + n, matrix);
+    }
+    return true;
 }
 
 /* Write what is nearest; its gap. */
@@ -197,4 +288,26 @@ EXPORT double crest(const double *y, const double *rotation, double radius, cons
     const double (*axes)[3] = (const double (*)[3])rotation;
     const Station *about = (const Station *)stations;
     return told(wire_nearest((const Wire *)wire, about, (const State *)y, axes, radius, bracket), normal, point, j);
+}
+
+EXPORT double crest_film(const double *y, const double *rotation, double radius, const double *wire,
+                         const double *stations, const double *bracket, double viscosity, double bound,
+                         const double *rates, double *force, int64_t count) {
+    const double (*axes)[3] = (const double (*)[3])rotation;
+    const Station *first = (const Station *)stations;
+    const Crest crest
+        = {(const Wire *)wire, first, first, first + count - 1, (const State *)y, axes, radius, viscosity, bound};
+    const Nearest nearest = wire_nearest(crest.wire, first, crest.y, axes, radius, bracket);
+    double matrix[RATES][RATES] = {{0.0}};
+    Slices slices;
+    clear_slices(&slices);
+    forget_cavities(&slices);
+    add_crest_film(&crest, &nearest, &slices, 0, matrix);
+    set_lifts(&slices, bound, rates);
+    for (int i = 0; i < RATES; i++) {
+        force[i] = 0.0;
+        for (int j = 0; j < RATES; j++) force[i] -= matrix[i][j] * rates[j];
+        for (int n = 0; n < LANES; n++) force[i] += slice_force(&slices, n, i);
+    }
+    return nearest.gap;
 }

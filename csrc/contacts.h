@@ -29,6 +29,7 @@ typedef struct {
     double normal[3]; /* n in body axes, towards the wall */
     double point[3];  /* the touching point from the origin in body axes, m */
     double j[RATES];  /* the gap closes at j.q at the rates q */
+    double xi;        /* of a wire: of the point */
 } Nearest;
 
 /* A contact with dry friction: mu_c N_c, N, and the sliding velocities along the tube and around it per rate, J_c. */
@@ -84,6 +85,15 @@ Nearest site_nearest(const Site *site, const State *y, const double rotation[3][
 bool tail_reaches(const Wire *wire, const State *y, const double rotation[3][3], double radius, double height);
 Nearest wire_nearest(const Wire *wire, const Station *stations, const State *y, const double rotation[3][3],
                      double radius, const double bracket[3]);
+/* A crest of the wire, found near the station `at` among those of its wire; the tube, and the liquid in it. */
+typedef struct {
+    const Wire *wire;
+    const Station *at, *first, *last;
+    const State *y;
+    const double (*rotation)[3];
+    double radius, viscosity, bound;
+} Crest;
+
 void sliding_rows(const Nearest *at, const double rotation[3][3], double rotor, double rows[2][RATES]);
 
 typedef struct {
@@ -106,17 +116,21 @@ typedef struct {
     Lift lift[MOST_SLICES];       /* at the rates that were last tried */
 } Slices;
 
+enum { BODY_FILM, CREST_FILMS, FILMS };
+
+static const double CREST_REACH = 0.75; /* of the wire's radius: thinnest film that a table's resistance has under it */
+
 /* Forces that balance: A q + sum of dry friction - lift of cavitation = f; see dry_friction.c. */
 typedef struct {
     double a[RATES][RATES], force[RATES];
     Contact contacts[MOST_CONTACTS];
     int64_t count;
-    Slices *slices;  /* of a film that may cavitate, or NULL */
-    double bound;    /* their pressure is not below -p_c, Pa */
-    double slow;     /* v_r, below which dry friction is smooth, m/s */
-    int along;       /* the rate along which a torque keeps a prescribed spin */
-    bool prescribed; /* whether the spin q_3 + q_6 is */
-    bool once;       /* whether one step of Newton's method is enough: the first guess is close */
+    Slices *slices[FILMS]; /* of films that may cavitate, or NULL */
+    double bound;          /* their pressure is not below -p_c, Pa */
+    double slow;           /* v_r, below which dry friction is smooth, m/s */
+    int along;             /* the rate along which a torque keeps a prescribed spin */
+    bool prescribed;       /* whether the spin q_3 + q_6 is */
+    bool once;             /* whether one step of Newton's method is enough: the first guess is close */
 } Balance;
 
 /* a and b of the slices' pressure in lanes from `first`; see cavitation.c. */
@@ -130,6 +144,13 @@ static inline double slice_force(const Slices *slices, int n, int i) {
     return slices->length[n] * (lift->normal * lanes->opening[i][l] + lift->along * lanes->entrainment[i][l]);
 }
 
+void forget_cavities(Slices *slices);
+/* Set the lifts of slices at rates. */
+void set_lifts(Slices *slices, double bound, const double q[RATES]);
+/* Take all slices away, but for the edges of cavities, which are guesses. */
+void clear_slices(Slices *slices);
+/* Whether the film of a crest is thin; then it is added: its slices, in lanes from `first`, and its linear resistance. */
+bool add_crest_film(const Crest *crest, const Nearest *nearest, Slices *slices, int first, double matrix[RATES][RATES]);
 Sliding sliding_at(const Contact *contact, const double q[RATES], double slow);
 double balance_rates(Balance *balance, double q[RATES], double left[RATES]);
 

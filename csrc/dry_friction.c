@@ -39,8 +39,7 @@ void set_pressures(const Slices *slices, int first, const double q[RATES], doubl
     }
 }
 
-/* Set the lifts of slices at rates. */
-static void set_lifts(Slices *slices, double bound, const double q[RATES]) {
+void set_lifts(Slices *slices, double bound, const double q[RATES]) {
     for (int first = 0; first < MOST_SLICES; first += LANES) {
         double a[LANES], b[LANES];
         set_pressures(slices, first, q, a, b);
@@ -70,10 +69,11 @@ static double residual(Balance *b, const double q[RATES], double left[RATES]) {
         const Sliding s = sliding_at(c, q, b->slow);
         for (int i = 0; i < RATES; i++) left[i] += s.drag * (c->rows[0][i] * s.u + c->rows[1][i] * s.v);
     }
-    if (b->slices) {
-        set_lifts(b->slices, b->bound, q);
-        for (int n = 0; n < MOST_SLICES; n++)
-            for (int i = 0; i < RATES && b->slices->lift[n].normal != 0.0; i++) left[i] -= slice_force(b->slices, n, i);
+    for (int k = 0; k < FILMS; k++) {
+        Slices *film = b->slices[k];
+        if (film) set_lifts(film, b->bound, q);
+        for (int n = 0; film && n < MOST_SLICES; n++)
+            for (int i = 0; i < RATES && film->lift[n].normal != 0.0; i++) left[i] -= slice_force(film, n, i);
     }
     double size = 0.0;
     for (int i = 0; i < RATES; i++)
@@ -127,8 +127,9 @@ static void set_tangent(const Balance *b, const Duals duals, const double q[RATE
             for (int j = 0; j < RATES; j++) h[i][j] += x * c->rows[0][j] + z * c->rows[1][j];
         }
     }
-    for (int n = 0; b->slices && n < MOST_SLICES; n++)
-        if (b->slices->lift[n].normal != 0.0) add_slice(b->slices, n, h);
+    for (int k = 0; k < FILMS; k++)
+        for (int n = 0; b->slices[k] && n < MOST_SLICES; n++)
+            if (b->slices[k]->lift[n].normal != 0.0) add_slice(b->slices[k], n, h);
 }
 
 /* Largest share of a step from w that stays in the unit circle. */
@@ -235,8 +236,8 @@ double balance_rates(Balance *b, double q[RATES], double left[RATES]) {
         for (int i = 0; i < RATES; i++) q[i] += step[i];
         if (b->prescribed)
             size = residual(b, q, left); /* for the torque */
-        else if (b->slices)
-            follow_lifts(b->slices, step);
+        for (int k = 0; k < FILMS && !b->prescribed; k++)
+            if (b->slices[k]) follow_lifts(b->slices[k], step);
         return size / scale;
     }
     for (int round = 0; round < ROUNDS && !(size <= BALANCED * scale); round++) {

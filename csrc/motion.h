@@ -43,6 +43,7 @@ typedef struct {
     TablePlace table, near_table;
     TableSlopes slopes;
     SlicedFilm sliced, near_sliced;
+    Slices crests; /* of the films under crests that were looked for last */
     bool has_slopes;
 } PlaceMemory;
 

@@ -133,9 +133,8 @@ static void add_share(const Profiles *p, int64_t edge, const double middle[COLOU
 
 EXPORT void seal_shares(const double *colours, const double *offsets, const int64_t (*sides)[3],
                         const double (*palette)[COLOURS], const double (*ground)[COLOURS][COLOURS], double beside,
-                        double distinct, double white,
-                        int64_t fewest, int64_t pooled, double *work, double *share, double *distance, int64_t *kind,
-                        int64_t edges, int64_t samples, int64_t count, int64_t kinds) {
+                        double distinct, double white, int64_t fewest, int64_t pooled, double *work, double *share,
+                        double *distance, int64_t *kind, int64_t edges, int64_t samples, int64_t count, int64_t kinds) {
     const Profiles p = {colours, offsets, edges, samples, beside};
     double *middle = work + COLOURS * edges, inverse[COLOURS][COLOURS];
     for (int64_t i = 0; i < edges; i++) {

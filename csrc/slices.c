@@ -219,10 +219,6 @@ static bool cavitates_at(const FilmPlace *p, SlicedFilm *sliced, double bound, c
     return false;
 }
 
-void forget_cavities(SlicedFilm *sliced) {
-    for (int n = 0; n < MOST_SLICES; n++) sliced->slices.edges[n][0] = sliced->slices.edges[n][1] = NAN;
-}
-
 void begin_slices(SlicedFilm *sliced, const SlicedFilm *last) {
     for (int n = 0; n < MOST_SLICES; n++)
         for (int k = 0; k < 2; k++) sliced->slices.edges[n][k] = last->slices.edges[n][k];
@@ -230,17 +226,17 @@ void begin_slices(SlicedFilm *sliced, const SlicedFilm *last) {
 }
 
 double balance_film(const FilmPlace *p, SlicedFilm *sliced, Balance *b, double q[RATES], double left[RATES]) {
-    b->slices = NULL;
+    b->slices[BODY_FILM] = NULL;
     if (!sliced->has_ends && !set_ends(p, b->bound, &sliced->ends)) return balance_rates(b, q, left);
     sliced->has_ends = true;
     if (!may_cavitate(p, &sliced->ends, b->bound, q) || !cavitates_at(p, sliced, b->bound, q)) {
         const double size = balance_rates(b, q, left);
         if (!may_cavitate(p, &sliced->ends, b->bound, q) || !cavitates_at(p, sliced, b->bound, q)) return size;
     }
-    b->slices = &sliced->slices;
+    b->slices[BODY_FILM] = &sliced->slices;
     if (!sliced->is_scaled) {
-        sliced->viscosity = scaled_viscosity(p, b->slices);
-        set_scales(p, sliced->viscosity, b->bound, b->slices);
+        sliced->viscosity = scaled_viscosity(p, &sliced->slices);
+        set_scales(p, sliced->viscosity, b->bound, &sliced->slices);
         sliced->is_scaled = true;
     }
     return balance_rates(b, q, left);

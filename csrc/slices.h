@@ -22,7 +22,6 @@ typedef struct {
     double thinnest, viscosity;
 } FilmPlace;
 
-void forget_cavities(SlicedFilm *sliced);
 /* Begin at another place, with the edges of cavities as guesses. */
 void begin_slices(SlicedFilm *sliced, const SlicedFilm *last);
 /* Rates in balance; what is left of it. Where no slice cavitates at those without slices, they are the rates. */

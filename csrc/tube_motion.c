@@ -4,7 +4,7 @@
  *
  *     (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n + L(q),
  *
- * where L is the lift of a film that cavitates, over the rates; see slices.c and cavitation.c.
+ * where L is the lift of films that cavitate, over the rates; see slices.c, contacts.c and cavitation.c.
  * M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint;
  * N_c the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of
  * dry friction, made smooth below the sliding speed v_r. See contacts.c and dry_friction.c.
@@ -22,7 +22,8 @@ TubeRobot tube_robot_opened(const double *packed, int64_t size, const double *ta
     const Station *stations = (const Station *)(sites + (int64_t)tube->sites);
     const double *flow = (const double *)(stations + (int64_t)tube->stations);
     memory->place[0] = NAN;
-    forget_cavities(&memory->sliced);
+    forget_cavities(&memory->sliced.slices);
+    forget_cavities(&memory->crests);
     return (TubeRobot){
         .links = (const Links *)packed,
         .tube = tube,
@@ -77,6 +78,7 @@ static double imposed_flow(const TubeRobot *robot, double time) {
 typedef struct {
     double matrix[RATES][RATES]; /* against q, SI */
     double film[6][6];           /* of it, the film's, against U and Omega_b */
+    double crests[RATES][RATES]; /* of it, that of the films under the wire's crests */
     double stream[RATES];        /* force of an imposed flow */
     double opened[RATES];        /* mean flow of open ends per q */
 } Fluid;
@@ -126,7 +128,10 @@ static void set_fluid(const TubeRobot *robot, const Place *place, double phase, 
     for (int i = 0; i < RATES; i++) {
         fluid->opened[i] = opened * m[i][7];
         fluid->stream[i] = tube->viscosity * m[i][7] * seen->mean_flow;
-        for (int j = 0; j < RATES; j++) fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
+        for (int j = 0; j < RATES; j++) {
+            fluid->matrix[i][j] = tube->viscosity * (m[i][j] - opened * m[i][7] * m[j][7]);
+            fluid->crests[i][j] = 0.0;
+        }
     }
 }
 
@@ -138,6 +143,8 @@ typedef struct {
     Balance *balance; /* forces and contacts that are added to */
     Seen *seen;
     SlicedFilm *sliced;
+    double (*resistance)[RATES]; /* of the films under crests, added to, or NULL */
+    int crest_count;
     double *gaps; /* of the sites, and last of the wire (infinite far from the wall), or NULL, m */
 } Touch;
 
@@ -165,17 +172,42 @@ static double station_square(const Touch *t, const Station *station, double c, d
     return d[0] * d[0] + d[1] * d[1];
 }
 
+/* Add the film under a crest of a helix of one size that was found near a station: the curvature of other wires, cubics
+ * between stations, has jumps, and so would the film. */
+static void add_crest(Touch *t, const Nearest *nearest, const Station *first, const Station *at, const Station *end) {
+    const TubeRobot *robot = t->robot;
+    if (!t->resistance || robot->wire->hand_k == 0.0 || t->crest_count * LANES >= MOST_SLICES) return;
+    const Station *last = at;
+    while (last < end && last[1].turn == at->turn) last++;
+    const Crest crest = {robot->wire,
+                         at,
+                         first,
+                         last,
+                         t->y,
+                         t->rotation,
+                         robot->tube->radius,
+                         robot->tube->viscosity,
+                         robot->tube->cavitation};
+    Slices *slices = &robot->memory->crests;
+    if (t->crest_count == 0) clear_slices(slices);
+    t->crest_count += add_crest_film(&crest, nearest, slices, t->crest_count * LANES, t->resistance);
+}
+
 /* Look for contacts of the wires, one after the other, where their stations are farthest from the axis. */
 static void touch_wire(Touch *t) {
     const TubeRobot *robot = t->robot;
     const Tube *tube = robot->tube;
     const int64_t last = robot->station_count - 1;
-    if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, tube->roughness)) return;
+    const double reach = robot->wire->hand_k == 0.0 ? 0.0 : CREST_REACH * robot->wire->radius;
+    const double height = larger(tube->roughness, reach);
+    if (last < 0 || !tail_reaches(robot->wire, t->y, t->rotation, tube->radius, height)) return;
     const double c = cos(t->y->phase), s = sin(t->y->phase);
     double before = 0.0, here = station_square(t, robot->stations, c, s);
     bool first = true;
+    const Station *root = robot->stations;
     for (int64_t k = 0; k <= last; k++) {
         const Station *at = robot->stations + k;
+        if (first) root = at;
         const double next = k < last ? station_square(t, at + 1, c, s) : 0.0;
         const bool tip = k == last || at[1].turn != at->turn;
         if (here >= before && here > (tip ? 0.0 : next) && t->balance->count < MOST_CONTACTS) {
@@ -184,6 +216,7 @@ static void touch_wire(Touch *t) {
             const Nearest nearest = wire_nearest(robot->wire, about, t->y, t->rotation, tube->radius, bracket);
             t->seen->tail_gap = smaller(t->seen->tail_gap, nearest.gap);
             add_contact(t, &nearest, 1.0);
+            add_crest(t, &nearest, root, at, robot->stations + last);
         }
         first = tip;
         before = tip ? 0.0 : here;
@@ -284,7 +317,10 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
         outer[i] = fluid->stream[i];
         contact[i] = asperities[i];
         for (int j = 0; j < 6; j++) film[i] -= mu * fluid->film[i][j] * q[j];
-        for (int j = 0; j < RATES; j++) outer[i] -= fluid->matrix[i][j] * q[j];
+        for (int j = 0; j < RATES; j++) {
+            film[i] -= fluid->crests[i][j] * q[j];
+            outer[i] -= fluid->matrix[i][j] * q[j];
+        }
         outer[i] -= film[i];
     }
     for (int64_t n = 0; n < b->count; n++) {
@@ -292,11 +328,14 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
         for (int i = 0; i < 3; i++)
             contact[i] -= s.drag * (b->contacts[n].rows[0][i] * s.u + b->contacts[n].rows[1][i] * s.v);
     }
-    for (int n = 0; b->slices && n < MOST_SLICES; n++) {
-        for (int i = 0; i < RATES && b->slices->lift[n].normal != 0.0; i++) {
-            const double force = slice_force(b->slices, n, i);
-            if (i < 3) lift[i] += force;
-            seen->dissipated_power -= force * q[i];
+    for (int k = 0; k < FILMS; k++) {
+        const Slices *slices = b->slices[k];
+        for (int n = 0; slices && n < MOST_SLICES; n++) {
+            for (int i = 0; i < RATES && slices->lift[n].normal != 0.0; i++) {
+                const double force = slice_force(slices, n, i);
+                if (i < 3) lift[i] += force;
+                seen->dissipated_power -= force * q[i];
+            }
         }
     }
     seen->weight_load = towards_wall(weight, rotation, seen->azimuth);
@@ -309,8 +348,8 @@ static void note_loads(const Balance *b, double mu, const Fluid *fluid, const do
 void tube_robot_rates(const TubeRobot *robot, const State *y, double time, bool nearby, Seen *seen, State *dy) {
     const Links *links = robot->links;
     Balance balance = {.count = 0, .slow = robot->tube->sliding, .bound = robot->tube->cavitation, .once = nearby};
-    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen};
     Fluid fluid;
+    Touch t = {.robot = robot, .y = y, .balance = &balance, .seen = seen, .resistance = fluid.crests};
     double field[RATES], weight[RATES], asperities[RATES];
     axes_of(y, t.rotation);
     note_place(y, t.rotation, robot->tube->radius, seen);
@@ -320,7 +359,11 @@ void tube_robot_rates(const TubeRobot *robot, const State *y, double time, bool 
     weight_loads(&links->weight, y->phase, t.rotation, weight);
     for (int i = 0; i < RATES; i++) balance.force[i] = 0.0;
     touch(&t);
-    for (int i = 0; i < RATES; i++) asperities[i] = balance.force[i];
+    for (int i = 0; i < RATES; i++) {
+        asperities[i] = balance.force[i];
+        for (int j = 0; j < RATES; j++) fluid.matrix[i][j] += fluid.crests[i][j];
+    }
+    if (t.crest_count > 0 && isfinite(balance.bound)) balance.slices[CREST_FILMS] = &robot->memory->crests;
     field_loads(&links->drive, time, t.rotation, field);
     assemble(fluid.matrix, links, balance.a);
     for (int i = 0; i < RATES; i++) balance.force[i] += weight[i] + field[i] + fluid.stream[i];

@@ -30,6 +30,10 @@ REFERENCES: dict[str, str] = {
         "D. J. Jeffrey and Y. Onishi. The slow motion of a cylinder next to a plane wall. "
         "Quarterly Journal of Mechanics and Applied Mathematics 34:129-137, 1981."
     ),
+    "ashmore2005": (
+        "J. Ashmore, C. del Pino and T. Mullin. Cavitation in a lubrication flow between a moving sphere and a "
+        "boundary. Physical Review Letters 94:124501, 2005."
+    ),
     "brun2001": (
         "R. Brun, P. Reichert and H. R. Kunsch. Practical identifiability analysis of large environmental simulation "
         "models. Water Resources Research 37:1015-1030, 2001."

@@ -173,6 +173,17 @@ def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: flo
     assert response_errors(found, high, over_a_turn(table, pose))[0] < allowed[0]
 
 
+@pytest.mark.slow
+def test_a_film_with_an_extrapolated_rest_agrees_with_the_flow_solved_for() -> None:
+    """At 0.1 mm, below the first nodes; coarser modes or fewer nodes to average waves miss a tenth of it and more."""
+    table, places = shipped("biorob2012-wide")
+    pose = TubePose.at_gap(places.geometry.body, places.radius, 1e-4)
+    found, _ = table.at(pose.offset, 0.0, 0.0, 0.3)
+    true = matrix_of(solved(places.geometry, pose, Fineness("standard", 1e-3, 6), 0.3))
+    size = np.sqrt(np.diag(found))
+    np.testing.assert_allclose(true / np.outer(size, size), found / np.outer(size, size), atol=0.015)
+
+
 @pytest.mark.parametrize("wire", ["standard", pytest.param("high", marks=pytest.mark.slow)])
 def test_a_yawed_place_agrees_with_the_flow_solved_for(wire: Accuracy) -> None:
     """To the right, where the nodes are those of the mirror image; far from the glass, where few modes do."""

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_banded
+from scipy.optimize import brentq
 
 from spirillum.kernels.tube_table import lift_of_cavitation
 
@@ -117,6 +118,27 @@ def test_entrainment_without_tension_bears_martins_load() -> None:
     """H. M. Martin, Engineering 102:119, 1916, and L. Guembel: 4.9 eta u R'/h0."""
     gap, u = 1e-6, 1e-3
     assert lift(gap, 0.0, u, 1e-4)[0] == pytest.approx(4.896 * ETA * u * BEND / gap, rel=1e-3)
+
+
+@pytest.mark.parametrize("bound", [np.inf, 1e5, 1e4])
+def test_a_heavy_cylinder_in_a_turning_drum_is_borne_and_turned_by_its_cavity(bound: float) -> None:
+    """At a fixed place, free of torque: the signs of J. Ashmore, C. del Pino, T. Mullin, PRL 94:124501, 2005."""
+    gap, drum = 1e-6, 2e-3
+    shear = np.pi * ETA * np.sqrt(2.0 * BEND * gap) / gap
+
+    def torque(surface: float) -> float:
+        u = 0.5 * (drum + surface)
+        pressed = float(linear(gap, 0.0, u)[1] + lift(gap, 0.0, u, bound)[1])
+        return (0.5 * pressed - shear * (surface - drum)) / (shear * drum)
+
+    surface = brentq(torque, -drum, drum)
+    load = lift(gap, 0.0, 0.5 * (drum + surface), bound)[0]
+    if np.isfinite(bound):
+        assert 0.0 < surface < drum
+        assert load > 0.0
+    else:  # pressure and shear of the linear film hold it at rest, and it bears nothing
+        assert abs(surface) < 1e-9 * drum
+        assert load == 0.0
 
 
 def test_the_pull_is_bounded_by_that_of_a_cavity() -> None:

@@ -74,6 +74,35 @@ def crest(
     """
 
 
+@native("force")
+def crest_film(
+    y: Float64[Array, "19"],
+    rotation: Float64[Array, "3 3"],
+    radius: float,
+    wire: Float64[Array, "6"],
+    stations: Float64[Array, "count 8"],
+    bracket: Float64[Array, "3"],
+    viscosity: float,
+    bound: float,
+    rates: Float64[Array, "7"],
+    force: Float64[Array, "7"],
+) -> float:
+    """Return the gap as `crest` does, and write the forces of the lubrication film there.
+
+    Args:
+        y: state, as of `ring_gap`.
+        rotation: likewise.
+        radius: likewise.
+        wire: columns of the wire.
+        stations: all those of one wire.
+        bracket: as of `crest`.
+        viscosity: Pa s.
+        bound: p_c, Pa.
+        rates: q.
+        force: result against the rates, N and N m.
+    """
+
+
 @native("q", "left")
 def balanced(
     a: Float64[Array, "7 7"],

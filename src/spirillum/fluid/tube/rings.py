@@ -101,8 +101,24 @@ def projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Sample
     return (cos, cos, -sin) if parity == 0 else (-sin, -sin, -cos)
 
 
-def finer(panels: Panels, times: int) -> tuple[Samples, Samples, Samples]:
-    """Positions x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q)."""
+def finer(panels: Panels, distances: Samples, cut: float, least: int) -> tuple[Samples, Samples, Samples]:
+    """Positions x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q).
+
+    A wave is damped by exp(-cut) at k (d + d_min) = cut: up to there its Legendre coefficients are averaged to 1e-5.
+    With fewer nodes the resistance to pitching is 11 % low at 0.1 mm: thin films amplify what is missed.
+
+    Args:
+        panels: panels.
+        distances: of each from the wall, (panels,), m.
+        cut: see `WallWaves.cut`.
+        least: nodes over those of a panel, at least.
+    """
+    u = panels.rule[0]  # Gauss nodes resolve waves that shorten towards the ends of a panel, as they crowd there
+    dense = np.sqrt(1.0 - (0.5 * (u[1:] + u[:-1])) ** 2) / np.diff(u)
+    speeds = np.max(dense * np.hypot(np.diff(panels.x, axis=1), np.diff(panels.rho, axis=1)), axis=1)
+    reach = cut * float(np.max(speeds / (distances + distances.min())))
+    count = 0.5 * (panels.order + reach + 6.9 * np.cbrt(0.5 * reach))
+    times = max(least, int(np.ceil(count / panels.order)))
     places, gauss = np.polynomial.legendre.leggauss(times * panels.order)
     cardinal = panels.cardinals(places)
     x, rho = panels.x @ cardinal.T, panels.rho @ cardinal.T
@@ -111,7 +127,7 @@ def finer(panels: Panels, times: int) -> tuple[Samples, Samples, Samples]:
 
 
 _FINER = 4
-"""Nodes that average waves over a panel, over its own."""
+"""Nodes that average waves over a panel, over its own, at least."""
 
 
 class LevelRings(Rings):
@@ -241,7 +257,10 @@ class LevelRings(Rings):
         thinner than nodes are apart: tractions enter by averages over the panels, with what each node contributes.
         """
         panels = self.panels
-        x, rho, average = finer(panels, _FINER) if averaged else (panels.x, panels.rho, None)
+        x, rho, average = panels.x, panels.rho, None
+        if averaged:
+            distances = waves.radius - self.offset - panels.rho.max(axis=1)
+            x, rho, average = finer(panels, distances, waves.cut, _FINER)
         found: list[Samples] = [np.empty((3 * panels.size, waves.k.size, 2, 3)) for _ in range(self.modes)]
 
         def fill(number: int) -> None:

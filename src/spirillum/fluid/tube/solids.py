@@ -24,7 +24,7 @@ from spirillum.fluid.tube.wall import CROWD, SLACK, WallWaves, each, waves_betwe
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.sources import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
-from spirillum.robot.outline import Outline
+from spirillum.robot.outline import Outline, Segment
 from spirillum.robot.tube_pose import TubePose
 
 MOTIONS = 13
@@ -43,6 +43,8 @@ class Fineness:
     """Gauss nodes of a panel."""
     panel: float = 2.5
     """Longest panels over the length on which the film's traction varies."""
+    growth: float = 0.0
+    """How much longer panels of a level solid's straight side may be, over their distance from its ends."""
     wires: float = 1e-3
     """Coarsest tolerance of waves to and from wires."""
     slack: float = SLACK
@@ -324,7 +326,12 @@ def _longest(
             if other != solid:
                 found = np.minimum(found, 2.0 * outline.distance(x, rho))
         film = np.maximum(pose.distances(x, rho), 0.0)
-        found = np.minimum(found, fineness.panel * np.sqrt(2.0 * film * np.maximum(rho, film)))
+        varies = fineness.panel * np.sqrt(2.0 * film * np.maximum(rho, film))
+        if pose.level and fineness.growth:
+            sides = [p for p in solids[solid][0].pieces if isinstance(p, Segment) and p.start[1] == p.end[1]]
+            apart = [np.minimum(x - min(p.start[0], p.end[0]), max(p.start[0], p.end[0]) - x) for p in sides]
+            varies += fineness.growth * np.max(apart, axis=0, initial=0.0)
+        found = np.minimum(found, varies)
         if len(lines):
             near = np.min(np.hypot(x[:, None] - lines[:, 0], rho[:, None] - lines[:, 1]), axis=1)
             found = np.minimum(found, 4.0 * np.hypot(near, lines[:, 2].min()))

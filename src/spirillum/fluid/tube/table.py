@@ -41,7 +41,7 @@ _MOST_STEPS = 2.0**31 - 1.0
 """Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
 _FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
 """Single bytes, regrouped by their position in a word: those of a plane follow each other."""
-BELOW = "a film with an extrapolated rest, within 1.1 % of exact flow around long cylinders down to asperities"
+BELOW = "a film with an extrapolated rest, within 2.1 % of direct solutions to 0.05 mm and of exact films below"
 """What a table is at gaps below those of its check poses, in words."""
 _LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
 
