@@ -32,9 +32,9 @@ EXPORT double asperity_energy(double gap, double height, double load) {
     return load * (height * height / h - h - 2.0 * height * log(height / h));
 }
 
-/* Direction (y, z) across the tube in body axes. */
 static const double LEAST_FILM = 1e-5; /* of the wire's radius: where a trial is inside the wall */
 
+/* Direction (y, z) across the tube in body axes. */
 static void set_normal(Nearest *at, const double rotation[3][3], double y, double z) {
     for (int i = 0; i < 3; i++) at->j[i] = at->normal[i] = rotation[1][i] * y + rotation[2][i] * z;
 }

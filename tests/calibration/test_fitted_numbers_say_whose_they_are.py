@@ -146,7 +146,7 @@ def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibratio
 def test_a_negative_friction_is_zero_and_said(calibration: Path) -> None:
     calibration.write_text(calibration.read_text().replace("8e-06", "0.0"))
     found = sp.predict(WIDE, model="rft", calibration=calibration)
-    assert any("is negative: zero is used" in words for words in found.warnings)
+    assert any("is negative; zero is used" in words for words in found.warnings)
     assert not any("unset" in words for words in found.warnings)
 
 

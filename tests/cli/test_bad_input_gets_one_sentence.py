@@ -86,7 +86,7 @@ WIDE = "biorob2012-wide"
             "panels = 'all' without a plot, whose look it is; allowed: with --plot",
         ),
         (["simulate", WIDE, "--plot", "run.png", "--panels", "x"], "panels = 'x'; allowed: main, all"),
-        (["calibrate", "a.csv", "b.csv", WIDE], "b.csv is a second observations file; allowed: one, as `spirillum"),
+        (["calibrate", "a.csv", "b.csv", WIDE], "b.csv is a second observations file; allowed: one, which `spirillum"),
         (["export", "run.nc", "x.stl"], "run.nc is a run, which has no shape to write as .stl; allowed: .mcap"),
         (["control", WIDE, "--task", "hold-speed", "--speed", "1m/s"], "allowed: below 0.5349 mm/s, the robot's speed"),
         (["simulate", WIDE, "-o", "run.nc", "--model", "sbt"], "motion = 'free' with model 'sbt'"),

@@ -52,7 +52,7 @@ def test_glare_under_which_an_end_passes_is_told_with_its_place(
     assert found.drift > 0.0
     assert flag.name == "standing-glare"
     assert flag.spoils == ()
-    assert f"column {column:.0f} and row {row:.0f} " in flag.sentence
+    assert f"at column {column:.0f}, row {row:.0f} " in flag.sentence
 
 
 @pytest.mark.parametrize(
@@ -92,5 +92,5 @@ def test_a_lamp_mirrored_in_the_surface_is_told_by_its_edge(
     found = standing_glare(images, [BodyPose(float(place), 0.0, 0.0) for place in x], body)
     assert [flag.name for flag in found.flags] == (["standing-glare"] if named else [])
     if named:
-        column = int(found.flags[0].sentence.partition("about column ")[2].split(" ")[0])
+        column = int(found.flags[0].sentence.partition("at column ")[2].split(",")[0])
         assert column == pytest.approx(edge, abs=4)  # a step over four pixels

@@ -41,7 +41,7 @@ _MOST_STEPS = 2.0**31 - 1.0
 """Bound of film coefficients: larger ones belong to angles at which no robot fits into its tube."""
 _FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
 """Single bytes, regrouped by their position in a word: those of a plane follow each other."""
-BELOW = "a film with an extrapolated rest, within 2.1 % of direct solutions to 0.05 mm and of exact films below"
+BELOW = "a film with an extrapolated rest (level robots of the paper: 2.1 % off direct solutions down to 0.05 mm)"
 """What a table is at gaps below those of its check poses, in words."""
 _LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
 
@@ -209,8 +209,8 @@ class TubeTable:
     def error_against(self) -> str:
         """Reference of the stated error of the forward velocity, in words."""
         return (
-            f"solutions with finer wires: the largest error of {STAGES[self.stage].held_out} places between the nodes "
-            "of its table, and that of the wire and the solids"
+            "solutions with finer wires: the largest error at check poses between the nodes of its table, and that of "
+            "the wire and the solids"
         )
 
     @property

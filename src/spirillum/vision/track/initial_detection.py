@@ -253,9 +253,11 @@ def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _
         size *= off
         if not abs(np.log(size)) < SEAL.largest_difference:
             return None
-        if abs(off - 1.0) < (SEAL.size_tolerance if stated else SEAL.size_error):
+        if stated and abs(off - 1.0) < SEAL.size_tolerance:
             break
         finder = resized(finder, off)
+        if not stated and abs(off - 1.0) < SEAL.size_error:
+            break
         search = SealSearch(body.robot, finder.optics, body.bounds)
         guesses = [next((one.pose for one in search.places(frame.image)), None) for frame in frames]
     rivals = _rivals_of_seal([frames[k] for k in seen], [found[k] for k in seen])
