@@ -126,7 +126,7 @@ FINE = Stage(
     upper=(0.55, 0.78, 1.0),
     phases=((0.0, 9), (1.0, 5)),
     resolutions=_FINEST | {("far", "pitched"): _FINE_FAR, ("far", "yawed"): _FINE_FAR},
-    seconds=(6.0, 14.0),
+    seconds=(5.0, 12.0),
     held_out=4,
     checks=_FINEST | {("near", tilt): replace(_FINEST["near", tilt], order=8) for tilt in ("pitched", "yawed")},
     hardest=((0.82, 0.2), (0.97, -0.9)),
