@@ -170,7 +170,8 @@ def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: flo
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
     standard, high = (matrix_of(solved(g, pose, Fineness(wire, 0.005), phase)) for wire in WIRES)
     assert np.all((response_errors(found, standard, over_a_turn(table, pose)) < allowed)[1:])
-    assert response_errors(found, high, over_a_turn(table, pose))[0] < allowed[0]
+    # against the finest wire the stated error is that of the interpolation, the wire and the solids together
+    assert response_errors(found, high, over_a_turn(table, pose))[0] < 1.5 * table.speed_error_at(pose.yaw)
 
 
 @pytest.mark.slow
