@@ -70,9 +70,15 @@ def clipped(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
+_SYNONYMS = {"weight": "mass", "radius": "diameter"}
+"""What users call a field, and its name."""
+
+
 def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:
     """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
-    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=likeness)
+    called, names = str(name).lower(), list(allowed)
+    meant = _SYNONYMS.get(called)
+    near = [meant] if meant in names else get_close_matches(called, names, n=1, cutoff=likeness)
     return f" (did you mean {near[0]}?)" if near else ""
 
 
