@@ -148,8 +148,8 @@ static void close_step(const Block *b, int64_t k, const AxialRobot *p, AxialStat
                        double rest) {
     const double i = b->current[k], charge = b->charge[k] + i * rest, squares = b->squares[k] + i * i * rest;
     const double loss = b->heat[k] + resistance(b, k, i) * i * i * rest; /* all resistance times I^2, over L */
-    const double impulse = p->motor.torque_constant * charge,
-                 emf = p->motor.back_emf * (p->tail - p->body) * p->motor.torque_constant;
+    const double impulse = p->motor.torque_constant * charge;
+    const double emf = p->motor.back_emf * (p->tail - p->body) * p->motor.torque_constant;
     state->current = i;
     state->position += p->speed * impulse + p->speed_flow * carried;
     state->tail_angle += p->tail * impulse + p->tail_flow * carried;

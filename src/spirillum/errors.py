@@ -71,7 +71,7 @@ def clipped(value: object, longest: int = 60) -> str:
 
 
 _SYNONYMS = {"weight": "mass", "radius": "diameter"}
-"""What users call a field, and its name."""
+"""Names of fields by other words for them."""
 
 
 def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:

@@ -94,6 +94,29 @@ def test_straight_stage_is_near_the_finest_without_yaw(solved_by: TubeTable) -> 
     assert "check poses between the nodes" in table.error_against
 
 
+@pytest.mark.parametrize("stage", [STRAIGHT, YAW])
+def test_nodes_that_are_not_positive_definite_are_solved_for_more_finely(
+    solved_by: TubeTable, stage: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right, asked = building.solutions, []
+
+    def solutions(nodes: Sequence[NodeSolution], *arguments: Any) -> list[list[np.ndarray]]:
+        asked.append(list(nodes))
+        found = right(nodes, *arguments)
+        if len(asked) == 1:
+            found[-1][-1] = found[-1][-1] - 2.0 * found[-1][-1].trace(axis1=1, axis2=2)[:, None, None] * np.eye(8)
+        return found
+
+    expected = made(solved_by, stage)
+    monkeypatch.setattr(building, "solutions", solutions)
+    (table,) = building.built_tables([(solved_by.geometry, solved_by.radius)], stage=stage)
+    np.testing.assert_array_equal(table.packed, expected.packed)
+    ((again,),) = asked[1:]
+    assert again.pose == asked[0][-1].pose
+    assert again.fineness.tolerance <= asked[0][-1].fineness.tolerance
+    assert again.fineness != asked[0][-1].fineness
+
+
 def test_straight_stage_answers_no_yawed_pose(solved_by: TubeTable) -> None:
     table = made(solved_by, STRAIGHT)
     offset = 0.6 * (table.radius - 0.5 * table.geometry.body_diameter)

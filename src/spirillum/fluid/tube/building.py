@@ -139,11 +139,11 @@ def built_tables(
     films = _start_films(requests, workers)
     try:
         found = iter(solutions(wanted, "table of the tube", progress, workers))
+        films.join()
+        solved = [_definite(one, [next(found) for _ in one.poses], progress, workers) for one in requests]
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt(kept_after(*_solved_before(wanted))) from error
-    films.join()
-    solved = [[next(found) for _ in request.poses] for request in requests]
-    tables = [_table(one, _definite(one, some, workers)) for one, some in zip(requests, solved, strict=True)]
+    tables = [_table(one, some) for one, some in zip(requests, solved, strict=True)]
     seconds = (time.perf_counter() - start) / len(tables)
     return [replace(table, seconds=seconds) for table in tables]
 
@@ -200,19 +200,22 @@ def _table(request: _Request, found: Sequence[Sequence[Samples]]) -> TubeTable:
     return TubeTable(places.geometry, places.radius, packed, error, without, nodes, 0.0, _wire(places), stage)
 
 
-def _definite(request: _Request, found: list[list[Samples]], workers: int) -> list[list[Samples]]:
+def _definite(
+    request: _Request, found: list[list[Samples]], progress: Progress | None, workers: int
+) -> list[list[Samples]]:
     """Solutions at all poses; nodes whose outer resistance is not positive definite are solved for more finely."""
     places, first = request.places, len(request.poses) - len(request.nodes)
     film, nodes = _film_of_table(places), (*_level(places), *_yawed(places))
     weak = [n for n, node in enumerate(nodes) if not _is_definite(film, node, found[first + n])]
+    if not weak:
+        return found
     finer = [
         request.nodes[n]._replace(fineness=places.fineness(nodes[n].t, nodes[n].pose, stage=FINE, check=True))
         for n in weak
     ]
-    found = found.copy()
-    for n, answers in zip(weak, solutions(finer, "nodes that need a finer resolution", None, workers), strict=True):
-        found[first + n] = answers
-    return found
+    again = solutions(finer, "nodes that need a finer resolution", progress, workers)
+    solved = dict(zip((first + n for n in weak), again, strict=True))
+    return [solved.get(n, answers) for n, answers in enumerate(found)]
 
 
 def _is_definite(film: Samples, node: _Place, answers: Sequence[Samples]) -> bool:

@@ -84,7 +84,7 @@ def _rows(prediction: Prediction) -> Iterator[_Row]:
 
 
 def _bars(prediction: Prediction) -> Iterator[str]:
-    """What the bars are."""
+    """Notes on the quantities that the bars show."""
     if prediction.band is not None:
         yield "Bar of the held speed: its range over the gaps and pitches that are not given."
     elif prediction.intervals is not None:
