@@ -152,7 +152,7 @@ class _Link:
         # from forces in robot axes to those in the tube's
         along = np.asarray(np.kron(np.eye(len(points)), pose.rotation), dtype=np.float64)
         mobility = system.mobility.copy()
-        mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
+        mobility[:forces, :forces] -= along.T @ point_reflection(placed, own, solids.fineness.precision) @ along
         start = 0
         for wire in lines:
             here = slice(start, start + wire.points.size)

@@ -49,7 +49,7 @@ class Answers:
     free: tuple[tuple[int, int, Samples], ...]
     """Parity, mode, and coefficients from ring sources, (fields, sources)."""
     wall: tuple[Samples, ...]
-    """Coefficients from waves at points, for each k, (fields, 2, parities, orders, 3)."""
+    """Coefficients from waves at points, for each k, (orders, parities, 2, 3, fields)."""
     parities: tuple[int, ...]
     """Of those waves."""
 
@@ -95,8 +95,10 @@ class Reduced:
         received = solids.rings.received(waves, [system for _, system in picked], away)
         found = []
         for number, (wall, (rows, _)) in enumerate(zip(walls, picked, strict=True)):
-            gather = np.linalg.pinv(wall[rows])
-            fields = [np.tensordot(gather, values[number], axes=1) for values in received]
+            gather = np.linalg.pinv(wall[rows]).T
+            fields = [
+                np.tensordot(values[number], gather, axes=1).astype(solids.fineness.precision) for values in received
+            ]
             found.append(_answers(solids, number, crossing, _sizes(sources), wall, fields))
         edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
         return [
@@ -131,17 +133,18 @@ class Reduced:
     def _reflected(self, placed: Samples) -> list[Samples]:
         """Fields that the wall reflects of unit forces at points about its axis, for each system, (fields, 3 n)."""
         points, distances, back = from_the_wall(placed, self.waves.radius)
+        precision = self.answers[0].wall[0].dtype.type
 
         def reflected(numbers: range) -> list[Samples]:
-            found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+            found: list[Samples] = [np.zeros((answers.wall[0].shape[-1], placed.size)) for answers in self.answers]
             for number in numbers:
                 for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
                     here = 3 * there.size
-                    at_points = point_waves(points[: there.size], self.waves, number, low, high)
+                    at_points = point_waves(points[: there.size], self.waves, number, low, high, precision)
                     for total, answers in zip(found, self.answers, strict=True):
-                        matrix = answers.wall[number][:, :, :, low:high]
-                        sent = at_points[:, :, answers.parities, : matrix.shape[3]].reshape(here, -1)
-                        total[:, :here] += matrix.reshape(len(matrix), -1) @ sent.T
+                        matrix = answers.wall[number][low:high]
+                        sent = at_points[: len(matrix), answers.parities].reshape(-1, here)
+                        total[:, :here] += matrix.reshape(-1, len(total)).T @ sent
             return found
 
         shares = summed(reflected, self.waves.k.size)

@@ -75,15 +75,14 @@ class Rings(ABC):
     def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
         """Velocities on some unknowns from waves at points, with the wall's single layer, for each k and system.
 
-        (unknowns, 2, parities, orders, 3), to be multiplied with `point_waves`; without the minus sign.
+        (orders, parities, 2, 3, unknowns), to be multiplied with `point_waves`; without the minus sign.
         """
 
 
 def sent_to_wall(waves: WallWaves, number: int, points: Samples, forces: Samples) -> Samples:
-    """Forces at points as waves of one k, times the wall's single layer, (columns, 2, 2, orders, 3)."""
-    at_points = point_waves(points, waves, number)
-    mixed = forces.T @ at_points.reshape(len(at_points), -1)
-    return times_layers(mixed.reshape(-1, *at_points.shape[1:]), waves, number)
+    """Forces at points as waves of one k, times the wall's single layer, (orders, 2, 2, 3, columns)."""
+    at_points = point_waves(points, waves, number, precision=forces.dtype.type)
+    return times_layers(np.tensordot(at_points, forces, axes=1), waves, number)
 
 
 def midpoints(orders: int, modes: int, *, whole: bool = False) -> Samples:
@@ -188,7 +187,7 @@ class LevelRings(Rings):
             onto_wall = sent_to_wall(waves, number, points, forces)
             for parity, trace in enumerate(self._traces(waves, number)):
                 flat = trace.reshape(3 * self.modes, -1)
-                both = flat @ onto_wall[:, :, parity].transpose(2, 3, 1, 0).reshape(flat.shape[1], -1)
+                both = flat @ onto_wall[:, parity].swapaxes(1, 2).reshape(flat.shape[1], -1)
                 middle[parity, :, number] = both.reshape(self.modes, 3, 2, columns).swapaxes(1, 2)
 
         each(fill, range(waves.k.size))
@@ -213,7 +212,7 @@ class LevelRings(Rings):
                     np.tensordot(values[rows, number], trace, axes=1)
                     for values, rows, trace in zip(strengths, family.of_mode, traces, strict=True)
                 ]
-                found.append(times_layers(np.concatenate(fields)[:, :, None], waves, number))
+                found.append(times_layers(np.concatenate(fields).transpose(2, 1, 3, 0)[:, None], waves, number))
             return found
 
         return each(product, range(waves.k.size))
