@@ -94,7 +94,7 @@ class TiltedRings(Rings):
             columns, unknowns = [], []
             for system in systems:
                 local = [[place[bearing] for bearing in family.of_mode] for family in system]
-                columns.append(_columns(local, modes, np.count_nonzero(nodes)))
+                columns.append(_columns(local, modes, int(np.count_nonzero(nodes))))
                 unknowns.append(np.flatnonzero(np.concatenate([part for family in local for part in family]) >= 0))
             if bearing is None:
                 sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
