@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     import pint
 
 _QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
+    r"\s*(?P<number>[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|nan|inf|infinity))"
+    r"\s*(?P<unit>[^0-9].*)?",
+    re.I | re.S,
 )
 # Letters, products, quotients and one-digit powers: nothing that could be expensive to read.
 _UNIT = re.compile(r"(?:[^\W\d]|[ */().°]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
@@ -235,6 +235,27 @@ def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str
         return str(path)
 
     return draw
+
+
+def show_with_pictures(
+    answer: Answer, source: Any, *, json: bool, draw: Mapping[str, Callable[[Any], str | None]], **options: Any
+) -> None:
+    """Print an answer with the pictures of its source by their entries, also where one of them cannot be drawn."""
+    files: dict[str, str | None] = {}
+    with answer_kept(lambda: with_files(answer, **files), json=json, **options):
+        for name, one in draw.items():
+            files[name] = one(source)
+    show(with_files(answer, **files), json=json, **options)
+
+
+@contextmanager
+def answer_kept(answer: Callable[[], Answer], *, json: bool, **options: Any) -> Iterator[None]:
+    """Print an answer that was computed before the error of the block that writes its files."""
+    try:
+        yield
+    except BaseException:
+        show(answer(), json=json, **options)
+        raise
 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:

@@ -105,6 +105,8 @@ def pose_limits(
     resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     turned = _turned(batch)
+    share = batch.pose.eccentricity
+    gap = "placement.gap" if share is None else f"placement.eccentricity = {share:g}: gap"
     open_ended = batch.placement.ends == "open"
     thinnest = thinnest_gap * batch.body_diameter
     return [
@@ -145,11 +147,9 @@ def pose_limits(
             "else it cuts into the wall; a smaller placement.pitch or placement.yaw leaves more room",
             "gap-too-wide",
         ),
+        Limit.of(gap, films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"),
         Limit.of(
-            "placement.gap", films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"
-        ),
-        Limit.of(
-            "placement.gap",
+            gap,
             np.where(np.isinf(films.asked), 0.0, films.asked),
             "at most",
             films.largest,

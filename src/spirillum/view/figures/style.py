@@ -225,7 +225,7 @@ def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
 
 def save_as(figure: Figure, path: Path) -> None:
     """Write one picture whole or not at all, without dates: PNG (200 dpi), PDF or SVG (text as paths)."""
-    kind = path.suffix.removeprefix(".")
+    kind = path.suffix.lower().removeprefix(".")
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
         figure.set_layout_engine(None)  # else the layout is computed once more before it is drawn
     with styled(), atomic_write(path) as temporary:

@@ -166,7 +166,7 @@ def film(
     """
     target = output_target(path, FILMS, "run.mp4")
     seen_from, pixels = checked_view(view), _even(checked_size(size))
-    _check_pace(fps, 1.0 if speed is None else speed, target.suffix)
+    _check_pace(fps, 1.0 if speed is None else speed, target.suffix.lower())
     check_choice("camera", camera, CAMERAS)
     if isinstance(dataset, (str, Path)):
         dataset = open_run(dataset)
