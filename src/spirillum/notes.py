@@ -51,8 +51,9 @@ CAUTIONS = {
         "`friction.effective`, or calibrate with observed rates."
     ),
     "friction-negative": (
-        "The inferred effective friction is negative: the torque that the model predicts exceeds that of the motor. "
-        "Check the rates' units, the motor's constants and the tail. Predictions take zero."
+        "The inferred effective friction, or the lower end of its interval, is negative: the torque that the model "
+        "predicts exceeds that of the motor. Check the rates' units, the motor's constants and the tail. Predictions "
+        "take zero."
     ),
     "friction-counted-twice": (
         "A body drag factor below 1 already includes friction on the body; the friction model `paper` counts it "

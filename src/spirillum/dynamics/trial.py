@@ -25,7 +25,7 @@ from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit import NO_FIT, Fit
+from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
@@ -43,7 +43,7 @@ from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
 from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
-from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
+from spirillum.swimming.released_motion import HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
 from spirillum.units import KINDS, as_given, parse_option, show, speed_unit
@@ -482,7 +482,9 @@ class TrialRequest:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
         self._check_length(held)
         self._announce("held", held.forward_velocity, held.tail_rotation_rate)
-        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
+        other = held.fitted_by and self.fit.fitted_motion == HELD
+        notes = (*held.warnings, FITTED_BESIDE) if other else held.warnings
+        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady}, warnings=notes)
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""
