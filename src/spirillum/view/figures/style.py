@@ -71,6 +71,7 @@ DPI = 200
 """Of PNG files."""
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
+_MICRO = re.compile(r"(\d )u(?=[mNWgl]\b)")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
 _WITHOUT_PREFIX = ("rad/s", "rad", "1", "%")
 _PREFIXES = (
@@ -198,6 +199,11 @@ def readable(text: str) -> str:
     """A figure's text with its formulas spelled out: ``$B_{eff}$`` becomes ``B_eff``."""
     spelled = _FORMULA.sub(lambda found: _spelled(found[1]), text)
     return " ".join(spelled.replace(r"\$", "$").split())
+
+
+def with_micro(text: str) -> str:
+    """A figure's text with the micro sign of its axes: ``0.9 um`` becomes ``0.9 µm``."""
+    return _MICRO.sub(r"\1µ", text)
 
 
 def _spelled(formula: str) -> str:
