@@ -248,7 +248,7 @@ def test_interrupt_that_a_library_has_caught_leaves_with_130(
     ("command", "work", "words"),
     [
         ("study -o out", "spirillum.studies.run.map_tasks", "finished robots are kept in out; the same"),
-        ("prepare magnetic-helix", "spirillum.cli.renderer.progress_bar", "finished tables and nodes are kept"),
+        ("prepare magnetic-helix", "spirillum.cli.renderer.progress_bar", "finished tables and poses are kept"),
         ("calibrate o.csv x.toml -o fit", "spirillum.robot.load.load", "nothing of this fit is kept"),
         ("predict magnetic-helix", "spirillum.dynamics.prediction.predict", "finished files are kept"),
     ],

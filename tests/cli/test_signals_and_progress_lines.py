@@ -72,7 +72,7 @@ def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: b
         assert not before
     else:
         assert [
-            line for line in before if not line.startswith(("no table of this tube yet", "table of the tube: "))
+            line for line in before if not line.startswith(("no table of this tube yet", "poses of the table: "))
         ] == []
         places = re.search(r"from (\d+) poses", before[0])
         assert places is not None

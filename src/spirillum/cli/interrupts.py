@@ -15,7 +15,7 @@ _RESUMED = "are kept in {}; the same command resumes"
 _KEPT = {
     "calibrate": "nothing of this fit is kept; earlier results in {} stay",
     "design": "nothing of this search is kept",
-    "prepare": "finished tables and nodes are kept; the same command resumes",
+    "prepare": "finished tables and poses are kept; the same command resumes",
     "study": f"finished robots {_RESUMED}",
     "virtual-experiment": f"finished videos {_RESUMED}",
 }

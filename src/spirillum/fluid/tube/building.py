@@ -138,7 +138,7 @@ def built_tables(
     start = time.perf_counter()
     films = _start_films(requests, workers)
     try:
-        found = iter(solutions(wanted, "table of the tube", progress, workers))
+        found = iter(solutions(wanted, "poses of the table", progress, workers))
         films.join()
         solved = [_definite(one, [next(found) for _ in one.poses], progress, workers) for one in requests]
     except KeyboardInterrupt as error:
@@ -150,7 +150,7 @@ def built_tables(
 
 @dataclass(frozen=True)
 class _Request:
-    """All poses that are solved for to make one table; the most expensive ones first."""
+    """All poses that are solved for to make one table."""
 
     places: Places
     straight: list[NodeSolution]
@@ -213,7 +213,7 @@ def _definite(
         request.nodes[n]._replace(fineness=places.fineness(nodes[n].t, nodes[n].pose, stage=FINE, check=True))
         for n in weak
     ]
-    again = solutions(finer, "nodes that need a finer resolution", progress, workers)
+    again = solutions(finer, "poses that need a finer resolution", progress, workers)
     solved = dict(zip((first + n for n in weak), again, strict=True))
     return [solved.get(n, answers) for n, answers in enumerate(found)]
 

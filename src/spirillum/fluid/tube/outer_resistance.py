@@ -103,17 +103,29 @@ def _solutions(
     """As `solutions`, node by node."""
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
-    numbered, saved = list(enumerate(places)), "; completed nodes are saved"
+    numbered, saved = list(enumerate(places)), "; completed poses are saved"
     known = [number for number, place in numbered if all_kept([place])]  # they take no time, and tell of no pace
     for number in known:
         found[number] = _solve(places[number])
     tell(what, len(known), len(places))
-    missing = [one for one in numbered if one[0] not in known]
+    missing = _mixed([one for one in numbered if one[0] not in known])
     answers = imap_unordered(_solve_numbered, missing, workers, besides=saved, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=len(known) + 1):
         found[number] = answer
         tell(what, done, len(places))
     return found
+
+
+def _mixed(numbered: Sequence[tuple[int, NodeSolution]]) -> list[tuple[int, NodeSolution]]:
+    """Cheap and expensive nodes evenly spread, those of each resolution and tilt in their order.
+
+    The time that is left is then that of the mean pace; it would else be judged by the most expensive ones.
+    """
+    kinds: dict[tuple[Fineness, bool, bool], list[tuple[int, NodeSolution]]] = {}
+    for one in numbered:
+        kinds.setdefault((one[1].fineness, one[1].pose.level, one[1].pose.yaw == 0.0), []).append(one)
+    spread = [((rank + 0.5) / len(kind), one) for kind in kinds.values() for rank, one in enumerate(kind)]
+    return [one for _, one in sorted(spread, key=lambda pair: (pair[0], pair[1][0]))]
 
 
 _LOWER = np.tril_indices(RATES)

@@ -18,9 +18,9 @@ from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
+from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK
-from spirillum.units import display_unit, show
 from spirillum.view.figures.style import COLOURS, with_micro
 from spirillum.view.scene3d.rendering import FILMS, film_writer
 from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
