@@ -116,6 +116,15 @@ def test_lines_come_at_a_rate_that_can_be_read() -> None:
     assert clock.now == 1200.0
 
 
+def test_piped_work_is_named_after_some_seconds() -> None:
+    clock, lines = _Clock(), list[str]()
+    progress = ProgressLines(lines.append, ("no table",), clock)
+    for _ in range(25):
+        clock.now += 1.0
+        progress.look()
+    assert lines == ["at work, 5 s elapsed", "at work, 20 s elapsed"]
+
+
 def test_short_work_prints_no_line(capsys: pytest.CaptureFixture[str]) -> None:
     with renderer.progress_bar(quiet=False) as progress:
         progress("looking", 1, 2)

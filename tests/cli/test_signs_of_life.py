@@ -26,6 +26,16 @@ def test_work_is_named_at_a_terminal_only(
     assert not shown.out
 
 
+def test_piped_work_is_named_where_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for first, told in ((0.0, "looking at a film\n"), (60.0, "")):
+        monkeypatch.setattr(renderer, "_FIRST", first)
+        with renderer.at_work("looking at a film", quiet=False):
+            time.sleep(0.1)
+        assert capsys.readouterr().err == told
+
+
 @pytest.mark.parametrize(("terminal", "told"), [(True, True), (False, False)])
 def test_work_that_is_silent_shows_that_it_goes_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], terminal: bool, told: bool

@@ -26,7 +26,9 @@ from spirillum.envelope import as_json, with_notes_last
 from spirillum.notes import Note, notes_in_answer, shown_cautions
 
 _PERIOD = 15.0
-"""Least time between two lines, s; shorter work prints none."""
+"""Least time between two lines, s."""
+_FIRST = 5.0
+"""Time after which the first line is printed, s; shorter work prints none."""
 _SHARE = 0.05
 """Least time between two lines over the time since the start, so that a long log stays readable."""
 _AT_ONCE = 1.0
@@ -96,12 +98,14 @@ class ProgressLines:
     ) -> None:
         """No work yet."""
         self._write, self._announcements, self._clock, self._lock = write, announcements, clock, Lock()
-        self._begin = self._printed = clock()
+        self._begin = clock()
+        self._printed = self._begin + _FIRST - _PERIOD
         self._pace = StagePace(clock)
 
     def __call__(self, what: str, done: int, total: int | None) -> None:
         """Take note of progress."""
         if what.startswith(self._announcements):
+            self._printed = self._clock()
             self._write(what)
             return
         with self._lock:
@@ -109,10 +113,10 @@ class ProgressLines:
         self.look()
 
     def look(self) -> None:
-        """Print a line if there is work and one is due."""
+        """Print a line if one is due."""
         with self._lock:
             now = self._clock()
-            if self._pace.what and now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
+            if now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
                 self._printed = now
                 self._write(self._line(now))
 
@@ -120,6 +124,8 @@ class ProgressLines:
         pace = self._pace
         of = f" of {pace.total}" if pace.total else ""
         left = "" if pace.left is None else f", about {_duration(pace.left)} left"
+        if not pace.what:
+            return f"at work, {_duration(now - self._begin)} elapsed"
         return f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
@@ -273,9 +279,23 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
 
 
 def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
-    """Progress lines on standard error; none for `--json` and where no terminal is attached."""
+    """A sign of life on standard error, where it is no terminal a line after some seconds; none for `--json`."""
     console = Console(stderr=True)
-    return nullcontext() if quiet or not console.is_terminal else console.status(what)
+    if quiet:
+        return nullcontext()
+    return console.status(what) if console.is_terminal else _line_after(_FIRST, what)
+
+
+@contextmanager
+def _line_after(seconds: float, line: str) -> Iterator[None]:
+    """Print a line where the block takes longer."""
+    timer = Timer(seconds, _print_line, (line,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _print_line(line: str) -> None:
