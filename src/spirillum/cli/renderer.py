@@ -289,7 +289,7 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
 @contextmanager
 def _line_after(seconds: float, line: str) -> Iterator[None]:
     """Print a line where the block takes longer."""
-    timer = Timer(seconds, _print_line, (line,))
+    timer = Timer(seconds, _print_line, (f"{line}, {seconds:.0f} s elapsed",))
     timer.daemon = True
     timer.start()
     try:
