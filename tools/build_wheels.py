@@ -23,8 +23,10 @@ def main(folder: str = "dist") -> None:
         pip = [f"{work}/tools/{'Scripts' if os.name == 'nt' else 'bin'}/python", "-m", "pip"]
         subprocess.run([*pip, "install", "--quiet", "--no-compile", "hatchling", "ziglang"], check=True)
         for tag in runpy.run_path(str(ROOT / "csrc" / "build.py"))["TARGETS"]:
-            copy = f"{work}/{tag}"
-            subprocess.run(["git", "clone", "--quiet", "--depth=1", ROOT.as_uri(), copy], check=True)
+            copy = Path(work, tag)
+            copy.mkdir()
+            files = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
+            subprocess.run(["tar", "-x", "-C", copy], input=files, check=True)
             command = [*pip, "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, copy]
             subprocess.run(command, check=True, env=os.environ | {"SPIRILLUM_WHEEL": tag})
             print(next(path for path in Path(folder).glob("spirillum-*.whl") if tag in path.name))
