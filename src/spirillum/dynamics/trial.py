@@ -83,13 +83,7 @@ def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, pl
 
 
 def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -> ReleasedMotion:
-    """Return the means of a trial.
-
-    Args:
-        held: the robot, held where it is laid down.
-        run: follows the robot, as `spirillum.simulate` does by its defaults.
-        duration: for how long, s.
-    """
+    """Return the means of a trial of a robot from where it is held."""
     turns = abs(held.tail_rotation_rate) * duration / (2.0 * np.pi)
     if turns > _MOST_TURNS:
         return ReleasedMotion(reason=f"its tail turns {turns:.4g} times in {duration:g} s; use `simulate`")
@@ -249,13 +243,7 @@ class TrialSample(NamedTuple):
 
 
 def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
-    """Return the unknowns that are open.
-
-    Args:
-        robot: the robot.
-        weight: its weight in the fluid, N; 0 where its masses are not known.
-        stated: `wait`, `roughness` and `friction_coefficient` as they are requested or fitted; None where they are not.
-    """
+    """Return the unknowns of which none is requested or fitted."""
     free = {name for name, value in stated.items() if value is None}
     free |= {"weight"} if weight and robot.body.mass is not None else set()
     free |= {"friction.effective"} if robot.motor is not None and robot.friction.effective is None else set()
@@ -317,14 +305,7 @@ def with_interval(
 ) -> ReleasedMotion:
     """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
 
-    Args:
-        nominal: the trial at nominal unknowns.
-        samples: settings of the runs.
-        unknowns: what they vary.
-        run: follows the robot of a sample.
-        progress: told how many runs are done.
-        discrepancy: gives the factors of a fitted model's discrepancy on quantities of runs, (runs,) each; only these
-            quantities then have intervals.
+    With the factors of a fitted model's discrepancy only the quantities that it knows have intervals.
     """
     if nominal.reason or not (unknowns or discrepancy):
         return nominal
@@ -369,12 +350,7 @@ def _swims(run: ReleasedMotion) -> bool:
 
 
 def variance_shares(shares: Samples, values: Samples) -> Samples:
-    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share.
-
-    Args:
-        shares: of the distributions, (runs, unknowns), 0 to 1.
-        values: (runs,).
-    """
+    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share."""
     x = 2.0 * shares - 1.0
     terms = np.stack([x, x**2], axis=-1)
     design = np.column_stack([np.ones(len(x)), terms.reshape(len(x), -1)])

@@ -80,13 +80,7 @@ class ResistanceModel(ABC):
 
     @abstractmethod
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
-        """Resistance of one part alone in the same fluid, about the origin, never calibrated.
-
-        Args:
-            batch: the robots.
-            part: one of `parts`.
-            phase: phase phi of the tail, rad.
-        """
+        """Resistance of one of `parts` alone in the same fluid, about the origin, never calibrated."""
 
 
 class SwimmerModel(ResistanceModel):

@@ -156,11 +156,7 @@ class Prediction(DisplayMixin):
         return answer, headline(answer)
 
     def to_dict(self, *, others: bool = True) -> dict[str, Any]:
-        """The answer of `spirillum predict --json`.
-
-        Args:
-            others: what other models predict, trial and steady motion stand in it.
-        """
+        """The answer of `spirillum predict --json`; with `others`, trial and steady motion stand in these."""
         band = self.band
         beside = self.other_models if others else None
         wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}

@@ -57,13 +57,7 @@ class Held:
 
 
 def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
-    """Resistance of two rigid parts in a tube with no net flux, twists about the origin.
-
-    Args:
-        solids: solids and wall.
-        wires: wires at their phase, in body axes, and the part (0 body, 1 rotor) with which each moves.
-        drop: how far the wires lie below where they turn, m.
-    """
+    """Resistance of two rigid parts in a tube with no net flux, twists about the origin; wires lie `drop` lower."""
     with one_thread():
         if solids.none:
             return _wires_alone(_Link.of(solids, wires, drop))

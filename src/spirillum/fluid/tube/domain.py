@@ -90,15 +90,8 @@ def pose_limits(
 ) -> list[Limit]:
     """Requirements on the pose in the tube for one of `PIECES`, after those that do not depend on it.
 
-    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine
-    for the memory.
-
-    Args:
-        batch: the robots.
-        part: one of `PIECES`.
-        kept: what the robots have to fulfil in unbounded fluid, the number of stations along the tail among it.
-        thinnest_gap: least gap under the body, over its diameter.
-        wire_film: least film between wire and wall, over the wire's radius.
+    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine for
+    the memory. The least gap is over the body's diameter, the least film at the wire over the wire's radius.
     """
     fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
     through = f"the tail would pass through the wall ({fields})"

@@ -74,11 +74,7 @@ class FilmBody:
 
     @classmethod
     def of(cls, outline: Outline) -> FilmBody:
-        """Read an outline; of a profile what can near the wall, with circles for its ends or a spheroid for all of it.
-
-        Raises:
-            InputError: for a profile that these are not near enough to.
-        """
+        """Read an outline; of a profile what can near the wall, with circles for its ends or one spheroid."""
         if any(isinstance(piece, Smooth) or _is_slanted(piece) for piece in outline.pieces):
             return _of_profile(outline)
         sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Segment) and p.start[1] == p.end[1] > 0]

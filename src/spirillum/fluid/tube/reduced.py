@@ -111,13 +111,7 @@ class Reduced:
         return self.sources.alike(sources)
 
     def coefficients(self, sources: Sources, placed: Samples, along: Samples) -> list[Samples]:
-        """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n).
-
-        Args:
-            sources: the wires at their phase.
-            placed: their stations about the tube's axis, (n, 3), m.
-            along: from forces in the robot's axes to the tube's, (3 n, 3 n).
-        """
+        """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""
         found = []
         for answers, wall in zip(self.answers, self._reflected(placed), strict=True):
             free: list[Samples] = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
@@ -229,16 +223,7 @@ def _duals(system: System) -> Samples:
 def _answers(
     solids: Solids, number: int, crossing: list[Samples], sizes: Samples, wall: Samples, coefficients: list[Samples]
 ) -> Answers:
-    """Solids' response of one system.
-
-    Args:
-        solids: solids and wall.
-        number: of the system.
-        crossing: see `_unbounded`.
-        sizes: see `_sizes`.
-        wall: basis of the fields that the wall reflects, (unknowns, fields).
-        coefficients: of those, see `Answers`.
-    """
+    """Solids' response of one system to fields that the wall reflects, (unknowns, fields), and their coefficients."""
     system = solids.systems[number]
     dual = _duals(system)
     root = np.sqrt(dual)[:, None]

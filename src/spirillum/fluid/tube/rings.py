@@ -59,17 +59,7 @@ class Rings(ABC):
     def sent(
         self, waves: WallWaves, systems: Sequence[System], points: Samples, forces: Samples, away: float
     ) -> list[Samples]:
-        """Velocities on the solids from forces at points, by the wall, (unknowns, columns) for each system.
-
-        Without the minus sign.
-
-        Args:
-            waves: those that matter between points and solids.
-            systems: families of unknowns that the wall couples.
-            points: about the tube's axis, in its axes, (n, 3), m.
-            forces: in columns, (3 n, columns).
-            away: smallest distance from the wall of what the points stand for, m.
-        """
+        """Velocities on the solids from forces at points, by the wall, (unknowns, columns) each, without the minus."""
 
     @abstractmethod
     def received(self, waves: WallWaves, systems: Sequence[System], away: float) -> list[list[Samples]]:
@@ -105,12 +95,6 @@ def finer(panels: Panels, distances: Samples, cut: float, least: int) -> tuple[S
 
     A wave is damped by exp(-cut) at k (d + d_min) = cut: up to there its Legendre coefficients are averaged to 1e-5.
     With fewer nodes the resistance to pitching is 11 % low at 0.1 mm: thin films amplify what is missed.
-
-    Args:
-        panels: panels.
-        distances: of each from the wall, (panels,), m.
-        cut: see `WallWaves.cut`.
-        least: nodes over those of a panel, at least.
     """
     u = panels.rule[0]  # Gauss nodes resolve waves that shorten towards the ends of a panel, as they crowd there
     dense = np.sqrt(1.0 - (0.5 * (u[1:] + u[:-1])) ** 2) / np.diff(u)

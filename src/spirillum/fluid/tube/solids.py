@@ -163,12 +163,7 @@ class Solids:
         return TiltedRings(self.panels, self.pose, self.counts, self.fineness.precision)
 
     def waves(self, distance: float, wires: Samples | None = None) -> WallWaves:
-        """The waves that matter between the solids, or solids and wires.
-
-        Args:
-            distance: mean of the smallest distances of both from the wall, m.
-            wires: where along the tube they are, m.
-        """
+        """The waves that matter between the solids, or solids and wires, at a mean distance from the wall."""
         x, fineness = self.panels.x.ravel(), self.fineness
         if wires is None:
             return fineness.waves(self.pose.radius, x, distance, fineness.damping)

@@ -161,11 +161,7 @@ RESPONSES = {
 
 
 def response_of(matrix: Samples) -> Samples:
-    """Response to a tail turning at 1 rad/s, constrained laterally and in tilt, closed ends, viscosity 1.
-
-    Returns:
-        Forward velocity, body rate, forces y and z, torques y and z of the fluid, and the normal resistance, (7,).
-    """
+    """Response `RESPONSES` to a tail turning at 1 rad/s, held laterally and in tilt, closed ends, viscosity 1, (7,)."""
     free = [0, 3]
     tail = matrix[:, 6]  # the rotor's lab rate is Omega + omega_m = 1
     a = matrix[np.ix_(free, free)] - np.outer(tail[free], [0.0, 1.0])
@@ -179,11 +175,8 @@ def response_of(matrix: Samples) -> Samples:
 def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None) -> Samples:
     """Errors of `RESPONSES`, over the size of what acts on the robot, sideways force and torques over those in all.
 
-    Args:
-        matrix: the 8x8 judged.
-        true: what it should be.
-        turn: of the place at phases over a turn of the tail, (n, 8, 8): sizes are then root mean squares over them, for
-            a force that nearly vanishes at one phase moves nothing; None: sizes are those of `true`.
+    With matrices over a turn of the tail sizes are root mean squares over them, for a force that nearly vanishes at one
+    phase moves nothing.
     """
     a, b = response_of(matrix), response_of(true)
     sizes = np.stack([response_of(some) for some in (true[None] if turn is None else turn)])

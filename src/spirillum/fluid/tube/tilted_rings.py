@@ -255,17 +255,8 @@ class TiltedRings(Rings):
     ) -> Samples:
         """Waves of one k and some orders on arcs of rings.
 
-        Args:
-            waves: which.
-            number: of the node in k.
-            theta: angles about the rings' axis, (angles,).
-            placed: points there, about the tube's axis, (rings, angles, 3), m.
-            low: first order.
-            high: order after the last.
-            precision: in which they are kept.
-
-        Returns:
-            even, odd; component; ring; order; real, imaginary; wall component; angle.
+        Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs about
+        the tube's axis, (rings, angles, 3), m.
         """
         from spirillum.kernels.stokes_flow import ring_waves, single_ring_waves
 

@@ -93,16 +93,7 @@ class WaveBand(NamedTuple):
 def waves_between(
     radius: float, reach: float, distance: float, tolerance: float, slack: float = SLACK, crowd: float = CROWD
 ) -> WallWaves:
-    """The waves that matter between things in a tube.
-
-    Args:
-        radius: of the tube, m.
-        reach: largest axial distance between them, m.
-        distance: mean of their smallest distances from the wall, m.
-        tolerance: waves are kept until they are damped by this much, there and back.
-        slack: see `WallWaves.slack`.
-        crowd: see `CROWD`.
-    """
+    """The waves that matter between things in a tube, until they are damped by a tolerance there and back."""
     steepest = -np.log(tolerance) / (2.0 * distance)
     step = 2.0 * np.pi / (reach - np.log(tolerance) / _DECAY * radius)
     lowest = float(np.clip(0.1 * tolerance, _LOWEST, _MOST_LOWEST))
@@ -183,16 +174,7 @@ def point_waves(
     last: int | None = None,
     precision: type[np.floating] = np.float64,
 ) -> Samples:
-    """Velocities of waves of one k at points, (last - first, 2, 2, 3, 3 n): even, odd; real, imaginary.
-
-    Args:
-        points: about the tube's axis, (n, 3), m.
-        waves: which.
-        number: of the node in k.
-        first: the first order.
-        last: the order after the last; None: of all that are kept.
-        precision: in which they are kept.
-    """
+    """Velocities of waves of one k at points, (last - first, 2, 2, 3, 3 n): even, odd; real, imaginary."""
     from spirillum.kernels import stokes_flow
 
     last = waves.orders[number] if last is None else last
