@@ -33,7 +33,6 @@ class Predicted:
     """What draws of the parameters predict, (draws, robots)."""
 
     advance: Samples
-    """U/omega, m/rad."""
     turning: Samples
     """Omega/omega."""
     load: Samples

@@ -136,14 +136,11 @@ _MOST_ALIKE = 4
 
 
 class MergedEvent(NamedTuple):
-    """An event, or the first of many that are alike."""
+    """An event, or the first of many that are alike; times in s."""
 
     time: float
-    """When, s."""
     what: str
-    """What happened."""
     times: int
-    """How often."""
     last: float
     """When for the last time, s."""
 
@@ -176,12 +173,10 @@ STEADY = (
 
 
 class DutyInterval(NamedTuple):
-    """A time at constant duty."""
+    """A time at constant duty, s."""
 
     start: float
-    """s."""
     end: float
-    """s."""
 
 
 def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[DutyInterval]:

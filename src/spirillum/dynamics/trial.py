@@ -164,7 +164,6 @@ class TrialUnknown(NamedTuple):
     of: str
     """What the ends are multiples of, or their unit."""
     source: str
-    """Why these ends."""
 
     def at(self, shares: Samples) -> Samples:
         """Values at shares of the distribution, between 0 and 1."""

@@ -115,7 +115,7 @@ def add_tractions(
 
 @dataclass(frozen=True)
 class FlowField(FluidField):
-    """Flow at one instant in fluid that is at rest far away."""
+    """Flow at one instant in fluid that is at rest far away, SI."""
 
     solution: UnitTwistSolution = field(repr=False)
     """Tractions for unit twists, at phase 0."""
@@ -124,9 +124,7 @@ class FlowField(FluidField):
     twists: Samples
     """Velocity and rotation of body, then of rotor, (12,)."""
     phase: float
-    """Phase of the tail, rad."""
     viscosity: float
-    """Pa s."""
 
     def part_at(self, points: Samples) -> np.ndarray:
         """See `FluidField.part_at`."""

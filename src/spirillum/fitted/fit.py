@@ -67,9 +67,7 @@ class Fit:
     model: str = ""
     """Model whose torque B_eff was inferred with."""
     posterior: PosteriorFile | None = None
-    """The posterior, whose draws give answers intervals; None without one."""
     file: CalibrationFile | None = None
-    """The calibration file; None without one."""
     name: str = ""
     """Name of the file, with the observations of a posterior."""
     channels: tuple[float, ...] = ()

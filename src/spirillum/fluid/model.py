@@ -29,7 +29,6 @@ class ResistanceModel(ABC):
     name: ClassVar[str]
     """Name on the command line."""
     title: ClassVar[str]
-    """Name in tables and figures."""
     references: ClassVar[tuple[str, ...]]
     """Keys of its references, see `spirillum.citation`."""
     known_error: ClassVar[str]

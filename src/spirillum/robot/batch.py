@@ -31,11 +31,8 @@ class Column(NamedTuple):
     optional: bool = False
     """Whether a robot swims without it."""
     zero: bool = False
-    """Whether zero is allowed."""
     signed: bool = False
-    """Whether negative values are allowed."""
     infinite: bool = False
-    """Whether infinity is allowed."""
 
 
 @cache

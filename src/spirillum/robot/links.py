@@ -65,9 +65,7 @@ class Links(NamedTuple):
     """Both links of a robot."""
 
     body: Link
-    """The body, without the coupling."""
     rotor: Link
-    """Coupling and wire."""
 
 
 def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:

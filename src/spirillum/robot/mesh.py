@@ -101,9 +101,7 @@ class TailLine:
     """The centreline of the tail, dense enough for a swept wire; m, at phase 0."""
 
     points: Samples
-    """(k, 3), m."""
     tangents: Samples
-    """Unit tangents away from the root, (k, 3)."""
     xi: Samples
     """Axial distance from the root, m, (k,)."""
 

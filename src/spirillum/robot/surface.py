@@ -23,9 +23,7 @@ class Surface(NamedTuple):
     """A closed surface of triangles, outward oriented, made of consecutive bands."""
 
     vertices: Samples
-    """(n, 3), m."""
     faces: Faces
-    """(m, 3)."""
     band: Faces
     """Index of each triangle's band, from the first pole to the last, (m,)."""
     sector: Faces

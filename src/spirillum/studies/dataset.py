@@ -341,7 +341,6 @@ class Caution(NamedTuple):
     model: str
     flag: str
     robots: int
-    """How many."""
     sentence: str
     """The first of them in words."""
     refused: bool = False

@@ -110,9 +110,7 @@ class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
 
     robot: Robot
-    """The robot."""
     table: TubeTable = field(repr=False)
-    """Its table."""
 
     @property
     def warnings(self) -> tuple[Note, ...]:

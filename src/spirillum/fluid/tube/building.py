@@ -143,9 +143,7 @@ class _Request:
 
     places: Places
     straight: list[NodeSolution]
-    """Check poses without yaw."""
     yawed: list[NodeSolution]
-    """Check poses with yaw."""
     nodes: list[NodeSolution]
 
     @classmethod

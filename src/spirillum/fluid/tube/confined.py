@@ -35,7 +35,6 @@ class Strengths:
     tractions: tuple[Samples, Samples]
     """Modes of the tractions, even and odd, (unknowns, 13)."""
     wires: tuple[Wire, ...]
-    """Wires, in the axes used here."""
     forces: Samples
     """At the wires' stations, in the axes used here, (3 stations, 13)."""
 

@@ -54,7 +54,6 @@ class FilmBody:
     """Geometry of a body of revolution for its lubrication film, about its mid-length; lengths in m."""
 
     radius: float
-    """a."""
     half: float
     """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
     rear: tuple[float, float]
@@ -175,13 +174,9 @@ class FilmSurface(NamedTuple):
     points: Samples
     normals: Samples
     along: Samples
-    """Derivative of the points by u."""
     across: Samples
-    """Derivative of the points by v."""
     turning_along: Samples
-    """Derivative of the normals by u."""
     turning_across: Samples
-    """Derivative of the normals by v."""
 
 
 class Cuts(NamedTuple):

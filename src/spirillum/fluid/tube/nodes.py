@@ -68,9 +68,7 @@ class Places:
 
     geometry: RobotGeometry
     radius: float
-    """R of the tube."""
     stage: Stage = FINE
-    """Nodes and resolution."""
 
     @cached_property
     def rings(self) -> Samples:

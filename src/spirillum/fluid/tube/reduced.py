@@ -67,13 +67,10 @@ class Reduced:
     """Coupling of wires and solids at any phase in the reduced basis."""
 
     sources: Sources
-    """The wires, at any phase."""
     waves: WallWaves
-    """Between wires and solids."""
     away: float
     """Smallest distance of the solids from the wall, m."""
     answers: tuple[Answers, ...]
-    """For each system."""
 
     @classmethod
     def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:

@@ -36,11 +36,9 @@ class Fineness:
     """Resolution of the flow in a tube."""
 
     wire: Accuracy = "standard"
-    """Form of the wires."""
     tolerance: float = 1e-4
     """At which Fourier modes are cut off."""
     order: int = 8
-    """Gauss nodes of a panel."""
     panel: float = 2.5
     """Longest panels over the length on which the film's traction varies."""
     growth: float = 0.0
@@ -48,9 +46,7 @@ class Fineness:
     wires: float = 1e-3
     """Coarsest tolerance of waves to and from wires."""
     slack: float = SLACK
-    """See `WallWaves.slack`."""
     crowd: float = CROWD
-    """See `wall.CROWD`."""
 
     @property
     def damping(self) -> float:

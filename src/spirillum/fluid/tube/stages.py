@@ -45,7 +45,6 @@ class Stage:
     resolutions: dict[tuple[Where, Tilt], Fineness]
     """Resolution of the flow at nodes."""
     seconds: tuple[float, float]
-    """Time that a node takes one process of a fast and of a slow machine, s."""
     held_out: int
     """Poses without yaw, and with it, from which the table's errors are stated."""
     checks: dict[tuple[Where, Tilt], Fineness]
@@ -60,9 +59,7 @@ class Stage:
     accuracy: float = 2.0
     """Largest relative error that it should have, over that of the finest stage."""
     yawed: bool = True
-    """Whether it has yawed nodes."""
     film_yaws: int = 5
-    """Polynomials in yaw of the film."""
     film_intervals: int = 15
     """Intervals of its splines: with 11 it is within 0.4 %."""
 

@@ -179,7 +179,6 @@ class TubeTable:
     """Table of one robot in one tube."""
 
     geometry: RobotGeometry
-    """Everything of the robot that decides the table."""
     radius: float
     """R of the tube, m."""
     packed: Samples = field(repr=False)
@@ -191,11 +190,9 @@ class TubeTable:
     places: int
     """Number of nodes that were solved for."""
     seconds: float
-    """Time that it took."""
     wire: float | None = None
     """Relative error of the forward velocity against the finest form of the wire; None: the largest measured one."""
     stage: StageName = "fine"
-    """Nodes and resolution."""
 
     @property
     def error_against(self) -> str:

@@ -53,12 +53,10 @@ class _Tier(NamedTuple):
 
 
 class _Sample(NamedTuple):
-    """Rings on which waves are evaluated."""
+    """Rings on which waves are evaluated, (panels, q), m."""
 
     x: Samples
-    """(panels, q), m."""
     rho: Samples
-    """(panels, q), m."""
     average: Samples | None
     """From them to the nodes, (panels, p, q); None where they are the nodes."""
 
