@@ -248,7 +248,7 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
 
     def run(**given: Any) -> None:
         typed = {
-            item.path: _as_argument(item, given[name])
+            item.path: not item.default if item.is_switch else given[name]
             for name, (item, _, default) in made.items()
             if given[name] is not None and given[name] != default
         }
@@ -266,11 +266,6 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
-
-
-def _as_argument(item: Declaration, value: Any) -> Any:
-    """The value of an argument; a switch turns the default round."""
-    return not item.default if item.is_switch else value
 
 
 _IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")

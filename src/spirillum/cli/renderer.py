@@ -114,13 +114,10 @@ class ProgressLines:
             now = self._clock()
             if self._pace.what and now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
                 self._printed = now
-                self._write(self._line(now))
-
-    def _line(self, now: float) -> str:
-        pace = self._pace
-        of = f" of {pace.total}" if pace.total else ""
-        left = "" if pace.left is None else f", about {_duration(pace.left)} left"
-        return f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}"
+                pace = self._pace
+                of = f" of {pace.total}" if pace.total else ""
+                left = "" if pace.left is None else f", about {_duration(pace.left)} left"
+                self._write(f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}")
 
 
 _FINE = 10.0

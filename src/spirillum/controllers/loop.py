@@ -175,7 +175,11 @@ class _Loop:
     def handle(self, time: float, kind: _Kind, content: Any) -> bool:
         """Process one event; return whether the run continues."""
         if kind is _Kind.DELIVERY:
-            self._deliver(time, content)
+            if isinstance(content, Detection):
+                self._sights.append(content)
+                self._arrived = time
+            else:
+                self._readings.append(content)
             return True
         if kind is _Kind.ARRIVAL:
             return self.arrive(time, content)
@@ -198,14 +202,6 @@ class _Loop:
             case _:
                 return False
         return True
-
-    def _deliver(self, time: float, content: Detection | MeterReading) -> None:
-        """A frame or a reading reaches the controller."""
-        if isinstance(content, Detection):
-            self._sights.append(content)
-            self._arrived = time
-        else:
-            self._readings.append(content)
 
     def arrive(self, time: float, sent: Command) -> bool:
         """Deliver a command to the robot; return whether the port is still there and the run continues."""

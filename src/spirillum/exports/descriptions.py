@@ -61,7 +61,7 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
         "density": quantity(robot.fluid.density, "kg/m^3"),
         "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
         "joint": {
-            "type": "fixed" if _fixed(robot) else "revolute",
+            "type": "fixed" if robot.drive is not None and robot.drive.joint == "fixed" else "revolute",
             "origin": quantity([0.0, 0.0, 0.0], "m"),
             "axis": [1.0, 0.0, 0.0],
             "phase_at_zero": quantity(phase, "rad"),
@@ -93,10 +93,6 @@ def _resistance(robot: Robot, model: str) -> _Resistance:
         words = f"model '{model}' has no coupling: its drag is missing; use another of {', '.join(FULL_MODELS)}"
         warnings.append(Note("coupling-left-out", words, ("coupling",)))
     return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
-
-
-def _fixed(robot: Robot) -> bool:
-    return robot.drive is not None and robot.drive.joint == "fixed"
 
 
 def joint_friction(robot: Robot) -> float:

@@ -82,11 +82,6 @@ SCHEMAS: Mapping[str, Json] = {
 """JSON schemas by the names by which Foxglove knows them."""
 
 
-def numbers_schema(meanings: Mapping[str, str]) -> Json:
-    """Schema of a message of plain numbers."""
-    return _object(timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in meanings.items()})
-
-
 def nanoseconds(time: float) -> int:
     """A time of a run, s, in whole nanoseconds."""
     if not 0.0 <= time <= _LATEST:
@@ -252,7 +247,12 @@ class _Writer:
 
         self._writer = Writer(stream)
         self._writer.start(library=f"{MARK} {own_version()}")
-        self._schemas = {**SCHEMAS, _NUMBERS: numbers_schema(_meanings(dataset))}
+        self._schemas = {
+            **SCHEMAS,
+            _NUMBERS: _object(
+                timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in _meanings(dataset).items()}
+            ),
+        }
         self._channels: dict[str, int] = {}
         names = ("robot", "model", "settings", "versions", "title")
         self._writer.add_metadata(

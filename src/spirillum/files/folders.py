@@ -25,7 +25,7 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
     folder = checked_path(path, "a folder for the results (-o DIR)")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file, no folder for results; allowed: a folder for the results (-o DIR)")
-    missing = _missing(folder)
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         with locked(output_folder(folder)):
             if (folder / "figures").exists():
@@ -41,11 +41,6 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
         for made in missing:
             with suppress(OSError):
                 made.rmdir()  # only where it is empty
-
-
-def _missing(folder: Path) -> list[Path]:
-    """The folder and those above it that are not there, the innermost first."""
-    return [place for place in (folder, *folder.parents) if not place.exists()]
 
 
 def claim_folder(

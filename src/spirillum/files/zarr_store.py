@@ -86,7 +86,9 @@ def region_files(
         group = zarr.create_group(store=MemoryStore(found), zarr_format=3)
         for name, given in values.items():
             item, place = variables[name], places[name]
-            _check_whole_chunk(name, item, place)
+            for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
+                if start % part or stop != min(start + part, size):
+                    raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
             _created(group, name, item)[tuple(slice(*ends) for ends in place)] = given
     keys = [chunk_key(name, variables[name], places[name]) for name in values]
     return {key: found[key].to_bytes() for key in keys}
@@ -107,13 +109,6 @@ def is_whole(path: Path) -> bool:
             content[-_CHECKSUM:], "little"
         )
     return False
-
-
-def _check_whole_chunk(name: str, item: Stored, place: Place) -> None:
-    """Refuse a region that is not exactly one chunk, or the last one along a dimension."""
-    for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
-        if start % part or stop != min(start + part, size):
-            raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
 
 
 def _created(group: Any, name: str, item: Stored) -> Any:

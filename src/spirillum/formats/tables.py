@@ -229,16 +229,13 @@ def check_known(table: Table, allowed: Sequence[str]) -> None:
         if name in allowed:
             if table.header.count(name) > 1:
                 raise InputError(f"{table.path}: column '{name}' is a duplicate; allowed: once")
-        elif not name.lower().startswith(_NOTES) and _resembles(name, words):
+        elif not name.lower().startswith(_NOTES) and any(
+            get_close_matches(word, words, n=1, cutoff=_ALIKE) for word in _words(name)
+        ):
             raise InputError(
                 f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, allowed)}; allowed: "
                 f"{', '.join(allowed)}, and notes, whose names begin with note"
             )
-
-
-def _resembles(name: str, words: Collection[str]) -> bool:
-    """Whether a word of a name is one of some words, but for a letter."""
-    return any(get_close_matches(word, words, n=1, cutoff=_ALIKE) for word in _words(name))
 
 
 def _words(name: str) -> list[str]:

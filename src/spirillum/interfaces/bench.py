@@ -63,7 +63,14 @@ class Bench(Senses):
         """The remote of the port `virtual`."""
         try:
             if tracked:
-                self._set_up_camera(plant, lab, seed, degradation)
+                pose = plant.observe().pose
+                options = {"fps": lab.camera.fps}
+                self._eye = VirtualCamera(plant.robot, pose, camera=options, degradation=degradation, seed=seed)
+                self._shift = self._eye.x_of(pose) - float(pose.position[0])
+                folder = self._left.enter_context(scratch_folder())
+                self._tracker = LiveTracker(
+                    self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera"
+                )
             if port is not None:
                 if port == VIRTUAL:
                     self.virtual = self._left.enter_context(VirtualRemote())
@@ -71,14 +78,6 @@ class Bench(Senses):
         except BaseException:
             self._left.close()
             raise
-
-    def _set_up_camera(self, plant: Plant, lab: Lab, seed: int, degradation: str | None) -> None:
-        pose = plant.observe().pose
-        options = {"fps": lab.camera.fps}
-        self._eye = VirtualCamera(plant.robot, pose, camera=options, degradation=degradation, seed=seed)
-        self._shift = self._eye.x_of(pose) - float(pose.position[0])
-        folder = self._left.enter_context(scratch_folder())
-        self._tracker = LiveTracker(self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera")
 
     def not_ready(self, time: float) -> str:  # noqa: ARG002 - it has learnt or not
         """Why nothing can be seen yet at a time, s; empty once the tracker knows the robot."""

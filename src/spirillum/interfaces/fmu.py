@@ -244,12 +244,6 @@ def _sources(model: FmuModel) -> dict[str, bytes]:
     return found
 
 
-def _token(model: FmuModel, written: Mapping[str, bytes]) -> str:
-    """Token with which an importer instantiates the FMU: a checksum of its numbers and its sources."""
-    said = repr((model.prediction.robot.name, dict(model.defined), model.flow, model.duty)).encode()
-    return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
-
-
 def _header(model: FmuModel, token: str) -> str:
     """The robot for the C source: `robot.h`."""
     defined = {
@@ -385,7 +379,8 @@ def compiler() -> str:
 def fmu_bytes(model: FmuModel) -> bytes:
     """The FMU of a robot: a zip archive with description, source and library."""
     written, name = _sources(model), model.identifier
-    token = _token(model, written)
+    said = repr((model.prediction.robot.name, dict(model.defined), model.flow, model.duty)).encode()
+    token = "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
     written["robot.h"] = _header(model, token).encode()
     system, ending = _LIBRARIES.get(sys.platform, ("linux", ".so"))
     machine = platform.machine().lower()

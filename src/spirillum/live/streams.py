@@ -108,14 +108,9 @@ def source_of(
         wanted = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
         address = scheme + word[len(scheme) :]
         options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
-        return Source(_without_secrets(word), "stream", options)
+        return Source(re.sub(r"//[^/]*@", "//", word)[:120], "stream", options)
     video = open_video(word, pace, aspect)  # raises for a bad video
     return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
-
-
-def _without_secrets(word: str) -> str:
-    """An address without name and password."""
-    return re.sub(r"//[^/]*@", "//", word)[:120]
 
 
 def _pictures(source: Source) -> Generator[Arrived, None, None]:

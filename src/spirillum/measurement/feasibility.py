@@ -165,7 +165,9 @@ def feasibility(
     Raises:
         InputError: if a field is wrong, or the robot's motion cannot be predicted and is not given.
     """
-    _check_video(video, view_width, picture_width)
+    for name, value in (("view-width", view_width), ("width", picture_width)):
+        if video is not None and value is not None:
+            raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
     chosen, robot = load_setup(setup)
     if overrides:
         beside = Path(setup).parent / chosen.robot.file
@@ -213,13 +215,6 @@ def feasibility(
 def _first(*values: tuple[float | None, str]) -> tuple[float, str]:
     """Return the first value that there is, with its source."""
     return next((value, source) for value, source in values if value is not None)
-
-
-def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
-    """Refuse what a video states itself."""
-    for name, value in (("view-width", view_width), ("width", picture_width)):
-        if video is not None and value is not None:
-            raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
 
 
 def _warnings(

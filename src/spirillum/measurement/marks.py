@@ -100,20 +100,16 @@ class Marks:
 def read_marks(path: str | Path) -> dict[str, Marks]:
     """Read a CSV table of manual readings by video; angles within one turn are unwrapped."""
     table = read_readings(path, _WHAT)
-    _check_columns(table)
-    rows: dict[str, list[TableRow]] = {}
-    place = table.column("video")
-    for row in table.rows():
-        rows.setdefault("" if place is None else row.text(place), []).append(row)
-    return {video: _marks(table, chosen) for video, chosen in rows.items()}
-
-
-def _check_columns(table: Table) -> None:
     check_known(table, MARK_COLUMNS)
     if not {"frame", "time_s"} & set(table.header):
         raise InputError(f"{table.path}: neither column 'frame' nor 'time_s' is there; allowed: at least one of them")
     if not set(_READINGS) & set(table.header):
         raise InputError(f"{table.path} holds no readings; allowed: at least one column of {', '.join(_READINGS)}")
+    rows: dict[str, list[TableRow]] = {}
+    place = table.column("video")
+    for row in table.rows():
+        rows.setdefault("" if place is None else row.text(place), []).append(row)
+    return {video: _marks(table, chosen) for video, chosen in rows.items()}
 
 
 def _marks(table: Table, rows: list[TableRow]) -> Marks:

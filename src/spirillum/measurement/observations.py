@@ -144,7 +144,9 @@ def _observation(row: TableRow) -> ObservationRow:
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
-    _check_trial(row)
+    number = number_in(row.text("trial"))
+    if not math.isnan(number) and not number.is_integer():
+        raise row.error("trial", row.text("trial"), "a whole number, or a name")
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
@@ -164,13 +166,6 @@ def _observation(row: TableRow) -> ObservationRow:
         trial=row.text("trial"),
         motor_derived=motor_derived,
     )
-
-
-def _check_trial(row: TableRow) -> None:
-    """A trial has a name or a whole number: a fraction has slipped in from another column."""
-    number = number_in(row.text("trial"))
-    if not math.isnan(number) and not number.is_integer():
-        raise row.error("trial", row.text("trial"), "a whole number, or a name")
 
 
 def _number(row: TableRow, name: str, factor: float, least: float | None = None) -> float:

@@ -168,6 +168,10 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         if isinstance(answer.get(name), dict)
     }
     error = answer["error_estimate"]
+    found = axial_forces_of(prediction)
+    weight = prediction.robot.derived().get("submerged_weight")
+    if weight is not None:
+        found.append({"name": "weight less buoyancy", "at": "body", "axis": "z", "value": -weight.value})
     return {
         "model": answer["model"],
         "form": answer.get("form", ""),
@@ -176,7 +180,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "calibrated": answer["calibrated"],
         "rows": rows,
         "columns": dict.fromkeys(("trial", "steady")) if answer["model"] == WALLED else {},
-        "forces": forces_of(prediction),
+        "forces": found,
         "band": "band" in answer,
         "error": _finite(error.get("value")),
         "against": error.get("against", ""),
@@ -191,18 +195,6 @@ def released_answer(motion: ReleasedMotion) -> dict[str, Any]:
     state = motion.basis.get("state", "")
     title = motion.reason or f"{state}; {motion.basis['assumption']}"
     return {"title": title, "rows": {name: _finite(motion.values.get(name)) for name in TABLE}}
-
-
-def forces_of(prediction: Prediction) -> list[dict[str, Any]]:
-    """Forces on a robot in steady swimming, N, each with its point of attack on the robot.
-
-    Weight less buoyancy is vertical, where masses are known.
-    """
-    found = axial_forces_of(prediction)
-    weight = prediction.robot.derived().get("submerged_weight")
-    if weight is not None:
-        found.append({"name": "weight less buoyancy", "at": "body", "axis": "z", "value": -weight.value})
-    return found
 
 
 def axial_forces_of(prediction: Prediction) -> list[dict[str, Any]]:

@@ -185,14 +185,10 @@ def _friction_tables(found: Calibrated) -> list[str]:
         }
         lines += ["", "[[friction]]", *(f"{name} = {_length(value)}" for name, value in sizes.items())]
         effective = max(item.value, 0.0)
-        lines.append(f'effective = "{_number(effective)} N m s/rad"' + _comment(item))
+        words = [f"comes out as {item.value:.4g}"] if item.value < 0 else []
+        words += [f"{item.low:.6g} to {item.high:.6g}"] if math.isfinite(item.low) else []
+        lines.append(f'effective = "{_number(effective)} N m s/rad"' + (f"  # {', '.join(words)}" if words else ""))
     return lines
-
-
-def _comment(item: Estimate) -> str:
-    words = [f"comes out as {item.value:.4g}"] if item.value < 0 else []
-    words += [f"{item.low:.6g} to {item.high:.6g}"] if math.isfinite(item.low) else []
-    return f"  # {', '.join(words)}" if words else ""
 
 
 _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")

@@ -81,7 +81,12 @@ _LARGEST_SVG = 2_000_000
 
 def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
     """Write `figures/` (PNG and SVG), a self-contained `report.html`, and the files of `write_tables`."""
-    pictures = _pictures(dataset)
+    ranking = ranking_of(dataset)
+    robot = robot_picture(dataset, ranking)
+    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
+    laid_down = release_picture(dataset, ranking)
+    drawn = {"robot": robot, "laid-down": laid_down}
+    pictures = {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
     steps = len(pictures) + 1
     embedded = draw_pictures(
         pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
@@ -106,16 +111,6 @@ def write_tables(dataset: xr.Dataset, folder: Path) -> tuple[list[dict[str, Any]
     write_text(folder / "claims.json", text + "\n", replace="any")
     write_text(folder / "ranking.csv", _ranking_rows(ranking_of(dataset)), replace="any")
     return claims, predictions
-
-
-def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
-    """The ranking first, then the robot and the figures of the study."""
-    ranking = ranking_of(dataset)
-    robot = robot_picture(dataset, ranking)
-    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
-    laid_down = release_picture(dataset, ranking)
-    drawn = {"robot": robot, "laid-down": laid_down}
-    return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
 
 
 def _ranking_rows(ranking: StudyRanking) -> str:

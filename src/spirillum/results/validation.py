@@ -50,19 +50,14 @@ def validate(
     claim = {"mark": "validated.json", "content": mark, "what": "validation", "results": _RESULTS}
     with results_folder(output, claim=claim) as folder:
         found = Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen), str(output))
-        _write_report(found, folder)
+        pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
+        embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
+        text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+        write_text(folder / "validation.json", text + "\n", replace="any")
+        cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
+        text = page("validation.html.jinja", cases=cases, header=HEADER, left=len(found.outside))
+        write_text(folder / "report.html", text, replace="any")
     return found
-
-
-def _write_report(found: Validation, folder: Path) -> None:
-    """Write `figures/`, `validation.json` and a self-contained `report.html`."""
-    pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
-    embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
-    text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(folder / "validation.json", text + "\n", replace="any")
-    cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
-    text = page("validation.html.jinja", cases=cases, header=HEADER, left=len(found.outside))
-    write_text(folder / "report.html", text, replace="any")
 
 
 HEADER = ("Row", "Quantity", "Published", "Ours", "Difference", "Stated error", "Ours under assumptions", "Covered by")

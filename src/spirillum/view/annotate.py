@@ -74,7 +74,9 @@ class Annotator:
         body = robot.body
         self._period = period
         self._half, self._radius = 0.5 * body.length, 0.5 * body.diameter
-        self._outline = _outline_of(robot)
+        x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 24))
+        edge = np.column_stack([x, radius, np.zeros_like(x)])
+        self._outline = np.concatenate([edge, edge[::-1] * [1.0, -1.0, 1.0]])
         self._wire = np.asarray(tail_line(robot, fineness=0.6).points)
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
@@ -200,13 +202,6 @@ def _lines_of(words: tuple[str, ...], width: Callable[[str], int], room: float) 
         elif width(word) <= room:
             lines.append(word)
     return lines
-
-
-def _outline_of(robot: Robot) -> Samples:
-    """The body's outline in the plane of its axis across the line of sight, (k, 3)."""
-    x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 24))
-    edge = np.column_stack([x, radius, np.zeros_like(x)])
-    return np.concatenate([edge, edge[::-1] * [1.0, -1.0, 1.0]])
 
 
 def _turned(points: Samples, angle: float) -> Samples:

@@ -45,7 +45,7 @@ from spirillum.virtual.artifacts import (
 )
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, motion_of_trial
-from spirillum.virtual.optics import Tank, VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
+from spirillum.virtual.optics import VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
@@ -312,7 +312,9 @@ def render(
     }
     if robot_file != robot.name:
         texts["robot"] = robot_text(robot)
-    painter = _painter_of(robot, tank, lens, troubles, seed)
+    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
+    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
+    painter = Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
     frames = FrameEncoder(
         painter, disturbances, trajectory, camera.exposure, ViewArtifacts(troubles, seed, camera.size)
     )
@@ -329,13 +331,6 @@ def render(
         _write_frames(writer, frames, (kept, counted), camera.fps, on_progress)
         on_progress("render: writing", len(kept), len(kept))
     return written
-
-
-def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles, seed: int) -> Painter:
-    """Painter of the robot, with uneven stripes and a cover of glass among the artifacts."""
-    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
-    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
-    return Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
 
 
 def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:

@@ -159,9 +159,14 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
     the error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
     """
     with styled():
+        rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
+        if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
+            driven = f"tail at {rates[0]:.4g} Hz"
+        else:
+            driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: models side by side",
-            _conditions(comparison),
+            f"{driven} · friction model '{comparison.friction}' · computed, no measured data",
             width=PAGE,
             heights=[_LINE_HEIGHT * len(comparison.models) + 0.1] * 2,
             columns=2,
@@ -182,16 +187,6 @@ def _label(comparison: ModelComparison, name: str) -> str:
     """A model's name, with a star if its result contains calibration factors."""
     answer = comparison.predictions.get(name)
     return f"{name}*" if answer is not None and answer.calibrated else name
-
-
-def _conditions(comparison: ModelComparison) -> str:
-    """Tail rate where all models share one, else what drives them; friction."""
-    rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
-    if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
-        driven = f"tail at {rates[0]:.4g} Hz"
-    else:
-        driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
-    return f"{driven} · friction model '{comparison.friction}' · computed, no measured data"
 
 
 def _notes(comparison: ModelComparison) -> list[str]:
@@ -300,7 +295,10 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes = sheet.panels[0, 0]
         scale = UnitPrefix.of(speeds, "m/s")
         _draw_waterfall(axes, speeds / scale.factor)
-        axes.set_yticks(range(len(effects)), [_effect_label(row, effect.name) for row, effect in enumerate(effects)])
+        axes.set_yticks(
+            range(len(effects)),
+            [effect.name if row == 0 else f"+ {effect.name}" for row, effect in enumerate(effects)],
+        )
         axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
@@ -316,10 +314,6 @@ def _why_no_trial(comparison: ModelComparison) -> str:
 
 
 _TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
-
-
-def _effect_label(row: int, name: str) -> str:
-    return name if row == 0 else f"+ {name}"
 
 
 def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:

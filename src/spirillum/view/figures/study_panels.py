@@ -107,7 +107,9 @@ class StudyView:
     @property
     def upper_bound(self) -> bool:
         """Whether rates and speeds under the robots' own drive are upper bounds: a motor without contact friction."""
-        return self.motor_driven and self.friction_unset
+        return self.motor_driven and all(
+            (robot.get("friction") or {}).get("effective") is None for robot in self.robots
+        )
 
     @property
     def shaded(self) -> bool:
@@ -135,11 +137,6 @@ class StudyView:
         return "forward_velocity_settled" in self.whole and bool(
             np.isfinite(self.whole["forward_velocity_settled"]).any()
         )
-
-    @cached_property
-    def friction_unset(self) -> bool:
-        """Whether reading `rotor` holds the rotor's own B_m alone."""
-        return all((robot.get("friction") or {}).get("effective") is None for robot in self.robots)
 
     @cached_property
     def own_drive_readings(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.view.scene3d.scene import DrawnRobot, Scene
+    from spirillum.view.scene3d.scene import DrawnRobot
 
 
 _SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
@@ -246,7 +246,11 @@ class _Shots:
         stamp = Stamp(self._size, times, speed)
         with Scene(self._solids, self._size, glass=self._glass, rows=self._rows, quick=True) as scene:
             if self._glass is None:
-                self._add_grid(scene)
+                corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
+                path = self._poses.position
+                scene.add_grid(
+                    self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0)
+                )
             for time in times:
                 pose = self._poses.at(float(time))
                 scene.place(pose)
@@ -261,11 +265,6 @@ class _Shots:
         if not self._follows:
             return self._camera
         return self._camera.moved((pose.position - first.position) * self._free)
-
-    def _add_grid(self, scene: Scene) -> None:
-        corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
-        path = self._poses.position
-        scene.add_grid(self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0))
 
 
 def _channel_centre(dataset: xr.Dataset) -> float | None:

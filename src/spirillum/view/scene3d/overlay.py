@@ -61,7 +61,9 @@ def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, l
         )
         _draw_bar(axes, bar, unit, size)
         _draw_axes(axes, camera, unit, size)
-        return _rendered(figure)
+        canvas: Any = figure.canvas
+        canvas.draw()
+        return np.array(canvas.buffer_rgba())
 
 
 def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -132,12 +134,6 @@ def _canvas(size: tuple[int, int]) -> tuple[Figure, Axes, float]:
     axes.set_ylim(size[1], 0.0)
     axes.set_axis_off()
     return figure, axes, min(size[1] / _REFERENCE, size[0] / _REFERENCE)
-
-
-def _rendered(figure: Figure) -> np.ndarray:
-    canvas: Any = figure.canvas
-    canvas.draw()
-    return np.array(canvas.buffer_rgba())
 
 
 def _draw_bar(axes: Axes, bar: Bar, unit: float, size: tuple[int, int]) -> None:
