@@ -25,9 +25,9 @@ from spirillum.cli.shared_options import (
     NotedCommand,
     Picture,
     Settings,
+    choices,
     complete_auto_models,
     complete_resistance_models,
-    complete_schemas,
 )
 from spirillum.cli.view_commands import film, flow, page, show
 
@@ -74,10 +74,6 @@ def _root(
     ROBOT is a preset (`biorob2012-wide`, `biorob2012-narrow`, `ecoli`, `magnetic-helix`) or a TOML file
     (`spirillum robot new`).
     """
-
-
-_RELEASED = ("duration", "roughness", "in_tube")
-"""Arguments of `predict` for the motions after release."""
 
 
 @from_function(
@@ -227,7 +223,12 @@ def study(
 
 
 def schema(
-    name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study, calibration or setup.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=choices("calibration", "robot", "setup", "study"), help="robot, study, calibration or setup."
+        ),
+    ],
 ) -> None:
     """Print the JSON schema of a file: robot, study, calibration or setup.
 

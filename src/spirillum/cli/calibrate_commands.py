@@ -12,7 +12,7 @@ import typer
 from spirillum.calibration.methods import METHODS
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import loaded_robot, overrides_from, pairs_of, refuse_conflicts
-from spirillum.cli.shared_options import Json, Settings, complete_robots, starting
+from spirillum.cli.shared_options import Json, Settings, choices, complete_robots
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,10 +26,6 @@ _Robots = Annotated[
 ]
 
 
-def _complete_methods(incomplete: str) -> list[str]:
-    return starting(METHODS, incomplete)
-
-
 _SAMPLER = dict.fromkeys(
     (f"sampling.{name}" for name in ("ensembles", "walkers", "warm_up", "steps", "kept")), "of the sampler, in Python"
 )
@@ -39,7 +35,7 @@ _SAMPLING = {"sampling": ("spirillum.calibration.posterior:Sampling",)}
 @from_function(
     "spirillum.results.calibration:calibrate",
     without={**_SAMPLER, "robots": "the argument"},
-    complete={"method": _complete_methods},
+    complete={"method": choices(*METHODS)},
     robot=None,
     tables=_SAMPLING,
 )

@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, TEXTS, Json, starting
+from spirillum.cli.shared_options import PANELS, TEXTS, Json, RunMovie, RunPlot, choices, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 _LAB = PANELS["lab"]
-_PICTURES = "Pictures"
 _EYES = ("model", "tracker")
 
 
@@ -42,10 +41,6 @@ def _complete_laws(incomplete: str) -> list[str]:
     from spirillum.controllers.steering import Law
 
     return starting(get_args(Law), incomplete)
-
-
-def _complete_eyes(incomplete: str) -> list[str]:
-    return starting(_EYES, incomplete)
 
 
 @from_function(
@@ -92,7 +87,7 @@ def control(
     seen_by: Annotated[
         str,
         typer.Option(
-            autocompletion=_complete_eyes,
+            autocompletion=choices(*_EYES),
             help="model (the camera of the lab) or tracker (rendered frames, tracked).",
             rich_help_panel=_LAB,
         ),
@@ -107,16 +102,8 @@ def control(
     ] = None,
     model: Annotated[str, typer.Option(help="Hydrodynamic model: tube, slender, rft; or auto.")] = "auto",
     roughness: Annotated[str | None, typer.Option(metavar="LENGTH", help=TEXTS["roughness"])] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
-    ] = None,
-    movie: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
-        ),
-    ] = None,
+    plot: RunPlot = None,
+    movie: RunMovie = None,
     json: Json = False,
 ) -> None:
     """Control a robot in a closed loop: late and noisy camera, on/off remote, flow, unknown friction; and score it.

@@ -102,11 +102,7 @@ _V = TypeVar("_V")
 
 
 def given_options(context: typer.Context, *parameters: str) -> list[str]:
-    """Options that were typed, also those with the value that they have otherwise.
-
-    Returns:
-        The options as they are typed, such as ``--volume-resolution``, in the order of `parameters`.
-    """
+    """Options that were typed, in the order of `parameters`, also those with the value that they have otherwise."""
     options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
     return [
         options[name]
@@ -140,14 +136,7 @@ def each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
 def loaded_robot(
     robot: str, settings: list[str] | None, calibration: Path | None = None, posterior: Path | None = None
 ) -> Robot:
-    """The robot with its fields set.
-
-    Args:
-        robot: a preset's name or a robot file.
-        settings: the options `--set`.
-        calibration: calibration file that will be applied to the robot; None without one.
-        posterior: posterior that will be applied to it; None without one.
-    """
+    """The robot with its fields set, none of which may be one that calibration or posterior replace."""
     from spirillum.robot.load import load
 
     overrides = overrides_from(settings)

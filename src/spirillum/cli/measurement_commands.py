@@ -16,8 +16,8 @@ from spirillum.cli.shared_options import (
     Json,
     NotedCommand,
     Settings,
+    choices,
     optional_robot,
-    starting,
 )
 from spirillum.cli.wrapping import wrapped
 
@@ -94,14 +94,10 @@ def measure(
         raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
 
 
-def _complete_paces(incomplete: str) -> list[str]:
-    return starting(("fast", "real"), incomplete)
-
-
 @from_function(
     "spirillum.live.session:track",
     without={"overrides": "--set", "on_observation": "the terminal or --udp"},
-    complete={"pace": _complete_paces},
+    complete={"pace": choices("fast", "real")},
     robot=None,
 )
 def track(
@@ -169,15 +165,11 @@ def _size(word: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def _complete_presets(incomplete: str) -> list[str]:
-    return starting(("clean", "degraded"), incomplete)
-
-
 _Preset = Annotated[
     str,
     typer.Option(
         "--preset",
-        autocompletion=_complete_presets,
+        autocompletion=choices("clean", "degraded"),
         help="clean, or degraded: all disturbances but bubbles and hand.",
         rich_help_panel=DISTURBANCES_PANEL,
     ),

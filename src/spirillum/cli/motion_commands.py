@@ -14,10 +14,13 @@ from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
+    PICTURES_PANEL,
     START_PANEL,
     TIMING_PANEL,
     Json,
     Output,
+    RunMovie,
+    RunPlot,
     complete_auto_models,
     complete_models,
 )
@@ -26,8 +29,6 @@ from spirillum.notes import note_attributes, notes_in
 if TYPE_CHECKING:
     import xarray as xr
 
-
-_PICTURES = "Pictures"
 
 _FullModel = Annotated[
     str,
@@ -74,27 +75,19 @@ def simulate(
             rich_help_panel=START_PANEL,
         ),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
-    ] = None,
+    plot: RunPlot = None,
     panels: Annotated[
         str | None,
-        typer.Option(help="With --plot: main (speed and gap) or all; else main.", rich_help_panel=_PICTURES),
+        typer.Option(help="With --plot: main (speed and gap) or all; else main.", rich_help_panel=PICTURES_PANEL),
     ] = None,
     column: Annotated[
         str | None,
         typer.Option(
             help="With --plot: its width, single or double, as the columns of a page; else double.",
-            rich_help_panel=_PICTURES,
+            rich_help_panel=PICTURES_PANEL,
         ),
     ] = None,
-    movie: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
-        ),
-    ] = None,
+    movie: RunMovie = None,
     json: Json = False,
 ) -> None:
     """Simulate swimming from rest: six degrees of freedom, weight, floor, motor and remote; or two (`--motion held`).

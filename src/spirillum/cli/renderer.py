@@ -213,10 +213,7 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
 def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str | None]:
     """A function that draws an answer into a file, which is checked now; it returns the file's name, or None.
 
-    Args:
-        path: of the picture; None without one.
-        example: of a file's name, for the sentence of an error.
-        figure: function that makes the figure of an answer, `module:name`.
+    `figure` is the function `module:name` that makes the figure, `example` a file's name for the sentence of an error.
     """
     from spirillum.files import PICTURES, output_target
 

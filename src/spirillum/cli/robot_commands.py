@@ -14,6 +14,7 @@ from spirillum.cli.shared_options import (
     NotedCommand,
     RobotArgument,
     Settings,
+    choices,
     complete_presets,
     complete_robots,
     starting,
@@ -117,10 +118,6 @@ def prepare(
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)
 
 
-def _complete_units(incomplete: str) -> list[str]:
-    return starting(("m", "mm", "um"), incomplete)
-
-
 @from_function(
     "spirillum.exports.write:export",
     without={
@@ -130,7 +127,7 @@ def _complete_units(incomplete: str) -> list[str]:
             "a unit is held at a gap and pitch, with a flow as its input",
         ),
     },
-    complete={"unit": _complete_units},
+    complete={"unit": choices("m", "mm", "um")},
     robot=Annotated[
         str,
         typer.Argument(

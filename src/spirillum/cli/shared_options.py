@@ -19,11 +19,17 @@ PLACE_PANEL = "Pose in the channel (model tube)"
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
+PICTURES_PANEL = "Pictures"
 
 
 def starting(words: Iterable[str], incomplete: str) -> list[str]:
     """Words that begin with what is typed."""
     return [word for word in words if word.startswith(incomplete)]
+
+
+def choices(*words: str) -> Callable[[str], list[str]]:
+    """Completion of one of some words."""
+    return lambda incomplete: starting(words, incomplete)
 
 
 def complete_presets(incomplete: str) -> list[str]:
@@ -59,66 +65,18 @@ def complete_resistance_models(incomplete: str) -> list[str]:
     return starting(sorted(MODELS), incomplete)
 
 
-def complete_parts(incomplete: str) -> list[str]:
-    """Parts of a robot."""
-    return starting(("body", "both", "coupling", "robot", "rotor", "tail"), incomplete)
-
-
-def complete_planes(incomplete: str) -> list[str]:
-    """Planes through a robot."""
-    return starting(("xy", "xz", "yz"), incomplete)
-
-
-def complete_frames(incomplete: str) -> list[str]:
-    """Frames of a flow."""
-    return starting(("body", "lab"), incomplete)
-
-
-def complete_schemas(incomplete: str) -> list[str]:
-    """Names of schemas."""
-    return starting(("calibration", "robot", "setup", "study"), incomplete)
-
-
-def _complete_accuracies(incomplete: str) -> list[str]:
-    return starting(("high", "standard"), incomplete)
-
-
-def _complete_ends(incomplete: str) -> list[str]:
-    return starting(("closed", "open"), incomplete)
-
-
-def _complete_motions(incomplete: str) -> list[str]:
-    return starting(("free", "held"), incomplete)
-
-
-def _complete_views(incomplete: str) -> list[str]:
-    return starting(("side", "top"), incomplete)
-
-
-def _complete_directions(incomplete: str) -> list[str]:
-    return starting(("left", "right"), incomplete)
-
-
-def _complete_friction(incomplete: str) -> list[str]:
-    return starting(("body", "none", "paper", "rotor"), incomplete)
-
-
-def complete_answers(incomplete: str) -> list[str]:
-    """Motions of a robot in its tube that can be fitted."""
-    return starting(("held", "trial"), incomplete)
-
-
+complete_parts = choices("body", "both", "coupling", "robot", "rotor", "tail")
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
-    "answer": complete_answers,
-    "accuracy": _complete_accuracies,
-    "ends": _complete_ends,
-    "friction": _complete_friction,
+    "answer": choices("held", "trial"),
+    "accuracy": choices("high", "standard"),
+    "ends": choices("closed", "open"),
+    "friction": choices("body", "none", "paper", "rotor"),
     "model": complete_auto_models,
     "models": complete_models,
-    "motion": _complete_motions,
+    "motion": choices("free", "held"),
     "part": complete_parts,
-    "view": _complete_views,
-    "direction": _complete_directions,
+    "view": choices("side", "top"),
+    "direction": choices("left", "right"),
 }
 """Completions of the shell, by argument or field of a table."""
 NAMES = {
@@ -211,6 +169,16 @@ Settings = Annotated[
 ]
 All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+RunPlot = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=PICTURES_PANEL),
+]
+RunMovie = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=PICTURES_PANEL
+    ),
+]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg.")

@@ -60,11 +60,6 @@ def slope_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float
     The errors are taken as a first-order autoregression: with the residuals' correlation r from frame to frame, which
     is first freed of its bias (1 + 3 r)/n, n readings tell as much as n (1 - r)/(1 + r) independent ones (Bartlett
     1946); Student's t has that many less two degrees of freedom.
-
-    Args:
-        time: of the readings, s, (n,), four or more, rising.
-        values: (n,).
-        level: confidence level.
     """
     count = time.size
     spans = time - time.mean()
@@ -86,11 +81,6 @@ def periodic_error(amplitude: float, rates: Sequence[float], span: float) -> flo
 
     A line through A sin(w t + p) over a time T has a slope of up to 6 A/T |j1(w T/2)|, with the spherical Bessel
     function j1(u) = sin(u)/u^2 - cos(u)/u; over all phases, 1/sqrt 2 of it in the root mean square.
-
-    Args:
-        amplitude: A.
-        rates: w of each angle, rad/s.
-        span: T, s.
     """
     total = 0.0
     for rate in rates:

@@ -41,15 +41,7 @@ class Flowing(BackgroundJob):
     def __init__(
         self, robot: Robot, model: str, run: Mapping[str, str], phase: float, announce: Callable[[], None]
     ) -> None:
-        """Begin.
-
-        Args:
-            robot: the robot that swims.
-            model: model by which it swims.
-            run: `gap`, `pitch`, `flow` where they are set.
-            phase: of the tail, rad.
-            announce: called from a thread when there is progress.
-        """
+        """Begin with `gap`, `pitch`, `flow` of the run where they are set; `announce` is called from a thread."""
         requested = {"robot": robot_text(robot), "model": model, "run": dict(run), "phase": phase}
         super().__init__(__name__, requested, announce)
 

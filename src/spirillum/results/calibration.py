@@ -288,13 +288,10 @@ def calibrate(  # noqa: PLR0913 - the options of the command
 def write_calibration(
     found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
 ) -> Calibrated:
-    """Write all files of a calibration, the figures last; each is whole or not there.
+    """Write all files of a calibration, the figures last, each whole or not at all; return it with their names.
 
     The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
     goes afterwards: half of an older calibration beside a new one would be believed.
-
-    Returns:
-        The calibration with the names of its files, and a warning where files of an earlier one are gone.
     """
     check_folder(folder)
     output_folder(folder)

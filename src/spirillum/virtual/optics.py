@@ -240,14 +240,7 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
 
 
 def _line_share(positions: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
-    """Share of each pixel that parallel lines cover, centred at multiples of the spacing.
-
-    Args:
-        positions: of the pixels' middles across the lines, m.
-        pixel: their sizes, m.
-        spacing: from one line to the next, m.
-        width: of a line, m.
-    """
+    """Share of each pixel that parallel lines cover, centred at multiples of the spacing; all in m."""
     low, high = (
         width * np.floor(edge / spacing + 0.5)
         + np.clip(edge - spacing * np.floor(edge / spacing + 0.5) + 0.5 * width, 0.0, width)

@@ -110,21 +110,11 @@ class Cover:
 
 
 def light_path(far: Samples, radius: float, height: float, index: float) -> tuple[Samples, Samples]:
-    """Where the floor is seen through a round cover with air inside, straight from above.
+    """How far out the floor is seen through a round cover with air inside, m, and the share of its light.
 
     A line of sight stays in a plane with the normal, where wall and air are circles, and n times its distance from the
     centre is the same in oil, glass and air (Bouguer's formula: M. Born, E. Wolf,
     Principles of Optics, 3.2). Where that exceeds the air's radius, the air mirrors it (total reflection).
-
-    Args:
-        far: distance of the line of sight from the centre over the cover's radius, 0 to 1, (n,).
-        radius: of the cover, m.
-        height: of its centre above the floor, m.
-        index: refractive index of the oil.
-
-    Returns:
-        Distance by which the floor is seen farther from the centre, m, and the share of the light that is from there;
-        the rest comes from the room; (n,) each.
     """
     inner = radius * (1.0 - _WALL)
     distance = far * radius

@@ -125,19 +125,7 @@ def steady_trajectory(
     body_angle: float = 0.0,
     tail_phase: float = 0.0,
 ) -> TrialTrajectory:
-    """Swimming at constant rates along the channel.
-
-    Args:
-        duration: from the first frame to the last, s.
-        forward_velocity: along x, m/s.
-        body_rotation_rate: about +x, rad/s.
-        tail_rotation_rate: about +x in the lab, rad/s.
-        position: of the body's mid-length at the first frame, m, (3,).
-        heading: angle of the robot's axis to the channel, rad.
-        wobble: amplitude of a transverse oscillation at the tail's rate, m.
-        body_angle: of the body at the first frame, rad.
-        tail_phase: of the tail at the first frame, rad.
-    """
+    """Swimming at constant rates along the channel; `wobble` is the amplitude of a transverse oscillation, m."""
     turns = abs(tail_rotation_rate) * duration / (2.0 * np.pi)
     time = np.linspace(0.0, duration, 2 + (int(_SAMPLES_PER_TURN * turns) if wobble > 0 else 0))
     path = position + np.outer(time, [forward_velocity, 0.0, 0.0])

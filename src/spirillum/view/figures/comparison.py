@@ -269,11 +269,7 @@ _ROOM_OF_AXIS = 3.0
 
 
 def effects_figure(comparison: ModelComparison) -> Figure:
-    """A line for each effect, from the speed before it to the speed with it, with the factor beside it.
-
-    Raises:
-        InputError: if the effects are not known, for want of a model among those that are compared.
-    """
+    """A line for each effect, from the speed before it to the speed with it, with the factor beside it."""
     effects = comparison.effects
     if not effects:
         raise InputError(

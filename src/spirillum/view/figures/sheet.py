@@ -60,21 +60,7 @@ def add_letters(panels: Iterable[Axes]) -> None:
 class Sheet:
     """A figure with a grid of panels of given height below title, subtitle and legend, notes at the foot.
 
-    Args:
-        title: bold, in the first line.
-        subtitle: below the title, wrapped to the width.
-        width: width of the figure, inches; see `width_of`.
-        heights: height of the panels of each row, inches.
-        columns: number of columns.
-        notes: sentences at the foot, each wrapped to the width; a formula in them must not contain a space.
-        legend: entries between subtitle and panels.
-        legend_below: entries between panels and notes.
-        sharex: which panels share their horizontal axes, as in `Figure.subplots`.
-        sharey: which panels share their vertical axes, as in `Figure.subplots`.
-
-    Attributes:
-        figure: the figure.
-        panels: the panels, (rows, columns).
+    Widths and heights are in inches; a formula in a note must not contain a space.
     """
 
     def __init__(
