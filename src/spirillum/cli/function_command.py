@@ -70,12 +70,10 @@ GIVEN_OTHERWISE = ("robot", "progress", "tell")
 class Declaration(NamedTuple):
     """One argument of a function, or one field of its options tables."""
 
-    path: str
-    """`argument`, or `argument.field` of a table."""
+    path: str  #: `argument`, or `argument.field` of a table.
     annotation: str
     default: Any
-    text: str
-    """Of the docstring."""
+    text: str  #: Of the docstring.
 
     @property
     def name(self) -> str:
@@ -104,11 +102,9 @@ class FunctionSource(NamedTuple):
 
     body: Callable[..., None]
     target: str
-    without: Mapping[str, str]
-    """Arguments and fields that are no option, with the reason."""
+    without: Mapping[str, str]  #: Arguments and fields that are no option, with the reason.
     completions: Mapping[str, Any]
-    robot: Any
-    """Annotation of the argument that names the robot; None for a function without one."""
+    robot: Any  #: Annotation of the argument that names the robot; None for a function without one.
     tables: Mapping[str, Sequence[str]] = {}
     """Arguments that are mappings, with the functions or classes (`module:name`) that declare their fields."""
 
@@ -128,8 +124,7 @@ class Request:
     """A call of the public function of a command, with the arguments that were typed."""
 
     source: FunctionSource
-    typed: dict[str, Any]
-    """Argument or `argument.field` to its value; what was not typed is left out."""
+    typed: dict[str, Any]  #: Argument or `argument.field` to its value; what was not typed is left out.
     named_robot: str | None = None
     settings: list[str] | None = None
 
@@ -268,8 +263,7 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
 
 
-_IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")
-"""Tables of functions whose fields no file has."""
+_IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")  # tables of functions whose fields no file has
 
 
 def _with_options(error: InputError, items: Iterable[Declaration]) -> InputError:

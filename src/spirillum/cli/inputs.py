@@ -20,10 +20,8 @@ if TYPE_CHECKING:
 class Rule(NamedTuple):
     """Options that a request in some state has no use for."""
 
-    state: str
-    """States of the request, such as `run`: its command defines which of them hold."""
-    options: tuple[str, ...]
-    """Names of the command's parameters."""
+    state: str  #: States of the request, such as `run`: its command defines which of them hold.
+    options: tuple[str, ...]  #: Names of the command's parameters.
     conflict: str
     """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
 

@@ -71,8 +71,7 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
-_START = "released at its placement and controlled from time 0, without the waiting of a trial"
-"""How a run begins."""
+_START = "released at its placement and controlled from time 0, without the waiting of a trial"  # how a run begins
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
 _SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
 _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
@@ -122,8 +121,7 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
 
 
 _MOST_SEEDS = 10_000
-_EVENT = 3000.0
-"""Memory of an event of a run with what the robot did until then, bytes."""
+_EVENT = 3000.0  # memory of an event of a run with what the robot did until then, bytes
 _LAST_SEED = 2**31 - 1
 _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
 

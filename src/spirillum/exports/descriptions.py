@@ -39,12 +39,9 @@ _TURNING = (
 class _Resistance(NamedTuple):
     """The resistance of both links in unbounded fluid."""
 
-    matrix: Samples
-    """(12, 12)."""
-    error: Any
-    """Stated error of the model."""
-    references: list[str]
-    """Sources of the model."""
+    matrix: Samples  # (12, 12)
+    error: Any  # stated error of the model
+    references: list[str]  # sources of the model
     warnings: list[Note]
 
 
@@ -166,8 +163,7 @@ FLUID_WARNING = Note(
     "MuJoCo's own fluid gives a helix no thrust and must stay off; apply the forces of the resistance matrix at "
     "each step",
 )
-_LEAST = 1e-15
-"""MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers."""
+_LEAST = 1e-15  # MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers
 _MOST_TRIANGLES = 200_000
 _STEP = 1e-4
 

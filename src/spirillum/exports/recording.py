@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 
 Json = dict[str, Any]
-_LATEST = 1e9
-"""Latest time of a recording, s; seconds have 32 bits."""
+_LATEST = 1e9  # latest time of a recording, s; seconds have 32 bits
 
 
 def _object(**fields: Json) -> Json:
@@ -171,8 +170,7 @@ _INFORMATION = 2
 _FINENESS = 0.5
 _QUALITY = 85
 _SLOWEST, _FASTEST = 1e-6, 1e6
-_LONGEST_TUBE = 2.0
-"""Length of a tube of unspecified length, over that of the robot's path and the robot together."""
+_LONGEST_TUBE = 2.0  # length of a tube of unspecified length, over that of the robot's path and the robot together
 
 Message = tuple[str, str, float, dict[str, Any]]
 """Topic, name of the schema, time in s, content."""

@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """glTF's y points up, where ours is z."""
-_CREASE = np.deg2rad(40.0)
-"""Angle between triangles above which an edge stays sharp, rad."""
+_CREASE = np.deg2rad(40.0)  # angle between triangles above which an edge stays sharp, rad
 _METAL = {"shaft": 0.9, "coupling": 0.9, "stub": 0.9, "arm": 0.9, "tail": 0.9}
 
 
@@ -116,10 +115,8 @@ STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
 class ExportFile(NamedTuple):
     """One file."""
 
-    data: bytes
-    """Its bytes."""
-    holds: str
-    """Description of the content."""
+    data: bytes  #: Its bytes.
+    holds: str  #: Description of the content.
 
 
 def check_masses(robot: Robot, target: Path) -> None:
@@ -197,10 +194,8 @@ _DESCRIPTIONS = (".urdf", ".mjcf", ".xml")
 class Written:
     """One file that was written."""
 
-    path: Path
-    """Path of the file."""
-    holds: str
-    """Description of the content."""
+    path: Path  #: Path of the file.
+    holds: str  #: Description of the content.
 
 
 @dataclass(frozen=True, repr=False)

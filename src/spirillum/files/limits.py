@@ -45,10 +45,8 @@ MOST_POINTS = 2000
 
 _LONGEST_NAME = 100
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
-_FORMULAS = ("=", "+", "-", "@")
-"""With what a cell begins that a spreadsheet takes for a formula."""
-_DEVICES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
-"""Names that are devices on Windows."""
+_FORMULAS = ("=", "+", "-", "@")  # with what a cell begins that a spreadsheet takes for a formula
+_DEVICES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # names that are devices on Windows
 
 
 def is_text(name: str) -> bool:
@@ -79,10 +77,8 @@ def checked_path(path: str | os.PathLike[str], what: str) -> Path:
 
 
 def file_name(name: str, taken: Collection[str] = ()) -> str:
-    """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count.
-
-    Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
-    """
+    """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count."""
+    # Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
     safe = _NOT_IN_NAMES.sub("-", name).lstrip(".-")[:_LONGEST_NAME].rstrip(".") or "unnamed"
     if _DEVICES.fullmatch(safe):
         safe = f"{safe}-"

@@ -99,11 +99,9 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def private_folder(parent: Path) -> Iterator[Path]:
-    """A new hidden folder that only this user can enter, removed when the block ends.
-
-    Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
-    that what was made in it takes its place at once.
-    """
+    """A new hidden folder that only this user can enter, removed when the block ends."""
+    # Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
+    # that what was made in it takes its place at once.
     sweep(parent)
     for _ in range(_TRIES):  # another run may take it for a leftover before it is locked
         folder = Path(tempfile.mkdtemp(prefix=LEFTOVER, dir=parent))

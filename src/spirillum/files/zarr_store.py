@@ -24,10 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "async.concurrency": 1}
-_LEVEL = 1
-"""Of compression: faster than a disk, and floats gain nothing from more."""
-_CHECKSUM = 4
-"""Bytes of the checksum at the end of a chunk."""
+_LEVEL = 1  # of compression: faster than a disk, and floats gain nothing from more
+_CHECKSUM = 4  # bytes of the checksum at the end of a chunk
 
 Place = Sequence[tuple[int, int]]
 """First index, and the one behind the last, along each dimension."""
@@ -39,8 +37,7 @@ class Stored(NamedTuple):
     dimensions: tuple[str, ...]
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
-    dtype: str
-    """`float64`, `int8`, `int32` or `str`."""
+    dtype: str  #: `float64`, `int8`, `int32` or `str`.
     attributes: Mapping[str, Any]
 
 

@@ -84,10 +84,8 @@ def _cell(path: Path, number: int, name: str, value: object) -> str:
 
 _LARGEST_NUMBER = 1e12
 _WORD = re.compile(r"[^\W_]+")
-_ALIKE = 0.8
-"""Likeness of two words, from 0 to 1, from which on one may be a misspelling of the other."""
-_NOTES = ("note", "comment", "remark")
-"""Prefix of the columns that are the user's own."""
+_ALIKE = 0.8  # likeness of two words, from 0 to 1, from which on one may be a misspelling of the other
+_NOTES = ("note", "comment", "remark")  # prefix of the columns that are the user's own
 
 
 @dataclass(frozen=True)
@@ -140,10 +138,8 @@ class Table:
 
     path: Path
     headers: Sequence[Sequence[str]]
-    below: Sequence[tuple[int, Sequence[str]]]
-    """Cells of each row below the headers, with its line number."""
-    comments: Sequence[str] = ()
-    """Comment lines, each with its `#`."""
+    below: Sequence[tuple[int, Sequence[str]]]  #: Cells of each row below the headers, with its line number.
+    comments: Sequence[str] = ()  #: Comment lines, each with its `#`.
 
     @property
     def header(self) -> Sequence[str]:
@@ -220,10 +216,8 @@ def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool
 
 
 def check_known(table: Table, allowed: Sequence[str]) -> None:
-    """Refuse columns that may be meant as one of the allowed ones, and names that stand twice.
-
-    Other columns are free: those without a word that an allowed name has, or nearly has.
-    """
+    """Refuse columns that may be meant as one of the allowed ones, and names that stand twice."""
+    # Other columns are free: those without a word that an allowed name has, or nearly has.
     words = {word for name in allowed for word in _words(name)} - {"s"}
     for name in table.header:
         if name in allowed:

@@ -23,8 +23,7 @@ _TRIES = 3
 """How often a virtual remote is polled before it counts as gone: a busy machine may delay it, but not the robot, whose
 time stands still.
 """
-_LEARN = 3.0
-"""Time from which the tracker learns the robot's look, s."""
+_LEARN = 3.0  # time from which the tracker learns the robot's look, s
 
 
 class Bench(Senses):

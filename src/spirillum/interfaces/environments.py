@@ -18,10 +18,8 @@ from spirillum.errors import InputError, check_choice, check_range, clipped
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, TaskEnvironment
 from spirillum.scalars import is_whole
 
-_LEAD = 0.17
-"""Look-ahead of `lead`, s: the usual latency of camera and remote together."""
-_GAIN = 1.0
-"""Of `integral`: change of the duty per second for a relative error of 1."""
+_LEAD = 0.17  # look-ahead of `lead`, s: the usual latency of camera and remote together
+_GAIN = 1.0  # of `integral`: change of the duty per second for a relative error of 1
 
 Rule = Callable[[np.ndarray, TaskEnvironment], np.ndarray]
 
@@ -58,14 +56,10 @@ RULES: Mapping[type[TaskEnvironment], Mapping[str, Rule]] = {
 class Scored(NamedTuple):
     """Scores of many episodes."""
 
-    scores: np.ndarray
-    """At the end of each."""
-    mean: float
-    """Their mean."""
-    margin: float
-    """Half the width of its 95 % interval."""
-    reward: float
-    """Mean of the rewards of an episode, summed."""
+    scores: np.ndarray  #: At the end of each.
+    mean: float  #: Their mean.
+    margin: float  #: Half the width of its 95 % interval.
+    reward: float  #: Mean of the rewards of an episode, summed.
 
 
 def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **options: Any) -> Scored:

@@ -63,8 +63,7 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: power for base, power in found.items() if power}
 
 
-_PLUMBING = ("fmi3.c", "model.h")
-"""C sources with the functions of FMI, around those of a model."""
+_PLUMBING = ("fmi3.c", "model.h")  # C sources with the functions of FMI, around those of a model
 _HEADERS = ("core.h", "drive.h")
 _MOTION = (
     "stiff_steps",
@@ -99,34 +98,23 @@ class FmuVariable(NamedTuple):
     name: str
     meaning: str
     unit: str
-    value: float | None = None
-    """Start of a parameter; None: an output, whose place is its value reference."""
+    value: float | None = None  #: Start of a parameter; None: an output, whose place is its value reference.
 
 
 @dataclass(frozen=True)
 class FmuModel:
     """What an FMU is made of: a robot, C sources with its equations, and its numbers."""
 
-    prediction: Prediction
-    """The robot with model and friction."""
-    motion: str
-    """How it moves, in half a sentence."""
-    duty: float
-    """Duty at first."""
-    flow: float | None
-    """Imposed mean flow at first, m/s; None: it is no input."""
-    source: str
-    """C source of the model, in this folder."""
-    equations: tuple[str, ...]
-    """Files of csrc/ with its equations, and headers."""
-    outputs: Mapping[int, FmuVariable]
-    """By their place in the C source."""
-    parameters: Mapping[int, FmuVariable]
-    """Numbers that an importer can set, by their place in the C source."""
-    defined: Mapping[str, str]
-    """Numbers of the C source by name."""
-    arrays: Mapping[str, Samples]
-    """Arrays of the C source by name."""
+    prediction: Prediction  #: The robot with model and friction.
+    motion: str  #: How it moves, in half a sentence.
+    duty: float  #: Duty at first.
+    flow: float | None  #: Imposed mean flow at first, m/s; None: it is no input.
+    source: str  #: C source of the model, in this folder.
+    equations: tuple[str, ...]  #: Files of csrc/ with its equations, and headers.
+    outputs: Mapping[int, FmuVariable]  #: By their place in the C source.
+    parameters: Mapping[int, FmuVariable]  #: Numbers that an importer can set, by their place in the C source.
+    defined: Mapping[str, str]  #: Numbers of the C source by name.
+    arrays: Mapping[str, Samples]  #: Arrays of the C source by name.
 
     @property
     def identifier(self) -> str:
@@ -357,12 +345,10 @@ def _text(root: ET.Element) -> str:
 _COMPILERS = ("cc", "gcc", "clang")
 _INSIDE = "SPIRILLUM_INSIDE"
 _OPTIONS = ("-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", f"-D{_INSIDE}")
-_LONGEST = 120.0
-"""Time after which a compiler is given up, s."""
+_LONGEST = 120.0  # time after which a compiler is given up, s
 _LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
-_NEVER = (1980, 1, 1, 0, 0, 0)
-"""Date of the files in the archive, so that the same robot gives the same bytes."""
+_NEVER = (1980, 1, 1, 0, 0, 0)  # date of the files in the archive, so that the same robot gives the same bytes
 
 
 def compiler() -> str:

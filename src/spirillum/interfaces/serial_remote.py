@@ -98,11 +98,9 @@ def _duty_of(word: str) -> float | None:
 
 _BAUD = 115_200
 _FASTEST = 100_000_000
-_PATIENCE = 0.15
-"""Time in which an answer has to come, s: three tries end before the far end's watchdog does."""
+_PATIENCE = 0.15  # time in which an answer has to come, s: three tries end before the far end's watchdog does
 _TRIES = 3
-_REPEAT = 0.1
-"""Time after which a duty that is held is sent again, s."""
+_REPEAT = 0.1  # time after which a duty that is held is sent again, s
 _LONGEST_HOLD = 86_400.0
 
 

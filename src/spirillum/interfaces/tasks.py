@@ -26,12 +26,9 @@ from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.units import KINDS, parse_option
 
 _MM = 1e3
-_LARGEST_GOAL = 1e3
-"""In m, and as a share of a speed."""
-_SEEN_OVER = 0.5
-"""Time over which the observed speed is an average, s."""
-_LATEST_PULSE = 0.9
-"""Share of an episode in which a pulse of flow may begin."""
+_LARGEST_GOAL = 1e3  # in m, and as a share of a speed
+_SEEN_OVER = 0.5  # time over which the observed speed is an average, s
+_LATEST_PULSE = 0.9  # share of an episode in which a pulse of flow may begin
 
 
 class ObservedNumber(NamedTuple):

@@ -44,18 +44,15 @@ from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
-_BETWEEN = 1.0
-"""Time between two pictures that are kept, s."""
-_TOGETHER = 5
-"""Pictures from which a background is made."""
+_BETWEEN = 1.0  # time between two pictures that are kept, s
+_TOGETHER = 5  # pictures from which a background is made
 
 
 @dataclass
 class RecentDetections:
     """What was read in the last seconds: on each frame time, x, continuous angles, and both angles as read."""
 
-    length: float
-    """Time that is kept, s."""
+    length: float  #: Time that is kept, s.
     rows: deque[tuple[float, ...]] = field(default_factory=deque)
     """Time, x, body angle, tail phase; body angle modulo its period with its error, tail phase modulo 2 pi with its."""
 
@@ -124,12 +121,9 @@ class CameraWatch:
         return (Flag("camera-moved", sentence, EVERYTHING),)
 
 
-_CHECKED = 1.0
-"""Time between two looks at the last seconds for what is odd, s."""
-_LOOKED_BACK = 10.0
-"""Time over which that looks back, s."""
-_MOST_FRAMES = 36_000
-"""Frames that the summary keeps: twenty minutes at 30 a second."""
+_CHECKED = 1.0  # time between two looks at the last seconds for what is odd, s
+_LOOKED_BACK = 10.0  # time over which that looks back, s
+_MOST_FRAMES = 36_000  # frames that the summary keeps: twenty minutes at 30 a second
 _VELOCITY, _BODY, _TAIL, _MOTOR = RATE_NAMES
 _NOT_SEEN = "the robot is not seen where it should be"
 _NOT_WHOLE = "the robot is partly out of view"

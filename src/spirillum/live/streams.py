@@ -32,35 +32,26 @@ _PROTOCOLS = {"rtsp": "rtsp,rtp,udp,tcp", "http": "http,tcp", "https": "https,tl
 """What a stream may use: its own protocol, no files and no playlists."""
 _FORMATS = "rtsp,mpegts,mpjpeg,mjpeg,matroska,webm,mov,mp4,h264,hevc,flv"
 _FASTEST = 1e4
-_SILENT = 5.0
-"""Time without a picture after which a camera or stream has stopped, s."""
+_SILENT = 5.0  # time without a picture after which a camera or stream has stopped, s
 
 
 class Arrived(NamedTuple):
     """A picture that has come."""
 
-    number: int
-    """Its number, from 0."""
-    time: float
-    """When it was taken, by the source's own clock, s from the first one."""
-    image: np.ndarray
-    """8-bit RGB, (height, width, 3)."""
-    clock: float
-    """When it came, by this computer's clock, s."""
+    number: int  #: Its number, from 0.
+    time: float  #: When it was taken, by the source's own clock, s from the first one.
+    image: np.ndarray  #: 8-bit RGB, (height, width, 3).
+    clock: float  #: When it came, by this computer's clock, s.
 
 
 @dataclass(frozen=True)
 class Source:
     """A source of pictures that was opened once, to see that it is there."""
 
-    name: str
-    """For sentences."""
-    kind: Kind
-    """`film`, `camera` or `stream`."""
-    options: Mapping[str, Any] = field(repr=False)
-    """How it is opened: see `source_of`."""
-    words: str = ""
-    """Metadata of a video, such as that it is synthetic."""
+    name: str  #: For sentences.
+    kind: Kind  #: `film`, `camera` or `stream`.
+    options: Mapping[str, Any] = field(repr=False)  #: How it is opened: see `source_of`.
+    words: str = ""  #: Metadata of a video, such as that it is synthetic.
     flags: list[Flag] = field(default_factory=list, repr=False)
     """What was odd about its pictures while they were read."""
 

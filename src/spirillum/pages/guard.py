@@ -20,10 +20,8 @@ from typing import Any
 
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-_MOST = 64
-"""Connections without a key; for another one the oldest is closed."""
-_PATIENCE = 10.0
-"""Time after which a connection without a key is closed, s."""
+_MOST = 64  # connections without a key; for another one the oldest is closed
+_PATIENCE = 10.0  # time after which a connection without a key is closed, s
 _Address = tuple[str, int]
 
 

@@ -99,10 +99,8 @@ class BackgroundJob:
 
 
 def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
-    """Run the task of standard input and report its progress.
-
-    The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
-    """
+    """Run the task of standard input and report its progress."""
+    # The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
 
     def announce(**said: Any) -> None:
         try:

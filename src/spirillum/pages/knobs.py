@@ -55,35 +55,24 @@ def refusal_of(command: Mapping[str, Any], sentence: str) -> str:
     return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})
 
 
-_LONGEST = 80
-"""Characters of a value that is typed."""
+_LONGEST = 80  # characters of a value that is typed
 
 
 @dataclass(frozen=True)
 class Knob:
     """One control of a field."""
 
-    field: str
-    """Dotted field of the robot file, or of the run (`run.gap`)."""
-    label: str
-    """Text of the value."""
-    group: str
-    """Heading of its group."""
-    unit: str = ""
-    """Unit in which it is shown; empty for a choice."""
-    low: float = 0.0
-    """Ends of its slider, in that unit; a value outside them can be typed."""
+    field: str  #: Dotted field of the robot file, or of the run (`run.gap`).
+    label: str  #: Text of the value.
+    group: str  #: Heading of its group.
+    unit: str = ""  #: Unit in which it is shown; empty for a choice.
+    low: float = 0.0  #: Ends of its slider, in that unit; a value outside them can be typed.
     high: float = 1.0
-    choices: tuple[str, ...] = ()
-    """Options of a choice."""
-    note: str = ""
-    """Description, a sentence."""
-    logarithmic: bool = False
-    """Whether its slider has equal steps of ratio."""
-    unset: str = ""
-    """Meaning of an empty field; empty: a value is required."""
-    needs: str = ""
-    """Table of the robot without which it is not shown."""
+    choices: tuple[str, ...] = ()  #: Options of a choice.
+    note: str = ""  #: Description, a sentence.
+    logarithmic: bool = False  #: Whether its slider has equal steps of ratio.
+    unset: str = ""  #: Meaning of an empty field; empty: a value is required.
+    needs: str = ""  #: Table of the robot without which it is not shown.
 
 
 KNOBS: tuple[Knob, ...] = (
@@ -141,14 +130,11 @@ _RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 class Settings:
     """Settings of one robot of the page; frozen, so that undo is a list of them."""
 
-    source: Any
-    """Preset's name, file or checked robot that it starts from."""
+    source: Any  #: Preset's name, file or checked robot that it starts from.
     overrides: Mapping[str, str] = field(default_factory=dict)
     """Fields of the robot that were changed, with their unit."""
-    run: Mapping[str, str] = field(default_factory=dict)
-    """`gap`, `pitch`, `flow` where they are set, with their unit."""
-    model: str = "auto"
-    """Requested model."""
+    run: Mapping[str, str] = field(default_factory=dict)  #: `gap`, `pitch`, `flow` where they are set, with their unit.
+    model: str = "auto"  #: Requested model.
 
     def robot(self) -> Robot:
         """The robot, checked; a size that varies along the tail is scaled as a whole."""

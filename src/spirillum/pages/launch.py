@@ -102,11 +102,9 @@ def page(
 
 
 def _is_host(host: str) -> bool:
-    """Whether it is an address as it is usually written, or can be the name of a host.
-
-    What the system alone reads as an address is neither: an empty text, ``0`` and ``<broadcast>`` would let the whole
-    network in.
-    """
+    """Whether it is an address as it is usually written, or can be the name of a host."""
+    # What the system alone reads as an address is neither: an empty text, ``0`` and ``<broadcast>`` would let the whole
+    # network in.
     with suppress(ValueError):
         ipaddress.ip_address(host)
         return True

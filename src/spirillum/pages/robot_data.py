@@ -26,22 +26,17 @@ if TYPE_CHECKING:
     from spirillum.swimming.released_motion import ReleasedMotion
 
 
-_CREASE = np.radians(40.0)
-"""Edges sharper than this stay sharp."""
+_CREASE = np.radians(40.0)  # edges sharper than this stay sharp
 _FINENESS = 0.75
-_ALONG = np.linspace(0.0, 1.0, 7)
-"""Positions along each piece of the body's outline."""
-_ALONG_POINTS = np.linspace(0.0, 1.0, 33)
-"""Along a piece through points."""
+_ALONG = np.linspace(0.0, 1.0, 7)  # positions along each piece of the body's outline
+_ALONG_POINTS = np.linspace(0.0, 1.0, 33)  # along a piece through points
 _METALS = ("shaft", "coupling", "stub", "arm", "tail")
 
 
 def shape_of(robot: Robot) -> dict[str, Any]:
-    """Meshes of body and rotor, and the tube; lengths in m.
-
-    `body` and `rotor` hold `vertices` (base64 of float32: place, normal, linear colour, metal; ten numbers each) and
-    `triangles` (base64 of uint32). The rotor is at phase 0 and turns about the body's x axis.
-    """
+    """Meshes of body and rotor, and the tube; lengths in m."""
+    # `body` and `rotor` hold `vertices` (base64 of float32: place, normal, linear colour, metal; ten numbers each) and
+    # `triangles` (base64 of uint32). The rotor is at phase 0 and turns about the body's x axis.
     robot.check_body("the page")
     pieces = robot_mesh(robot, fineness=_FINENESS)
     channel, tail = robot.channel, robot.tail
@@ -218,8 +213,7 @@ def _finite(value: Any) -> float | None:
 
 MOST = 12_000
 """Samples that are kept; beyond it every other one is dropped."""
-_DRAWN = 900
-"""Samples of a plot's past, at most."""
+_DRAWN = 900  # samples of a plot's past, at most
 
 
 class SampleRecording:

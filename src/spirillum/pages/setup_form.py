@@ -10,8 +10,7 @@ from typing import Any
 
 from spirillum.errors import InputError, clipped
 
-_LONGEST = 200
-"""Characters of a field."""
+_LONGEST = 200  # characters of a field
 
 
 @dataclass(frozen=True)
@@ -21,14 +20,11 @@ class Entry:
     field: str
     label: str
     group: str
-    example: str
-    """Placeholder of an empty field: its meaning, or an example."""
+    example: str  #: Placeholder of an empty field: its meaning, or an example.
     note: str
     choices: tuple[str, ...] = ()
-    number: bool = False
-    """Whether it is a bare number, without a unit."""
-    uncertain: bool = False
-    """Whether it has a standard uncertainty in a field of its own."""
+    number: bool = False  #: Whether it is a bare number, without a unit.
+    uncertain: bool = False  #: Whether it has a standard uncertainty in a field of its own.
 
 
 FORM: tuple[Entry, ...] = (

@@ -195,8 +195,7 @@ _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
 _FIGURES = ("observed-", "residuals", "posterior", "profiles")
 _SYNTHETIC = f"# the observations say that they are synthetic: nothing here is measured; {MARK}\n"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm", "rows")
-_HEADER = ",".join(_COLUMNS)
-"""What `predictions.csv` begins with, which other programs read and has no comments."""
+_HEADER = ",".join(_COLUMNS)  # what `predictions.csv` begins with, which other programs read and has no comments
 
 
 def earlier_results(folder: Path) -> list[Path]:
@@ -288,11 +287,9 @@ def calibrate(  # noqa: PLR0913 - the options of the command
 def write_calibration(
     found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
 ) -> Calibrated:
-    """Write all files of a calibration, the figures last, each whole or not at all; return it with their names.
-
-    The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
-    goes afterwards: half of an older calibration beside a new one would be believed.
-    """
+    """Write all files of a calibration, the figures last, each whole or not at all; return it with their names."""
+    # The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
+    # goes afterwards: half of an older calibration beside a new one would be believed.
     check_folder(folder)
     output_folder(folder)
     earlier = earlier_results(folder)

@@ -14,8 +14,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope
 from spirillum.version import own_version
 
-_NOT_FOR_USERS = ("test", "lint", "docs")
-"""Extras of those who work on the package."""
+_NOT_FOR_USERS = ("test", "lint", "docs")  # extras of those who work on the package
 _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+).*?(?:;.*\bextra == ['\"](?P<extra>[\w-]+)['\"])?$")
 
 

@@ -208,10 +208,8 @@ class _Folder:
     path: Path
     annotated: bool
     figures: bool
-    files: list[str] = field(default_factory=list)
-    """Names of the files that were written."""
-    thumbnails: dict[str, bytes] = field(default_factory=dict)
-    """JPEG of an annotated frame by the trial's name."""
+    files: list[str] = field(default_factory=list)  # names of the files that were written
+    thumbnails: dict[str, bytes] = field(default_factory=dict)  # JPEG of an annotated frame by the trial's name
 
     def check(self, asked: MeasurementRequest) -> None:
         """Look at all that will be written, before any video is measured."""

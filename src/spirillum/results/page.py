@@ -22,8 +22,7 @@ class EmbeddedPicture:
     title: str
     caption: str
     alternative: str
-    source: str
-    """The picture itself as a data URI."""
+    source: str  #: The picture itself as a data URI.
 
     @property
     def files(self) -> tuple[str, str]:

@@ -75,8 +75,7 @@ def _rebuilt(table: Mapping[str, Any]) -> Robot:
     )
 
 
-_LARGEST_SVG = 2_000_000
-"""A larger vector picture is embedded as pixels, bytes."""
+_LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 
 def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:

@@ -101,10 +101,8 @@ _NOTE = TypeAdapter(_Note)
 class _Outcome(NamedTuple):
     """What is known once all regions are there."""
 
-    warnings: str
-    """Sentences, one a line."""
-    notes: str
-    """Notes with their codes, as JSON."""
+    warnings: str  # sentences, one a line
+    notes: str  # notes with their codes, as JSON
     unanswered: int
 
 

@@ -27,16 +27,12 @@ _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), 
 _INK = (255, 255, 255)
 _TEXT, _SMALLEST_TEXT = 0.45, 0.4
 """Scale of the font in a picture 480 pixels high, and the least one that can be read."""
-_DIAL = 16.0
-"""Radius of a dial in a picture 480 pixels high, pixels."""
-_MOST_OF_HEIGHT = 0.25
-"""Largest share of a picture's height that text covers."""
-_SHIFT = 4
-"""Subpixel resolution of lines: sixteenths."""
+_DIAL = 16.0  # radius of a dial in a picture 480 pixels high, pixels
+_MOST_OF_HEIGHT = 0.25  # largest share of a picture's height that text covers
+_SHIFT = 4  # subpixel resolution of lines: sixteenths
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
-_LARGEST = 1920
-"""Longest side of an annotated frame, pixels: a larger one is reduced by a whole number."""
+_LARGEST = 1920  # longest side of an annotated frame, pixels: a larger one is reduced by a whole number
 
 
 class AnnotatedFrame(Protocol):
@@ -123,10 +119,8 @@ class Annotator:
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
     def _dials(self, picture: np.ndarray, seen: AnnotatedFrame) -> None:
-        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root.
-
-        Where stripes repeat, the body has a hand for each that may be stripe 1.
-        """
+        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
+        # Where stripes repeat, the body has a hand for each that may be stripe 1.
         radius = _DIAL * _unit(picture)
         around = np.linspace(0.0, 2.0 * np.pi, 33)
         for position, angle, colour, period in (
@@ -268,8 +262,7 @@ def _jpeg(picture: np.ndarray) -> bytes:
     return bytes(data) if good else b""
 
 
-_Frame = tuple[int, np.ndarray, AnnotatedFrame]
-"""A frame's number, its picture and its observation."""
+_Frame = tuple[int, np.ndarray, AnnotatedFrame]  # a frame's number, its picture and its observation
 
 
 class _Writer:

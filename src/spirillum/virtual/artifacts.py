@@ -20,10 +20,8 @@ from spirillum.robot.robot import Robot
 _LOST, _SHAKE, _PAINT, _CABLES, _MIRRORED = range(30, 35)
 _WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2
 """Waves of a hand's sway, and their frequencies, Hz; assumed."""
-_JITTER = 1.0 / 3.0
-"""Standard deviation of the jitter from frame to frame over the sway; assumed."""
-_TURN = 2e-4
-"""Roll of a hand-held camera over its sway, rad per pixel; assumed."""
+_JITTER = 1.0 / 3.0  # standard deviation of the jitter from frame to frame over the sway; assumed
+_TURN = 2e-4  # roll of a hand-held camera over its sway, rad per pixel; assumed
 
 
 class Degradation(Options):
@@ -234,10 +232,8 @@ class Shake:
         return np.ascontiguousarray(np.maximum(moved, 0.0), dtype=light.dtype)
 
 
-_CABLE = 1.0 / 80.0
-"""Width of a cable over that of the picture; assumed."""
-_CABLE_LIGHT = 0.02
-"""Linear light of a cable: black rubber; assumed."""
+_CABLE = 1.0 / 80.0  # width of a cable over that of the picture; assumed
+_CABLE_LIGHT = 0.02  # linear light of a cable: black rubber; assumed
 
 
 class ViewArtifacts:

@@ -71,8 +71,7 @@ class Planned:
     folder: str
     robot: Robot
     number: int
-    rates: Mapping[str, float]
-    """The steady rates times the trial's random factor, SI."""
+    rates: Mapping[str, float]  #: The steady rates times the trial's random factor, SI.
     trial: TrialOptions
     seed: int
 
@@ -229,12 +228,9 @@ def _answered_by(source: str, reason: str) -> dict[str, str]:
 class _Filmed(NamedTuple):
     """Content of an experiment: robots and trials."""
 
-    robots: dict[str, Robot]
-    """By the names of their folders."""
-    model: str
-    """The study's first."""
-    placement: Placement | None
-    """Poses of the robots in the study."""
+    robots: dict[str, Robot]  # by the names of their folders
+    model: str  # the study's first
+    placement: Placement | None  # poses of the robots in the study
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:

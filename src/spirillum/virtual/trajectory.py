@@ -15,40 +15,30 @@ if TYPE_CHECKING:
 
     from spirillum.dynamics.run_file import Poses
 
-_MAX_OBLIQUITY = 0.5
-"""Largest angle of a run's robot to the channel, rad."""
-_SAMPLES_PER_TURN = 240
-"""Samples of the wobble per turn of the tail."""
+_MAX_OBLIQUITY = 0.5  # largest angle of a run's robot to the channel, rad
+_SAMPLES_PER_TURN = 240  # samples of the wobble per turn of the tail
 
 
 @dataclass(frozen=True)
 class CameraFramePose:
     """Position and attitude of the robot at one time, in the camera's frame."""
 
-    position: Samples
-    """The body's mid-length, m, (3,)."""
-    body: Samples
-    """Rotation of the body, (3, 3)."""
-    rotor: Samples
-    """Rotation of the rotor from its tail at phase 0, (3, 3)."""
+    position: Samples  #: The body's mid-length, m, (3,).
+    body: Samples  #: Rotation of the body, (3, 3).
+    rotor: Samples  #: Rotation of the rotor from its tail at phase 0, (3, 3).
 
 
 @dataclass(frozen=True)
 class TrialTrajectory:
     """Position and angles over time in the camera's frame, linear between samples."""
 
-    time: Samples = field(repr=False)
-    """(n,) increasing, s."""
-    position: Samples = field(repr=False)
-    """The body's mid-length, m, (n, 3)."""
+    time: Samples = field(repr=False)  #: (n,) increasing, s.
+    position: Samples = field(repr=False)  #: The body's mid-length, m, (n, 3).
     heading: Samples = field(repr=False)
     """Angle of the motor axis to x in the plane of the picture, about +z, rad, (n,)."""
-    pitch: Samples = field(repr=False)
-    """Angle by which the nose points towards the camera, rad, (n,)."""
-    body_angle: Samples = field(repr=False)
-    """Angle of the body about +x, unwrapped, rad, (n,)."""
-    tail_phase: Samples = field(repr=False)
-    """Phase of the tail about +x in the lab, unwrapped, rad, (n,)."""
+    pitch: Samples = field(repr=False)  #: Angle by which the nose points towards the camera, rad, (n,).
+    body_angle: Samples = field(repr=False)  #: Angle of the body about +x, unwrapped, rad, (n,).
+    tail_phase: Samples = field(repr=False)  #: Phase of the tail about +x in the lab, unwrapped, rad, (n,).
 
     @property
     def duration(self) -> float:

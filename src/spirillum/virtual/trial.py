@@ -56,8 +56,7 @@ if TYPE_CHECKING:
 
 _QUALITY = {"preset": "veryfast", "x264-params": "mbtree=0"}
 """With `mbtree`, small pictures now and then gave different bytes from equal frames."""
-_THREADS = 2
-"""Threads of the encoder, a fixed number, so that a seed determines the bytes."""
+_THREADS = 2  # threads of the encoder, a fixed number, so that a seed determines the bytes
 
 
 class FrameWriter(Protocol):
@@ -129,8 +128,7 @@ def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
 
 
 _MOST_FRAMES = 200_000
-_LEAST_DEPTH = 1e-6
-"""Least distance of the stated axis from the floor and from the oil's surface, m."""
+_LEAST_DEPTH = 1e-6  # least distance of the stated axis from the floor and from the oil's surface, m
 
 
 @dataclass(frozen=True, repr=False)

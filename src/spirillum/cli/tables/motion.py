@@ -197,8 +197,7 @@ def _difference(share: float | None) -> str:
     return "0.0%" if float(text) == 0 else f"{text}%"
 
 
-_FACTOR = 2.0
-"""Ratio from which on a difference is shown as a multiple."""
+_FACTOR = 2.0  # ratio from which on a difference is shown as a multiple
 
 
 def simulation(answer: Answer) -> Blocks:
@@ -253,8 +252,7 @@ def _rounded(value: float | None, most: float | None) -> float | None:
 
 
 _ROUNDING = 1e-12
-_NONE: Answer = {"value": None}
-"""Of the time, which has no mean."""
+_NONE: Answer = {"value": None}  # of the time, which has no mean
 
 
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -63,10 +63,8 @@ def _empty_results(answer: Answer) -> Iterator[str]:
         yield f"{answer['unanswered']} of {answer['results']} results are empty: notes and variable `outside` say why"
 
 
-_MANY = 5
-"""Quantities from which on a ranking has units below their names, to fit into a terminal."""
-_WHOLE = 24
-"""Length of names that are not wrapped."""
+_MANY = 5  # quantities from which on a ranking has units below their names, to fit into a terminal
+_WHOLE = 24  # length of names that are not wrapped
 
 
 def _ranking(answer: Answer, rows: int) -> Blocks:

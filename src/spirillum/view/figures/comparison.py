@@ -119,10 +119,8 @@ def _of(robots: tuple[RankedRobot, ...], which: str, name: str) -> Values:
     return np.array([getattr(robot, which)[name] for robot in robots])
 
 
-_LINE_HEIGHT = 0.34
-"""Height of one model in a panel, inches."""
-_ROOM = 1.42
-"""Width of a panel over its longest bar: room for the difference written beside it."""
+_LINE_HEIGHT = 0.34  # height of one model in a panel, inches
+_ROOM = 1.42  # width of a panel over its longest bar: room for the difference written beside it
 
 
 @dataclass(frozen=True)
@@ -133,8 +131,7 @@ class _Panel:
     symbol: str
     unit: str
     value: Callable[[Prediction], float]
-    estimated: bool = False
-    """Whether a model's estimate of its own error is of this quantity."""
+    estimated: bool = False  # whether a model's estimate of its own error is of this quantity
 
 
 # Each is taken for a turn or a radian of the tail, so that models which differ in their rates can be compared.
@@ -153,11 +150,9 @@ _PANELS = (
 
 
 def comparison_figure(comparison: ModelComparison) -> Figure:
-    """Four panels with a line for each model: advance, counter-rotation, torque and efficiency.
-
-    A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
-    the error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
-    """
+    """Four panels with a line for each model: advance, counter-rotation, torque and efficiency."""
+    # A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans the
+    # error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
     with styled():
         rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
         if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
@@ -264,8 +259,7 @@ def _finish(axes: Axes, values: np.ndarray) -> None:
 
 
 _EFFECT_HEIGHT = 0.36
-_ROOM_OF_AXIS = 3.0
-"""Of a logarithmic axis beyond its values, for the words beside them."""
+_ROOM_OF_AXIS = 3.0  # of a logarithmic axis beyond its values, for the words beside them
 
 
 def effects_figure(comparison: ModelComparison) -> Figure:

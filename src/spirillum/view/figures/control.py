@@ -15,8 +15,7 @@ from spirillum.units import show
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
 
-_MOST_SEEN = 1500
-"""Largest number of plotted frames."""
+_MOST_SEEN = 1500  # largest number of plotted frames
 
 
 def control_figure(control: Control) -> Figure:

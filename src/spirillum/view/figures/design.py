@@ -27,10 +27,8 @@ _TODAY = {**_MARKED, "marker": "o", "markersize": 5, "color": "white"}
 
 
 def design_figure(design: Design) -> Figure:
-    """Panels: with two objectives their front; with two fields the landscape; the objective along every field.
-
-    One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
-    """
+    """Panels: with two objectives their front; with two fields the landscape; the objective along every field."""
+    # One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
     count = len(design.profiles) + (design.front is not None) + (design.landscape is not None)
     columns = min(count, 2)
     with styled():

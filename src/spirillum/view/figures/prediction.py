@@ -13,10 +13,8 @@ from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
 
 _SPEED = "forward_velocity"
-_ROW = 0.34
-"""Height of a row, inches."""
-_ROOM = 1.4
-"""Width of the axis over its largest value: room for the number beside it."""
+_ROW = 0.34  # height of a row, inches
+_ROOM = 1.4  # width of the axis over its largest value: room for the number beside it
 
 
 class _Row(NamedTuple):

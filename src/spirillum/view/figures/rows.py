@@ -46,16 +46,11 @@ Draw = Callable[[Axes, StudyView, Values], None]
 class PanelRow:
     """A row of panels that share their vertical axis."""
 
-    label: str
-    """Plotted quantity with its unit."""
-    draw: Draw
-    """Plot one panel: axes, part of the study, horizontal positions (amplitudes or robots)."""
-    across: Literal["tails", "rates"] = "tails"
-    """Horizontal axis: the tails (or robots), or the assumed motor rate."""
-    logarithmic: bool = False
-    """Whether the vertical axis is logarithmic."""
-    tells: str = ""
-    """Explanation for the note below the figure, a sentence."""
+    label: str  #: Plotted quantity with its unit.
+    draw: Draw  #: Plot one panel: axes, part of the study, horizontal positions (amplitudes or robots).
+    across: Literal["tails", "rates"] = "tails"  #: Horizontal axis: the tails (or robots), or the assumed motor rate.
+    logarithmic: bool = False  #: Whether the vertical axis is logarithmic.
+    tells: str = ""  #: Explanation for the note below the figure, a sentence.
 
 
 def grid_rows(shown: StudyView) -> list[PanelRow]:

@@ -114,20 +114,15 @@ class DrawingLayout:
 
     robot: Robot
     scale: UnitPrefix
-    total: float
-    """Length of the robot, or twice its height if that is more: the measure of margins and text."""
+    total: float  #: Length of the robot, or twice its height if that is more: the measure of margins and text.
     nose: float
     rear: float
     root: float
     tip: float
-    half_height: float
-    """Largest distance of the robot from the motor axis."""
-    floor: float
-    """Height of the floor, or of the robot's underside without a channel."""
-    ceiling: float | None
-    """Height of the upper wall where the picture reaches it."""
-    wall: float
-    """Displayed thickness of the walls; the true one is unknown."""
+    half_height: float  #: Largest distance of the robot from the motor axis.
+    floor: float  #: Height of the floor, or of the robot's underside without a channel.
+    ceiling: float | None  #: Height of the upper wall where the picture reaches it.
+    wall: float  #: Displayed thickness of the walls; the true one is unknown.
 
     @classmethod
     def of(cls, robot: Robot) -> DrawingLayout:

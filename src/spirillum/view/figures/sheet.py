@@ -21,10 +21,8 @@ class Picture:
     """Deferred figure with its title and caption."""
 
     title: str
-    caption: str
-    """Content and limits of the figure, sentences."""
-    alternative: str
-    """Alternative text."""
+    caption: str  #: Content and limits of the figure, sentences.
+    alternative: str  #: Alternative text.
     draw: Callable[[], Figure] = field(repr=False)
 
     @classmethod
@@ -41,8 +39,7 @@ class Picture:
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14
 """Typical room for the labels beside a row of panels, and between panels, inches."""
-_EDGE = 0.012
-"""Free edge at the left and at the right, share of the width."""
+_EDGE = 0.012  # free edge at the left and at the right, share of the width
 
 
 def width_of(columns: int, panel: float) -> float:
@@ -128,10 +125,8 @@ def _within(figure: Figure | SubFigure) -> SubFigure:
 
 
 def _wrap(text: Text) -> None:
-    """Break the lines of a text at the free edge at the right of its figure.
-
-    Words are measured one by one: matplotlib measures every beginning of a line, which with formulas takes seconds.
-    """
+    """Break the lines of a text at the free edge at the right of its figure."""
+    # Words are measured one by one: matplotlib measures every beginning of a line, which with formulas takes seconds.
     figure = cast("Figure", text.get_figure(root=True))
     room = (1.0 - 2.0 * _EDGE) * figure.bbox.width
 

@@ -43,8 +43,7 @@ MOST_ROBOTS = 2000
 """Listed robots of one panel."""
 NAMED_ROBOTS = 60
 """Listed robots that are named; more are numbered."""
-_TICK_LETTER = 0.066
-"""Width of a letter of a tick label, inches."""
+_TICK_LETTER = 0.066  # width of a letter of a tick label, inches
 _DASHED = (0, (4.0, 2.0))
 
 

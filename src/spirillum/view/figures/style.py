@@ -91,8 +91,7 @@ class Look:
     """Colour, line and marker that identify a model in every figure."""
 
     colour: str
-    line: Any
-    """A line style of matplotlib: text, or an offset with lengths of dashes."""
+    line: Any  #: A line style of matplotlib: text, or an offset with lengths of dashes.
     marker: str
 
 
@@ -119,8 +118,7 @@ def label_of_model(name: str) -> str:
 class UnitPrefix:
     """A unit with a prefix that makes a set of values readable."""
 
-    factor: float
-    """SI value of one unit."""
+    factor: float  #: SI value of one unit.
     unit: str
 
     @classmethod
@@ -156,11 +154,9 @@ def _settings() -> dict[Any, Any]:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Plot and save in the style of all figures, without changing the user's settings.
-
-    All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it.
-    Names may hold characters that the font lacks; they become boxes, not warnings.
-    """
+    """Plot and save in the style of all figures, without changing the user's settings."""
+    # All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it. Names may
+    # hold characters that the font lacks; they become boxes, not warnings.
     with rc_context(_settings()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
         yield

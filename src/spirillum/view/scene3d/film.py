@@ -33,13 +33,11 @@ if TYPE_CHECKING:
 
 _SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
 """Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
-_FINE = 3
-"""Rendered pixels per displayed pixel, along each side (supersampling)."""
+_FINE = 3  # rendered pixels per displayed pixel, along each side (supersampling)
 _RIM, _ROOM = 0.93, 0.90
 """Radius of the tube, outside and inside, over half of the square."""
 _GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
-_MOST = 600
-"""Number of plotted points of the path."""
+_MOST = 600  # number of plotted points of the path
 
 
 class CrossSection:
@@ -85,8 +83,7 @@ class CrossSection:
 
 CAMERAS = ("auto", "fixed", "follow")
 """Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
-_ALONG = ("front", "rear")
-"""Views that show the cross-section themselves."""
+_ALONG = ("front", "rear")  # views that show the cross-section themselves
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
 _LARGEST_TURN = 0.25

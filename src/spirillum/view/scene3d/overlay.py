@@ -18,20 +18,16 @@ from spirillum.view.figures.style import UnitPrefix, plain, styled
 from spirillum.view.scene3d.scenery import SceneCamera, ruler_steps
 
 _DPI = 200
-_REFERENCE = 900.0
-"""Height of a picture in pixels at which text has its nominal size."""
+_REFERENCE = 900.0  # height of a picture in pixels at which text has its nominal size
 
 
 @dataclass(frozen=True)
 class Bar:
     """Scale bar in the scene, projected."""
 
-    length: float
-    """Length, m."""
-    start: tuple[float, float]
-    """Pixel of its left end."""
-    end: tuple[float, float]
-    """Pixel of its right end."""
+    length: float  #: Length, m.
+    start: tuple[float, float]  #: Pixel of its left end.
+    end: tuple[float, float]  #: Pixel of its right end.
 
 
 def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Bar:

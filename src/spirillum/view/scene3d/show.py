@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 
 SMALLEST, LARGEST = 64, 4096
 """Allowed widths and heights of a picture, pixels."""
-_FINER = 2
-"""Rendered pixels per pixel of a picture, along width and height (supersampling)."""
-_MOST_FINER = 5_000_000
-"""Pixels of a picture above which supersampling is off: it would take gigabytes."""
+_FINER = 2  # rendered pixels per pixel of a picture, along width and height (supersampling)
+_MOST_FINER = 5_000_000  # pixels of a picture above which supersampling is off: it would take gigabytes
 
 
 @dataclass(frozen=True, repr=False)
