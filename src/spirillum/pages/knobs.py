@@ -80,8 +80,8 @@ class Knob:
 def _knobs() -> Iterator[Knob]:
     """The rows of `knobs.csv`; a choice has no range."""
     for row in csv.DictReader(Path(__file__).with_name("knobs.csv").read_text(encoding="utf-8").splitlines()):
-        words = {name: row[name] for name in ("field", "label", "group", "unit", "note", "unset", "needs")}
-        ends = {end: float(row[end]) for end in ("low", "high") if row[end]}
+        words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "note", "unset", "needs")}
+        ends: Any = {end: float(row[end]) for end in ("low", "high") if row[end]}
         yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")
 
 

@@ -32,7 +32,7 @@ class Entry:
 def _entries() -> Iterator[Entry]:
     """The rows of `setup_form.csv`."""
     for row in csv.DictReader(Path(__file__).with_name("setup_form.csv").read_text(encoding="utf-8").splitlines()):
-        words = {name: row[name] for name in ("field", "label", "group", "example", "note")}
+        words: Any = {name: row[name] for name in ("field", "label", "group", "example", "note")}
         yield Entry(
             **words, choices=tuple(row["choices"].split()), number=row["number"] != "", uncertain=row["uncertain"] != ""
         )
