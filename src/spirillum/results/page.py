@@ -55,14 +55,21 @@ def data_uri(picture: bytes, kind: str) -> str:
 
 
 def page(template: str, **names: Any) -> str:
-    """A page from a template of this package; text is escaped, and every name of the template has to be given."""
+    """A page from a template of this package, with its text escaped."""
+    return rendered(template, {}, escaped=True, **names)
+
+
+def rendered(template: str, filters: Mapping[str, Callable[..., str]], *, escaped: bool = False, **names: Any) -> str:
+    """The text of a template of this package, every name of which has to be given."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("spirillum.results", ""),
-        autoescape=True,
+        autoescape=escaped,  # noqa: S701 - a table of numbers is no page
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        keep_trailing_newline=not escaped,
     )
+    environment.filters.update(filters)
     return environment.get_template(template).render(**names)
