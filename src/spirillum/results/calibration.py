@@ -19,8 +19,8 @@ from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import Progress
 from spirillum.files import MARK, atomic_write_all, check_replaceable, guard_inputs, output_folder, results_folder
 from spirillum.fitted.posterior_file import write_posterior
+from spirillum.formats.templates import rendered
 from spirillum.notes import Note
-from spirillum.results.page import rendered
 from spirillum.robot.placement import gap_on_asperities
 from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO
@@ -74,8 +74,8 @@ def calibration_text(found: Calibrated) -> str:
             frictions.append((robot, item, words))
     synthetic = " (synthetic)" if experiment.synthetic else ""
     return rendered(
-        "calibration.toml.jinja",
-        _FILTERS,
+        "results/calibration.toml.jinja",
+        filters=_FILTERS,
         found=found,
         experiment=experiment,
         model=model,

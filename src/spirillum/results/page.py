@@ -6,7 +6,7 @@ import base64
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from spirillum.files import output_folder
 
@@ -52,24 +52,3 @@ def draw_pictures(
 def data_uri(picture: bytes, kind: str) -> str:
     """A picture as the source of an image in a page; `kind` as in `image/kind`."""
     return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
-
-
-def page(template: str, **names: Any) -> str:
-    """A page from a template of this package, with its text escaped."""
-    return rendered(template, {}, escaped=True, **names)
-
-
-def rendered(template: str, filters: Mapping[str, Callable[..., str]], *, escaped: bool = False, **names: Any) -> str:
-    """The text of a template of this package, every name of which has to be given."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("spirillum.results", ""),
-        autoescape=escaped,  # noqa: S701 - a table of numbers is no page
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=not escaped,
-    )
-    environment.filters.update(filters)
-    return environment.get_template(template).render(**names)

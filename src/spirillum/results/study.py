@@ -16,10 +16,11 @@ import numpy as np
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import guard_inputs, output_folder, results_folder, write_dataset, write_text
+from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
-from spirillum.results.page import draw_pictures, page
+from spirillum.results.page import draw_pictures
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
@@ -99,7 +100,7 @@ def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, 
         "predictions": predictions,
         **content(dataset),
     }
-    write_text(folder / "report.html", page("report.html.jinja", **names))
+    write_text(folder / "report.html", rendered("results/report.html.jinja", escaped=True, **names))
     on_progress("report", steps, steps)
 
 

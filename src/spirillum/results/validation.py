@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from spirillum.files import results_folder, write_text
+from spirillum.formats.templates import rendered
 from spirillum.papers.case import case_names, load_case
 from spirillum.papers.validation import CaseResult, Validation, compute_case
 from spirillum.papers.validation_figure import case_picture
-from spirillum.results.page import draw_pictures, page
+from spirillum.results.page import draw_pictures
 
 _RESULTS = ("validation.json", "figures", "report.html")
 """What a folder without the mark of a validation may not hold, for it would be replaced."""
@@ -55,7 +56,9 @@ def validate(
         text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
         write_text(folder / "validation.json", text + "\n", replace="any")
         cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
-        text = page("validation.html.jinja", cases=cases, header=HEADER, left=len(found.outside))
+        text = rendered(
+            "results/validation.html.jinja", escaped=True, cases=cases, header=HEADER, left=len(found.outside)
+        )
         write_text(folder / "report.html", text, replace="any")
     return found
 
