@@ -12,12 +12,11 @@ import subprocess
 import sys
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
+from spirillum.formats.templates import rendered
 from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels.motor import STATES as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
@@ -244,102 +244,37 @@ def _header(model: FmuModel, token: str) -> str:
     return "".join(f"#define {name} {value}\n" for name, value in defined.items())
 
 
-def _build_text(model: FmuModel, names: Iterable[str]) -> str:
-    """How the source is compiled: `sources/buildDescription.xml`."""
-    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
-    compiled = ET.SubElement(configuration, "SourceFileSet", language="C11")
-    for name in names:
-        if name.endswith(".c"):
-            ET.SubElement(compiled, "SourceFile", name=name)
-    ET.SubElement(compiled, "PreprocessorDefinition", name=_INSIDE)
-    return _text(root)
-
-
 def description_text(model: FmuModel, token: str) -> str:
     """`modelDescription.xml` of FMI 3.0."""
-    prediction = model.prediction
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=prediction.robot.name,
-        instantiationToken=token,
+    prediction, variables = model.prediction, list(_variables(model))
+    return rendered(
+        "interfaces/modelDescription.xml.jinja",
+        robot=prediction.robot,
+        identifier=model.identifier,
+        token=token,
         description=(
             f"{prediction.robot.name}, {model.motion}: model {prediction.model.name}, friction "
             f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
-        generationTool=f"spirillum {own_version()}",
-        variableNamingConvention="structured",
+        tool=f"spirillum {own_version()}",
+        units={item.unit: base_units(item.unit) for *_, item in variables if item.unit},
+        variables=variables,
     )
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=model.identifier,
-        canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-    )
-    variables = _variables(model)
-    units = ET.SubElement(root, "UnitDefinitions")
-    for unit in dict.fromkeys(item["unit"] for _, item in variables if "unit" in item):
-        exponents = {base: str(power) for base, power in base_units(unit).items()}
-        ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", exponents)
-    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="1.0", stepSize="0.01")
-    found = ET.SubElement(root, "ModelVariables")
-    for kind, item in variables:
-        ET.SubElement(found, kind, item)
-    structure = ET.SubElement(root, "ModelStructure")
-    for kind in ("Output", "InitialUnknown"):
-        for _, item in variables:
-            if item["causality"] == "output":
-                ET.SubElement(structure, kind, valueReference=item["valueReference"])
-    return _text(root)
 
 
-def _variables(model: FmuModel) -> list[tuple[str, dict[str, str]]]:
-    """Kind and attributes of all variables."""
-
-    def variable(reference: int, causality: str, variability: str, item: FmuVariable) -> tuple[str, dict[str, str]]:
-        found = {
-            "name": item.name,
-            "valueReference": str(reference),
-            "causality": causality,
-            "variability": variability,
-            "description": item.meaning,
-            "unit": item.unit,
-        }
-        return "Float64", found | ({} if item.value is None else {"start": repr(item.value)})
-
+def _variables(model: FmuModel) -> Iterator[tuple[int, str, str, FmuVariable]]:
+    """Value reference, causality and variability of all variables; the remote is no number."""
     duty, flow = QUANTITIES["duty"], QUANTITIES["mean_flow"]
-    found = [
-        variable(0, "independent", "continuous", FmuVariable("time", "time", "s")),
-        (
-            "Boolean",
-            {
-                "name": "remote",
-                "valueReference": str(_REMOTE),
-                "causality": "input",
-                "variability": "discrete",
-                "description": "remote: the drive is on",
-                "start": "true",
-            },
-        ),
-        variable(_DUTY, "input", "continuous", FmuVariable("duty", f"{duty.meaning}, 0 to 1", "1", model.duty)),
-    ]
+    yield 0, "independent", "continuous", FmuVariable("time", "time", "s")
+    yield _REMOTE, "remote", "discrete", FmuVariable("remote", "the drive is on", "")
+    yield _DUTY, "input", "continuous", FmuVariable("duty", f"{duty.meaning}, 0 to 1", "1", model.duty)
     if model.flow is not None:
-        imposed = FmuVariable(flow.name, flow.meaning, flow.unit, model.flow)
-        found.append(variable(_FLOW, "input", "continuous", imposed))
+        yield _FLOW, "input", "continuous", FmuVariable(flow.name, flow.meaning, flow.unit, model.flow)
     for place, item in model.outputs.items():
         if not (item.name == flow.name and model.flow is not None):
-            found.append(variable(_FIRST_OUTPUT + place, "output", "continuous", item))
+            yield _FIRST_OUTPUT + place, "output", "continuous", item
     for place, item in model.parameters.items():
-        found.append(variable(_FIRST_PARAMETER + place, "parameter", "fixed", item))
-    return found
-
-
-def _text(root: ET.Element) -> str:
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+        yield _FIRST_PARAMETER + place, "parameter", "fixed", item
 
 
 _COMPILERS = ("cc", "gcc", "clang")
@@ -372,7 +307,12 @@ def fmu_bytes(model: FmuModel) -> bytes:
     machine = platform.machine().lower()
     contents = {
         "modelDescription.xml": description_text(model, token).encode(),
-        "sources/buildDescription.xml": _build_text(model, written).encode(),
+        "sources/buildDescription.xml": rendered(
+            "interfaces/buildDescription.xml.jinja",
+            identifier=name,
+            names=[file for file in written if file.endswith(".c")],
+            inside=_INSIDE,
+        ).encode(),
         **{f"sources/{file}": text for file, text in written.items()},
         f"binaries/{_PROCESSORS.get(machine, machine)}-{system}/{name}{ending}": _compiled(written),
     }
