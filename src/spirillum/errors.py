@@ -70,8 +70,7 @@ def clipped(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-_SYNONYMS = {"weight": "mass", "radius": "diameter"}
-"""Names of fields by other words for them."""
+_SYNONYMS = {"weight": "mass", "radius": "diameter"}  # names of fields by other words for them
 
 
 def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:

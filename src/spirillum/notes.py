@@ -31,14 +31,11 @@ LONGEST = 160
 class NoteKind(NamedTuple):
     """What all notes of one code have in common."""
 
-    severity: Literal["caution", "info"]
-    """`caution`: it changes what the numbers mean; `info`: it explains them."""
-    explanation: str
-    """What is assumed or violated, what follows, what to do."""
+    severity: Literal["caution", "info"]  #: `caution`: it changes what the numbers mean; `info`: it explains them.
+    explanation: str  #: What is assumed or violated, what follows, what to do.
 
 
-_FIRST = ("posterior-unusable", "synthetic")
-"""Codes that come before all flags of a video."""
+_FIRST = ("posterior-unusable", "synthetic")  # codes that come before all flags of a video
 _LIGHT = (
     *("stray-frames", "pixels-not-square", "pixel-aspect-replaced", "pictures-turned", "slant-left-out"),
     *("sixteen-bit-images", "several-films", "by-hand", "corrected-by-hand", "imported", "no-video"),

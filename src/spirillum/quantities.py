@@ -16,16 +16,11 @@ from spirillum.units import for_people
 class Quantity(NamedTuple):
     """A quantity by its one definition."""
 
-    name: str
-    """Name in answers, datasets and Python."""
-    symbol: str
-    """Symbol as in the paper, in matplotlib's notation for formulas; empty where it has none."""
-    unit: str
-    """SI unit; rates in rad/s."""
-    meaning: str
-    """What it is, in half a sentence."""
-    source: str
-    """Equation, table or reference."""
+    name: str  #: Name in answers, datasets and Python.
+    symbol: str  #: Symbol as in the paper, in matplotlib's notation for formulas; empty where it has none.
+    unit: str  #: SI unit; rates in rad/s.
+    meaning: str  #: What it is, in half a sentence.
+    source: str  #: Equation, table or reference.
 
     @property
     def display_unit(self) -> str:

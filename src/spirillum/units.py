@@ -34,63 +34,22 @@ Hz = 2 * math.pi
 """One turn per second in rad/s."""
 
 _SI: dict[str, float] = {
-    "1": 1.0,
-    "m": 1.0,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "m/s": 1.0,
-    "mm/s": 1e-3,
-    "um/s": 1e-6,
-    "nm/s": 1e-9,
-    "rad/s": 1.0,
-    "Hz": Hz,
-    "kg": 1.0,
-    "g": 1e-3,
-    "mg": 1e-6,
-    "ug": 1e-9,
-    "pg": 1e-15,
-    "N": 1.0,
-    "mN": 1e-3,
-    "uN": 1e-6,
-    "nN": 1e-9,
-    "pN": 1e-12,
-    "fN": 1e-15,
-    "N m": 1.0,
-    "mN m": 1e-3,
-    "uN m": 1e-6,
-    "nN m": 1e-9,
-    "pN m": 1e-12,
-    "pN um": 1e-18,
+    **dict.fromkeys(("1", "m", "m/s", "rad/s", "kg", "N", "N m", "N m s/rad", "W", "A", "V", "s"), 1.0),
+    **dict.fromkeys(("m/rad", "kg/m^3"), 1.0),
+    **dict.fromkeys(("mm", "mm/s", "g", "mN", "mN m", "mW", "mA", "mT", "mPa s", "mV"), 1e-3),
+    **dict.fromkeys(("um", "um/s", "mg", "uN", "uN m", "uW", "ml"), 1e-6),
+    **dict.fromkeys(("nm", "nm/s", "ug", "nN", "nN m", "nW", "ul"), 1e-9),
+    **dict.fromkeys(("pg", "fN", "fW"), 1e-15),
+    **dict.fromkeys(("pN", "pN m", "pW"), 1e-12),
+    **dict.fromkeys(("pN um", "aW", "um^3"), 1e-18),
     "pN nm": 1e-21,
-    "N m s/rad": 1.0,
-    "W": 1.0,
-    "mW": 1e-3,
-    "uW": 1e-6,
-    "nW": 1e-9,
-    "pW": 1e-12,
-    "fW": 1e-15,
-    "aW": 1e-18,
-    "A": 1.0,
-    "mA": 1e-3,
-    "V": 1.0,
+    **dict.fromkeys(("Hz", "turn"), Hz),
     "deg": math.pi / 180,
-    "ml": 1e-6,
-    "ul": 1e-9,
-    "um^3": 1e-18,
-    "mT": 1e-3,
-    "s": 1.0,
     "mm/turn": 1e-3 / (2 * math.pi),
     "um/turn": 1e-6 / (2 * math.pi),
     "nm/turn": 1e-9 / (2 * math.pi),
-    "m/rad": 1.0,
     "min": 60.0,
-    "turn": 2 * math.pi,
-    "%": 1e-2,
-    "cm": 1e-2,
-    "nm": 1e-9,
-    "kg/m^3": 1.0,
-    "mPa s": 1e-3,
-    "mV": 1e-3,
+    **dict.fromkeys(("%", "cm"), 1e-2),
     "mA h": 3.6,
 }
 """SI values of the units that are shown, and of those that files mostly state."""
@@ -427,8 +386,7 @@ def speed_unit(speed: float | None, rate: float | None) -> str:
     return display_unit(speed, "m/s")
 
 
-_ROBOTS_ADVANCE = 5e-6
-"""Advance in a turn of the tail from which a robot is one of millimetres and more, m."""
+_ROBOTS_ADVANCE = 5e-6  # advance in a turn of the tail from which a robot is one of millimetres and more, m
 
 
 def among(value: float | None, unit: str, others: Iterable[float | None]) -> str:
