@@ -68,17 +68,7 @@ def length_per_pixel_between(
     surface: float | None,
     index: float,
 ) -> float:
-    """Length that a pixel shows at the height of the robot's axis, m, from two marks where no ruler is detected.
-
-    Args:
-        one: pixel (u, v) of a mark.
-        other: pixel of another one.
-        length: length between the marks, m.
-        heights: of the marks and of the robot's axis, m.
-        camera: height of the lens, m.
-        surface: height of the oil's surface, m; None: nothing refracts.
-        index: refractive index below it, within `INDICES`.
-    """
+    """Length that a pixel shows at the height of the robot's axis, m, from two marks where no ruler is detected."""
     pixels = float(np.hypot(other[0] - one[0], other[1] - one[1]))
     if pixels < _SHORTEST:
         raise InputError(f"the clicks are {pixels:.0f} pixels apart; allowed: at least {_SHORTEST:.0f}")

@@ -131,12 +131,6 @@ def wrong_signs(values: Samples, expected: float, stated: Samples, groups: Seque
     """Indices of values whose sign differs from the expected one by more than their error.
 
     The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
-
-    Args:
-        values: (n,); NaN where nothing was measured.
-        expected: sign that they should have.
-        stated: standard errors, (n,); NaN where not stated.
-        groups: what distinguishes repeated trials from others, n of them.
     """
     opposite = np.sign(values) * expected < 0
     error = np.where(np.isfinite(stated), stated, _scatter_of_magnitudes(values, groups))

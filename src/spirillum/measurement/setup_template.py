@@ -26,14 +26,7 @@ _STEP = 1e-3
 
 
 def apparent_distance(height: float, camera: float, surface: float | None, index: float) -> float:
-    """Distance in air at which a point would look as large: (H - S) + (S - z)/n below a surface at S.
-
-    Args:
-        height: height z of the point, m.
-        camera: height H of the lens, m.
-        surface: height S of the surface, m; None: nothing refracts.
-        index: refractive index n below it.
-    """
+    """Distance in air at which a point would look as large: (H - S) + (S - z)/n below a surface at S."""
     if surface is None or height >= surface:
         return camera - height
     return camera - surface + (surface - height) / index
@@ -102,14 +95,7 @@ def toml_value(value: str | float | list[str]) -> str:
 
 
 def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: Collection[str] = ()) -> str:
-    """Text of a setup file.
-
-    Args:
-        found: fields by their dotted names, each with its value as it stands in TOML and a comment; others are left
-            out. None: every field has an example.
-        open_fields: fields that are left to be filled in: the file is not valid until they are. Their uncertainties
-            are those of the example.
-    """
+    """The example, or a setup file with fields found (value in TOML, comment) and others left to be filled in."""
     text = _TEMPLATE.read_text(encoding="utf-8")
     if found is None:
         return text

@@ -100,14 +100,7 @@ class ShownNumber(NamedTuple):
 
 
 def shown(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:
-    """A number down to the second digit of its interval's half width, and the interval's ends likewise.
-
-    Args:
-        value: in SI; None or NaN where there is none. Without an interval it has four digits.
-        low: lower end of the interval; None or NaN where there is none.
-        high: upper end.
-        unit: SI unit.
-    """
+    """A number, SI, down to the second digit of its interval's half width, or in four digits, and the ends likewise."""
     if value is None or not math.isfinite(value):
         return ShownNumber("-", "-", "-", "")
     read = for_people(unit)

@@ -110,11 +110,6 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
 
     The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
     unwrapped from the middle of each strip outwards.
-
-    Args:
-        picture: 0 to 255, (h, w, 3).
-        bounds: region of interest: left, top, right, bottom; the last two are exclusive.
-        turn: angle of the channel to the rows, positive downwards to the right, rad, to some degrees.
     """
     left, top, right, bottom = bounds
     colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32, copy=False)
@@ -134,11 +129,6 @@ def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
 
     Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
     1 / factor. The full picture shows at which of these it holds the larger part of its power.
-
-    Args:
-        lines: in pixels of the full picture.
-        image: a full picture, 8-bit RGB, (h, w, 3).
-        factor: by which the other one was reduced.
     """
     cv2 = import_optional("cv2", "measuring a video", "video")
     way = np.array([math.cos(lines.roll), math.sin(lines.roll)])

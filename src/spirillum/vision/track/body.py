@@ -398,13 +398,6 @@ def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray,
     """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
 
     Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
-
-    Args:
-        left: residual displacement of each edge along its normal, pixels, (n,).
-        slopes: Jacobian of the displacements by the pose, (n, 3).
-        used: weights of the edges, 0 for outliers, (n,).
-        nose: mask of the edges of the nose, (n,).
-        behind: mask of those of rear and seal, (n,).
     """
     if min(np.count_nonzero(used[nose]), np.count_nonzero(used[behind])) < OUTLINE.fewest_at_end:
         return np.nan

@@ -220,14 +220,7 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
 
 
 def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float) -> float:
-    """Median width of the stripes that are fully in view, rad; NaN for too few of them.
-
-    Args:
-        profiles: colours along the angle, for some frames, (f, n, 3); NaN where not in view.
-        angles: angles of the samples, rad, (n,).
-        palettes: result of `colour_classes`.
-        stated: stated width, rad; far narrower runs are blurred edges between two colours.
-    """
+    """Median width of the stripes that are fully in view, rad; NaN for too few of them."""
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
     least = max(COLOURS.whole_samples, COLOURS.blurred_width * stated / step)

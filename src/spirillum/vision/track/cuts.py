@@ -140,12 +140,6 @@ def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated
     Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
     no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they meet
     by both, as of a slow robot, the uncertainty holds both.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
-        period: period of the stripes, rad.
-        stated: times of the frames as the video states them, s, (n,), where lost frames were put back; else None.
     """
     time, x, body_angle, tail_phase = motion
     none = Clock(0.0, ())

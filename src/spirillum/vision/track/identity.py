@@ -93,16 +93,7 @@ class Identified(NamedTuple):
 def identify(
     name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, *, by_seal: bool = True
 ) -> Identified:
-    """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds.
-
-    Args:
-        name: name of the video.
-        setup: the setup.
-        stated: the robot's body at the stated scale.
-        frames: frames spread over the video.
-        still: static background of the frames, (h, w, 3).
-        by_seal: whether it is looked for by its coloured seal first, else by its outline alone.
-    """
+    """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds."""
     found: Identified | InputError
     try:
         found, is_whole = _at_stated_size(name, setup, stated, frames, still, by_seal=by_seal)
@@ -196,10 +187,6 @@ def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
     A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
     the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
     an empty tube shows neither.
-
-    Args:
-        stated: the robot's body at the stated scale.
-        still: static background of the frames, (h, w, 3), or reduced by a whole factor.
     """
     shape = stated.shape(stated.optics.size[0] // still.shape[1])
     picture = np.clip(np.round(still), 0.0, 255.0).astype(np.uint8)

@@ -138,15 +138,7 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
 def _brightness(
     images: Sequence[np.ndarray], pose: BodyPose, body: BodyFinder, along: Samples, across: Samples
 ) -> Samples | None:
-    """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view.
-
-    Args:
-        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
-        pose: of the robot halfway.
-        body: the robot's body.
-        along: places along its axis from its mid-length, m, (n,).
-        across: places across, m, (k,).
-    """
+    """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view."""
     grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     pixels = np.nan_to_num(seen(grid, pose, body.optics), nan=-1.0).round().astype(int)
     left, top, right, bottom = body.bounds
@@ -204,10 +196,6 @@ def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
     What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
     shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
     highlight that reaches over the body's rim would else lose there, and seem to stand.
-
-    Args:
-        white: what is white on each of n frames, (h, w).
-        bodies: corners of what body and coupling cover on each frame, (n, k, 2).
     """
     cv2 = import_optional("cv2", "measuring a video", "video")
     middle, shape = len(white) // 2, white[0].shape

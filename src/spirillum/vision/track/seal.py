@@ -80,14 +80,7 @@ class SealEdges:
         self._bias = np.zeros((len(_SIDES), self._classes))
 
     def shifts(self, part: ColourPart, pixels: Samples, normals: Samples, *, rough: bool = False) -> SealShifts:
-        """Displacement of each edge along its normal.
-
-        Args:
-            part: the surroundings of the robot.
-            pixels: expected places of the edges, (n, 2).
-            normals: their outward normals, (n, 2).
-            rough: displacements of several pixels, with the same variance at all edges.
-        """
+        """Displacement of each edge along its normal."""
         found, count = self._profiles(part, pixels, normals), len(pixels)
         if rough:
             known = (found.distance > 0.0) & np.isfinite(found.share[:, 0])

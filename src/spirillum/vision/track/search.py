@@ -176,12 +176,7 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate
 
 
 def most_likely(found: list[list[PoseCandidate]], size: float) -> list[PoseCandidate | None]:
-    """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm).
-
-    Args:
-        found: candidates on each frame; may be empty. A frame on which none has a score above 0 shows no robot.
-        size: the body's length, m.
-    """
+    """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm)."""
     chosen: list[PoseCandidate | None] = [None] * len(found)
     seen = [index for index, some in enumerate(found) if some and some[0].score > 0.0]
     if not seen:

@@ -251,11 +251,6 @@ def align_with_path(time: Samples, position: Samples, heading: Samples) -> Align
 
     A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
     robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
-
-    Args:
-        time: of each frame, s, (n,).
-        position: along the rows and columns of the picture, m, (n, 2); NaN where unknown.
-        heading: angle of the motor axis to the rows, rad, (n,).
     """
     known = np.isfinite(position).all(axis=1)
     if np.count_nonzero(known) < DIRECTION.frames:

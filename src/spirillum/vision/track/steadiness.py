@@ -96,14 +96,7 @@ def shift_of(first: StillPicture, other: StillPicture) -> tuple[float, bool]:
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
-    """Flag a camera or tank that moved along the channel during the video.
-
-    Args:
-        frames: frames spread over the video, in order of time; all of them may be reduced by a whole factor, and what
-            counts as moved are pixels of these.
-        start: result of the first look at them.
-        ruled: whether a ruler is in the picture.
-    """
+    """Flag a camera or tank that moved along the channel during the video."""
     parts = [
         part
         for part in np.array_split(np.arange(len(frames)), STEADINESS.parts)
@@ -146,10 +139,6 @@ def shift_between(one: Samples, other: Samples) -> float:
 
     Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
     least median residual is taken, or the one nearest to 0 if it fits about as well.
-
-    Args:
-        one: the first picture, high-pass filtered, (h, w).
-        other: the second picture, (h, w).
     """
     cv2 = import_optional("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)

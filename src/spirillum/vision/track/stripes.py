@@ -359,12 +359,6 @@ def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) 
 
     The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
     the two even where the body hardly turned, as the sheen is nearly white.
-
-    Args:
-        angles: rad, (n,).
-        models: model colours of the stripes in some frames, (f, n, 3).
-        wanted: observed colours, (f, n, 3).
-        kept: mask of the samples used, (f, n).
     """
     s = angles / STRIPES.reach
     series = np.stack([s**power for power in range(5)], axis=1)

@@ -61,15 +61,7 @@ class Agreement(NamedTuple):
 
 
 def cue_shifts(left: Samples, slopes: Samples, used: Samples, cue: np.ndarray, level: float) -> Samples:
-    """Displacement of each cue of edges from the joint pose, and its standard error, m, (cues, 2); NaN if unused.
-
-    Args:
-        left: residual displacement of each edge along its normal, pixels, (n,).
-        slopes: Jacobian of the displacements by the pose, (n, 3).
-        used: weights of the edges, 0 for outliers, (n,).
-        cue: index into `EDGE_CUES` of each edge, (n,).
-        level: standard error over the one by the weights.
-    """
+    """Displacement of each cue of edges from the joint pose, and its standard error, m, (cues, 2); NaN if unused."""
     found = np.full((len(EDGE_CUES), 2), np.nan)
     for number, along in enumerate(_ALONG):
         mine = (cue == number) & (used > 0.0)
@@ -87,13 +79,6 @@ def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel:
 
     Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
     mixture of both, with their weights.
-
-    Args:
-        time: times of the frames, s, (n,).
-        shifts: results of `cue_shifts` on each frame.
-        tail: phase of the tail on each frame, (n,); NaN where unreadable.
-        pixel: length per pixel, m.
-        suspect: what the outline may follow in place of the body; empty where nothing else is there.
     """
     stack = np.array(shifts)
     cues = {}

@@ -29,14 +29,6 @@ def unwrapped(
     """Continuous angles, NaN where unknown or outliers, and flags.
 
     Each angle gets the whole periods that bring it nearest to its prediction by an alpha-beta filter, also after gaps.
-
-    Args:
-        time: time of each frame, s, (n,).
-        angle: angle modulo `period`, rad, (n,); NaN where unreadable.
-        error: standard error of each angle, rad, (n,).
-        period: period of the angle, rad.
-        part: `body` or `tail`, for the flags.
-        readable: share of a turn in which something of the pattern faces the camera.
     """
     out = np.full(angle.shape, np.nan)
     known = np.flatnonzero(np.isfinite(angle) & np.isfinite(time))

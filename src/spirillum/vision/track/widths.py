@@ -87,16 +87,7 @@ class Evened(NamedTuple):
 def edge_shifts(
     levels: Samples, angles: Samples, blur: Samples, shade: Samples, colours: Samples, angle: float
 ) -> Samples:
-    """Angles by which the edges in view lie beyond their even places, rad, (stripes,); NaN of others.
-
-    Args:
-        levels: colours along the angle over the frame's gains, (n, 3); NaN where nothing is seen.
-        angles: about the axis, rad, (n,).
-        blur: standard deviation of the blur at each angle, rad, (n,).
-        shade: shading factor and additive sheen at each angle, in each channel, (n, 6).
-        colours: of the stripes in their order, (stripes, 3).
-        angle: of the body, rad.
-    """
+    """Angles by which the edges in view lie beyond their even places, rad, (stripes,); NaN of others."""
     found = np.empty(len(colours))
     limits = WIDTHS.step, WIDTHS.steepest, WIDTHS.around, WIDTHS.contrast, WIDTHS.fewest
     stripe_edges(levels, angles, blur, shade, colours, angle, _TRIED, *limits, np.empty(_TRIED.size), found)
@@ -104,15 +95,7 @@ def edge_shifts(
 
 
 def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period: float) -> Evened:
-    """Angles corrected by the learnt widths; as they are where stripes are about even, or too little was seen.
-
-    Args:
-        angle: continuous angle of the body by an even pattern, rad, (n,); NaN where unknown.
-        read: the same as it was read, modulo `period`, rad, (n,).
-        error: its standard error, rad, (n,).
-        edges: result of `edge_shifts` on each frame, (n, stripes).
-        period: of the stripes, rad.
-    """
+    """Angles corrected by the learnt widths; as they are where stripes are about even, or too little was seen."""
     untouched, count = Evened(angle, error, ()), edges.shape[1]
     known = np.isfinite(angle) & (np.isfinite(edges).sum(axis=1) >= 2)
     if known.sum() < WIDTHS.frames:
