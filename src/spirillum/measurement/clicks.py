@@ -29,10 +29,8 @@ _RIGHT = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}
 
 
 def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, float], length: float) -> float:
-    """Spacing of a ruler's lines, m, from two of its marks and the length between them.
-
-    The detected lines between the clicks are counted, so that a click need not be exact.
-    """
+    """Spacing of a ruler's lines, m, from two of its marks and the length between them."""
+    # The detected lines between the clicks are counted, so that a click need not be exact.
     labels = np.unique(lines.strip)
     away = [
         min(float(np.hypot(*(lines.pixels[lines.strip == k] - click).T).min()) for click in (one, other))

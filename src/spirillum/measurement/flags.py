@@ -38,12 +38,10 @@ class Elongation(NamedTuple):
     """Length per pixel, m; NaN without a scale, and so without a known change."""
 
     def error(self) -> float:
-        """Standard error of the robot's displacement by it, m.
-
-        Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
-        variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
-        goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
-        """
+        """Standard error of the robot's displacement by it, m."""
+        # Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
+        # variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
+        # goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
         share = 1.0 if self.clear else 0.5
         return share * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
 

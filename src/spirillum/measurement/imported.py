@@ -50,12 +50,10 @@ def read_track(
     time_of: Callable[[Samples], Samples],
     frame_of: Callable[[Samples], Samples] | None = None,
 ) -> Track:
-    """A track from another program's table, in pixels of the stored picture from its upper left corner.
-
-    trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a line
-    with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts, coords) and
-    the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
-    """
+    """A track from another program's table, in pixels of the stored picture from its upper left corner."""
+    # trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a
+    # line with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts,
+    # coords) and the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
     path = Path(path)
     first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()
     size = ruled.stored_size

@@ -265,10 +265,8 @@ def _unwrapped_flag(marks: Marks) -> tuple[Flag, ...]:
 
 
 def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
-    """A track in which manual readings replace the automatic ones.
-
-    To angles the multiple of 2 pi is added that brings them nearest to the track.
-    """
+    """A track in which manual readings replace the automatic ones."""
+    # To angles the multiple of 2 pi is added that brings them nearest to the track.
     index = _frames_of(track, marks)
     frames = "1 frame carries a reading" if index.size == 1 else f"{index.size} frames carry readings"
     position, body, tail = track.position.copy(), track.body_angle.copy(), track.tail_phase.copy()

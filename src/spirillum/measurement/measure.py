@@ -63,10 +63,8 @@ class Summary:
 
 
 def summary_of(trials: Sequence[Trial]) -> Summary:
-    """Means over trials with Student's t intervals; that of a single trial is its own.
-
-    The uncertainty of the scale is common to all trials: averaging does not reduce it.
-    """
+    """Means over trials with Student's t intervals; that of a single trial is its own."""
+    # The uncertainty of the scale is common to all trials: averaging does not reduce it.
     shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
     quantities, counts = {}, {}
     for name in MEASURED:

@@ -86,11 +86,9 @@ def convention_doubt(rates: RateTriples) -> tuple[Note, ...]:
 
 
 def convention_evidence(rates: RateTriples) -> float:
-    """Logarithm of the likelihood ratio of tail plus body rate to tail less body rate as the motor's.
-
-    Errors are normal, relative to the motor's rate. Their standard deviation is the stated one, or `_TYPICAL`, times a
-    factor common to all rows, with a log-normal prior; a small error of gain is common to all rows, too.
-    """
+    """Logarithm of the likelihood ratio of tail plus body rate to tail less body rate as the motor's."""
+    # Errors are normal, relative to the motor's rate. Their standard deviation is the stated one, or `_TYPICAL`, times
+    # a factor common to all rows, with a log-normal prior; a small error of gain is common to all rows, too.
     size = 0.5 * (np.abs(rates.motor) + np.abs(rates.tail))
     stated = rates.error / size
     known = np.isfinite(stated) & (stated > 0)
@@ -128,10 +126,8 @@ def _check_contradictions(path: str | Path, rates: RateTriples) -> None:
 
 
 def wrong_signs(values: Samples, expected: float, stated: Samples, groups: Sequence[Hashable]) -> np.ndarray:
-    """Indices of values whose sign differs from the expected one by more than their error.
-
-    The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
-    """
+    """Indices of values whose sign differs from the expected one by more than their error."""
+    # The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
     opposite = np.sign(values) * expected < 0
     error = np.where(np.isfinite(stated), stated, _scatter_of_magnitudes(values, groups))
     return np.flatnonzero(opposite & ~(np.abs(values) <= _BEYOND * error))

@@ -86,11 +86,9 @@ class Rate:
         return bool(np.isfinite(self.value))
 
     def less(self, other: Rate) -> Rate:
-        """The rate of the difference of two series over the same times, both steady.
-
-        Errors of the two are independent but for what their residuals show: where one runs ahead while the other lags
-        behind, the interval is wider.
-        """
+        """The rate of the difference of two series over the same times, both steady."""
+        # Errors of the two are independent but for what their residuals show: where one runs ahead while the other lags
+        # behind, the interval is wider.
         left = self.residual - other.residual if self.measured and other.measured else np.zeros(0)
         both = np.isfinite(left)
         if (count := int(both.sum())) < 2:
@@ -224,10 +222,8 @@ def _from_end_to_end(s: Samples, y: Samples) -> float:
 
 
 def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | None) -> tuple[float, float, float]:
-    """Slope of a few readings with independent errors, with its confidence interval.
-
-    Three readings may lie on a line by chance: known standard errors of the readings add one degree of freedom.
-    """
+    """Slope of a few readings with independent errors, with its confidence interval."""
+    # Three readings may lie on a line by chance: known standard errors of the readings add one degree of freedom.
     design = np.stack([np.ones_like(s), s], axis=1) * np.sqrt(weights)[:, None]
     inverse = np.linalg.inv(design.T @ design)
     beta = inverse @ design.T @ (y * np.sqrt(weights))
@@ -443,11 +439,10 @@ def _fitted(blocks: _Blocks, numbers: Sequence[int]) -> list[_Fit]:
 
 
 def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
-    """Whether the rate changes significantly and by more than a tenth.
-
-    The last coefficient of a parabola, which shows a steady change, or of a cubic is tested against 0. As its standard
-    error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no change.
-    """
+    """Whether the rate changes significantly and by more than a tenth."""
+    # The last coefficient of a parabola, which shows a steady change, or of a cubic is tested against 0. As its
+    # standard error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no
+    # change.
     if blocks.s.size < _FEWEST_BLOCKS or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False
     return any(curve.p_value(-1) < _UNSTEADY_P and _bends(curve.mean) for curve in curves)

@@ -188,10 +188,8 @@ def setup_remarks(setup: Setup, *, confirmed: bool = False) -> list[Note]:
 
 
 def _as_in_example(setup: Setup) -> list[str]:
-    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names.
-
-    A value without an uncertainty, such as the spacing of a ruler, may well be the one of the example.
-    """
+    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names."""
+    # A value without an uncertainty, such as the spacing of a ruler, may well be the one of the example.
     example, fields = Setup.model_validate(tomllib.loads(setup_text())), [name.split(".") for name in KNOWN]
 
     def held(one: Setup, part: str, key: str) -> tuple[float | None, float]:

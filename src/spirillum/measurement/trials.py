@@ -238,10 +238,8 @@ def _motor_rate(track: Track, body: Rate, tail: Rate, periodic: list[PeriodicErr
 
 
 def _smooth(time: Samples, angle: Samples) -> Samples:
-    """A smoothed angle: a regressor with its own noise would explain that noise.
-
-    A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
-    """
+    """A smoothed angle: a regressor with its own noise would explain that noise."""
+    # A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
     known = np.isfinite(angle) & ~outlying_frames(time, angle)
     if known.sum() < _FEWEST:
         return np.zeros(angle.shape)

@@ -126,10 +126,8 @@ class Steadied(NamedTuple):
 
 
 def sways(frames: Sequence[Frame]) -> bool:
-    """Whether some pictures lie higher and lower than others, or are turned, as those of a camera in a hand.
-
-    Along the rows a ruler's lines may hide it: a hand does not move in one direction alone.
-    """
+    """Whether some pictures lie higher and lower than others, or are turned, as those of a camera in a hand."""
+    # Along the rows a ruler's lines may hide it: a hand does not move in one direction alone.
     flats = (_flat(frame.reduced(_reduction(frame))) for frame in frames)
     anchor = Anchor(next(flats))
     poses = np.array(

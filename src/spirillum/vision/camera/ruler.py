@@ -89,10 +89,8 @@ def still_picture(images: list[np.ndarray]) -> Samples:
 
 
 def _sorting(count: int) -> list[tuple[int, int]]:
-    """Comparators of a sorting network for `count` values: Batcher's odd-even merge sort.
-
-    K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
-    """
+    """Comparators of a sorting network for `count` values: Batcher's odd-even merge sort."""
+    # K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
     pairs, run = [], 1
     while run < count:
         step = run
@@ -106,11 +104,9 @@ def _sorting(count: int) -> list[tuple[int, int]]:
 
 
 def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:
-    """Detect a ruler in a static picture; None if there is none.
-
-    The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
-    unwrapped from the middle of each strip outwards.
-    """
+    """Detect a ruler in a static picture; None if there is none."""
+    # The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
+    # unwrapped from the middle of each strip outwards.
     left, top, right, bottom = bounds
     colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32, copy=False)
     back = None
@@ -125,11 +121,9 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
 
 
 def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
-    """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones.
-
-    Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
-    1 / factor. The full picture shows at which of these it holds the larger part of its power.
-    """
+    """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones."""
+    # Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
+    # 1 / factor. The full picture shows at which of these it holds the larger part of its power.
     cv2 = import_optional("cv2", "measuring a video", "video")
     way = np.array([math.cos(lines.roll), math.sin(lines.roll)])
     side = np.array([-way[1], way[0]])

@@ -157,11 +157,9 @@ def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) 
 
 
 def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens | None = None) -> CalibratedCamera:
-    """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines.
-
-    The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
-    of the setup, by the implicit derivative of the fit.
-    """
+    """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines."""
+    # The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain
+    # number of the setup, by the implicit derivative of the fit.
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101 - the setup ensures it
     assert height is not None  # noqa: S101
@@ -341,10 +339,8 @@ def _uncertain(setup: Setup) -> dict[str, float]:
 
 
 def _changed(before: _Geometry, name: str, step: float) -> _Geometry:
-    """A fitted camera before its ruler, with one number of the setup changed by a relative step.
-
-    Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
-    """
+    """A fitted camera before its ruler, with one number of the setup changed by a relative step."""
+    # Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
     optics, far = before.optics, step * before.optics.height
     if name == "markers.spacing":
         after = before._replace(spacing=before.spacing * (1.0 + step))

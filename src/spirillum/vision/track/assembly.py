@@ -88,11 +88,10 @@ class Swayed(NamedTuple):
 
 
 def swayed_by(still: Steadied, motion: RobotMotion, setup: Setup, sight: CalibratedCamera) -> Swayed:
-    """How much a camera that swayed makes the velocity uncertain, and whether it may be given.
-
-    A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which is
-    nearer than the background, by more: what is not known is the difference, for as much as the camera has drifted.
-    """
+    """How much a camera that swayed makes the velocity uncertain, and whether it may be given."""
+    # A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which
+    # is nearer than the background, by more: what is not known is the difference, for as much as the camera has
+    # drifted.
     optics, right, down = sight.optics, still.poses[:, 0], still.poses[:, 1]
     behind = 0.0 if setup.markers.height is None else setup.markers.height
     pixel = optics.length_per_pixel

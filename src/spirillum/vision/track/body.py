@@ -395,10 +395,8 @@ def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:
 
 
 def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray, behind: np.ndarray) -> float:
-    """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
-
-    Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
-    """
+    """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m."""
+    # Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
     if min(np.count_nonzero(used[nose]), np.count_nonzero(used[behind])) < OUTLINE.fewest_at_end:
         return np.nan
     design = np.column_stack([slopes, np.where(nose, slopes[:, 0], 0.0)])

@@ -196,11 +196,9 @@ def named_rightly(palette: Samples, start: Samples) -> bool:
 
 
 def told_apart(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
-    """Whether the classes that are seen are two or more, and differ as their names do.
-
-    Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may be
-    learnt as colours: they differ by much less.
-    """
+    """Whether the classes that are seen are two or more, and differ as their names do."""
+    # Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may
+    # be learnt as colours: they differ by much less.
     palette, start, glare = palettes
     nearest = _nearest(samples, np.concatenate([palette, glare]))
     seen = [k for k in range(len(palette)) if np.mean(nearest == k) > COLOURS.seen]

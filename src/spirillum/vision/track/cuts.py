@@ -65,10 +65,8 @@ CUTS = CutConstants()
 
 
 def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
-    """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow.
-
-    Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
-    """
+    """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow."""
+    # Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
     jumps = [jump for jump in _jumps(motion, length_per_pixel) if jump is not None]
     usual = _usual(motion.time)
     for one, other in pairwise(sorted(jumps)):
@@ -95,10 +93,8 @@ class Hops(NamedTuple):
 
 
 def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
-    """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since.
-
-    Of a video that is cut nothing is given, and nothing is looked for in it.
-    """
+    """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since."""
+    # Of a video that is cut nothing is given, and nothing is looked for in it.
     if picture is None or cuts_in(motion, length_per_pixel, picture):
         return Hops(0.0, 0.0, 0.0, ())
     hops = [
@@ -135,12 +131,10 @@ class Clock(NamedTuple):
 
 
 def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated: Samples | None = None) -> Clock:
-    """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?
-
-    Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
-    no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they meet
-    by both, as of a slow robot, the uncertainty holds both.
-    """
+    """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?"""
+    # Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as
+    # if no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they
+    # meet by both, as of a slow robot, the uncertainty holds both.
     time, x, body_angle, tail_phase = motion
     none = Clock(0.0, ())
     if time.size < 2:
@@ -188,11 +182,10 @@ def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
 
 
 def stands_still(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
-    """Flag a robot that turns, but does not advance by half a pixel.
-
-    A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong compression
-    leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the body.
-    """
+    """Flag a robot that turns, but does not advance by half a pixel."""
+    # A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong
+    # compression leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the
+    # body.
     time, x, body_angle, tail_phase = motion
     known = np.isfinite(x)
     turns, turned = (_turned(angle) for angle in (tail_phase, body_angle))
@@ -217,11 +210,9 @@ def _turned(angle: Samples) -> float:
 
 
 def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
-    """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle.
-
-    It is in units of what rates that are not quite steady explain (`least`, more where the lines go on for longer than
-    they were fitted), or of what the scatter of the readings does; 0 where too few are known.
-    """
+    """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle."""
+    # It is in units of what rates that are not quite steady explain (`least`, more where the lines go on for longer
+    # than they were fitted), or of what the scatter of the readings does; 0 where too few are known.
     middle, far, variance, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, 0.0, []
     for part in (slice(None, gap + 1), slice(gap + 1, None)):
         known = np.flatnonzero(np.isfinite(values[part]))

@@ -182,12 +182,10 @@ def _nothing_moves(frames: list[Frame], still: Samples) -> bool:
 
 
 def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
-    """Untrained finders of a body at the places of a background where one may stand, most likely first.
-
-    A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
-    the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
-    an empty tube shows neither.
-    """
+    """Untrained finders of a body at the places of a background where one may stand, most likely first."""
+    # A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
+    # the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
+    # an empty tube shows neither.
     shape = stated.shape(stated.optics.size[0] // still.shape[1])
     picture = np.clip(np.round(still), 0.0, 255.0).astype(np.uint8)
     found = []
@@ -224,10 +222,8 @@ def _with_nose(
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
-    """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
-
-    A body alone constrains its ends little where it is blurred, or looked for at a wrong scale.
-    """
+    """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end."""
+    # A body alone constrains its ends little where it is blurred, or looked for at a wrong scale.
     side = opposite(stated.optics.direction)
     turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})
     body = BodyFinder(stated.robot, replace(stated.optics, direction=side), stated.bounds)

@@ -276,10 +276,8 @@ def _rivals_of_seal(frames: Sequence[Frame], found: Sequence[list[PoseCandidate]
 
 
 def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _Learnt] | None:
-    """The body by its whole outline, which is more accurate; None unless it moves with the seal, and has its size.
-
-    What stands still seems to move along where the robot hardly moves.
-    """
+    """The body by its whole outline, which is more accurate; None unless it moves with the seal, and has its size."""
+    # What stands still seems to move along where the robot hardly moves.
     poses, pixel = np.array(learnt.poses), body.optics.length_per_pixel
     if float(np.ptp(poses[:, 0])) < SEAL.far_enough * pixel or not body.outline_moves:
         return None

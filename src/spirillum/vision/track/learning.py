@@ -191,12 +191,10 @@ def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
 
 
 def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
-    """Spots that stay white where they are, on the path of the body, (h, w).
-
-    What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
-    shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
-    highlight that reaches over the body's rim would else lose there, and seem to stand.
-    """
+    """Spots that stay white where they are, on the path of the body, (h, w)."""
+    # What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that
+    # are shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole
+    # way: a highlight that reaches over the body's rim would else lose there, and seem to stand.
     cv2 = import_optional("cv2", "measuring a video", "video")
     middle, shape = len(white) // 2, white[0].shape
     moved = np.round(bodies.mean(axis=1) - bodies[middle].mean(axis=0)).astype(int)

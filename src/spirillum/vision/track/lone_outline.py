@@ -218,11 +218,9 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
 
 
 def _stays(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder, end: str) -> Samples:
-    """Share of the contrast across the edges at an end that stays where it was, (n,).
-
-    Each frame is compared with that on which the robot lies farthest ahead of the nose, or behind the rear: an opaque
-    body covers there what lay beside it. NaN where there is none.
-    """
+    """Share of the contrast across the edges at an end that stays where it was, (n,)."""
+    # Each frame is compared with that on which the robot lies farthest ahead of the nose, or behind the rear: an opaque
+    # body covers there what lay beside it. NaN where there is none.
     found, pixel = np.full(len(images), np.nan), body.optics.length_per_pixel
     x = np.array([pose.x for pose in poses])
     last = int(np.argmax(x) if end == "front" else np.argmin(x))

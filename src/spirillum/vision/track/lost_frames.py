@@ -150,10 +150,8 @@ def _put_back(
 
 
 def _repeated(time: Samples, readings: tuple[FrameSeries, ...], frame: float, picture: PictureSteps | None) -> int:
-    """Number of frames that show no motion between frames that do.
-
-    Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
-    """
+    """Number of frames that show no motion between frames that do."""
+    # Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
     series = _all_jumps(time, readings, frame, 1)
     if _power(series) < LOST_FRAMES.repeats_power:
         return 0
@@ -301,11 +299,9 @@ def _sees(steps: _Jumps, lost: np.ndarray) -> bool:
 
 
 def _agrees(steps: _Jumps, lost: np.ndarray) -> bool:
-    """Whether the series has the losses' size; a series that cannot see them agrees.
-
-    What jumps are left with the corrected times is regressed on the losses: 0 within four standard errors, or within
-    `LOST_FRAMES.agrees`.
-    """
+    """Whether the series has the losses' size; a series that cannot see them agrees."""
+    # What jumps are left with the corrected times is regressed on the losses: 0 within four standard errors, or within
+    # `LOST_FRAMES.agrees`.
     if not _sees(steps, lost):
         return True
     at = (lost > 0) & np.isfinite(steps.jump)

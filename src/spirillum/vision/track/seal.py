@@ -150,11 +150,9 @@ class SealEdges:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
     def size(self, seen: SealShifts, pixels: Samples, *, rough: bool = False) -> float:
-        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
-
-        Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the silhouette,
-        or nothing is: `rough` takes its length or its width alone where that differs.
-        """
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ."""
+        # Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the
+        # silhouette, or nothing is: `rough` takes its length or its width alone where that differs.
         found, distances = np.full(2, np.nan), np.zeros(2)
         for way, ends in enumerate(((0, 3), (1, 2))):
             sides = [self._sides[side] for side in ends]

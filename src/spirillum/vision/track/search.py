@@ -221,10 +221,8 @@ def _slopes(
     *,
     bounded: bool = True,
 ) -> tuple[Samples, Samples, float]:
-    """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude.
-
-    The gradients are transposed, (w, h).
-    """
+    """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude."""
+    # The gradients are transposed, (w, h).
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     whole, background = (

@@ -109,11 +109,9 @@ class OutlineFit(NamedTuple):
 
 
 def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
-    """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees.
-
-    Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare and
-    shadows agree on no size, so that they do not bias the maximum.
-    """
+    """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees."""
+    # Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare
+    # and shadows agree on no size, so that they do not bias the maximum.
     pixels, normals, _, slopes = body.contour.places(pose, body.optics)
     middle = body.optics.pixels(np.array([[pose.x, pose.y, body.optics.axis_height]]))
     units = np.array([body.optics.length_per_pixel, body.optics.length_per_pixel, 1.0])
@@ -158,12 +156,10 @@ class CheckedScale(NamedTuple):
 def checked_scale(
     scale: Scale, body: BodyFinder, size: float, spacing: float | None = None, tail: float = np.nan
 ) -> CheckedScale:
-    """Compare the scale with the apparent sizes of body and tail.
-
-    A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid may
-    be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body, the
-    ruler or the heights are doubted; where it agrees with the ruler, the outline.
-    """
+    """Compare the scale with the apparent sizes of body and tail."""
+    # A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid
+    # may be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body,
+    # the ruler or the heights are doubted; where it agrees with the ruler, the outline.
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel
     off = float(abs(np.log(size)))
@@ -247,11 +243,9 @@ class AlignedTrack(NamedTuple):
 
 
 def align_with_path(time: Samples, position: Samples, heading: Samples) -> AlignedTrack:
-    """Turn a track so that x runs along the robot's path.
-
-    A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
-    robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
-    """
+    """Turn a track so that x runs along the robot's path."""
+    # A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where
+    # the robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
     known = np.isfinite(position).all(axis=1)
     if np.count_nonzero(known) < DIRECTION.frames:
         return AlignedTrack(position, heading, ())

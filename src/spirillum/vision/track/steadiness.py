@@ -135,11 +135,9 @@ def _rows_of(start: Start, factor: int) -> tuple[int, int]:
 
 
 def shift_between(one: Samples, other: Samples) -> float:
-    """Shift of a picture to the right of another one, pixels, robust to objects that move in it.
-
-    Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
-    least median residual is taken, or the one nearest to 0 if it fits about as well.
-    """
+    """Shift of a picture to the right of another one, pixels, robust to objects that move in it."""
+    # Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
+    # least median residual is taken, or the one nearest to 0 if it fits about as well.
     cv2 = import_optional("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
     correlation = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)

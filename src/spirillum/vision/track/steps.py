@@ -167,10 +167,8 @@ class FrameTracker:
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
     def _may_be_elsewhere(self, found: PoseFit) -> bool:
-        """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do.
-
-        It is searched for at once where they do so on a frame for the first time, then now and then.
-        """
+        """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do."""
+        # It is searched for at once where they do so on a frame for the first time, then now and then.
         placed = self.record.placed
         now_and_then = len(placed) % FOLLOWING.search_interval == 0
         if not found.known:

@@ -355,11 +355,9 @@ def _line_flag(name: str, what: str) -> Flag:
 
 
 def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) -> Samples:
-    """Shading factor and sheen along the angle, (n, 6), by regularised linear least squares.
-
-    The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
-    the two even where the body hardly turned, as the sheen is nearly white.
-    """
+    """Shading factor and sheen along the angle, (n, 6), by regularised linear least squares."""
+    # The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
+    # the two even where the body hardly turned, as the sheen is nearly white.
     s = angles / STRIPES.reach
     series = np.stack([s**power for power in range(5)], axis=1)
     centres = np.linspace(-1.0, 1.0, _HATS)

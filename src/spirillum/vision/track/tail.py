@@ -140,10 +140,8 @@ class TailWave:
             self._flags = [self.unseen()]
 
     def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
-        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames.
-
-        NaN where its standard error is above `TAIL.stretch_error`.
-        """
+        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames."""
+        # NaN where its standard error is above `TAIL.stretch_error`.
         assert self.contrast is not None  # noqa: S101 - learnt
         found = []
         for image, strip in strips[:: max(1, len(strips) // 12)]:
@@ -260,10 +258,8 @@ class TailWave:
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
-        """Contrast of the best phase against the others, over the root mean square ridge of the strip.
-
-        Only the rows are filtered that the scores are summed over.
-        """
+        """Contrast of the best phase against the others, over the root mean square ridge of the strip."""
+        # Only the rows are filtered that the scores are summed over.
         xi, *rows = (rows[:: TAIL.row_stride] for rows in (self.xi, *strip))
         few = _Strip(*rows)
         ridge, scores = self._ridge(image, few, contrast), np.empty(TAIL.phases)
@@ -367,10 +363,8 @@ class TailWave:
         return scores is not None and float(np.interp(1.0, _FACTORS, scores)) > own
 
     def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
-        """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen.
-
-        Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
-        """
+        """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen."""
+        # Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
         found = []
         for weights in _CONTRASTS:
             contrast = np.array(weights) / np.linalg.norm(weights)
@@ -390,10 +384,9 @@ class TailWave:
         return shape if np.mean(read) > TAIL.seen_share and other.halves_agree(strips) else None
 
     def halves_agree(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> bool:
-        """Whether the front and the rear half of the tail show the same wavelength, each by itself.
-
-        A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both halves.
-        """
+        """Whether the front and the rear half of the tail show the same wavelength, each by itself."""
+        # A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both
+        # halves.
         assert self.contrast is not None  # noqa: S101 - only of a wave that was read
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in strips]
         middle = self.xi.size // 2

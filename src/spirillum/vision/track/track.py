@@ -75,11 +75,9 @@ def cue_shifts(left: Samples, slopes: Samples, used: Samples, cue: np.ndarray, l
 
 
 def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel: float, suspect: str = "") -> Agreement:
-    """Cues of a video: how often each was used, and whether they agree.
-
-    Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
-    mixture of both, with their weights.
-    """
+    """Cues of a video: how often each was used, and whether they agree."""
+    # Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
+    # mixture of both, with their weights.
     stack = np.array(shifts)
     cues = {}
     for number, name in enumerate(EDGE_CUES):

@@ -139,11 +139,9 @@ def _off_even(places: Samples) -> Samples:
 
 
 def _not_of_paint(places: Samples) -> Flag | None:
-    """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side.
-
-    All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
-    deviation s sqrt((n - k)/(k (n - 1))).
-    """
+    """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side."""
+    # All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
+    # deviation s sqrt((n - k)/(k (n - 1))).
     count, off = places.size, _off_even(places)
     if not off.size:
         return None
@@ -162,12 +160,11 @@ def _not_of_paint(places: Samples) -> Flag | None:
 
 
 def _another_size(places: Samples) -> tuple[float, Flag] | None:
-    """The relative difference of the widths that are known from even ones, and a flag, if they differ all alike.
-
-    A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
-    than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
-    other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the size.
-    """
+    """The relative difference of the widths that are known from even ones, and a flag, if they differ all alike."""
+    # A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
+    # than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
+    # other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the
+    # size.
     count, off = places.size, _off_even(places)
     if not 1 < off.size < count:
         return None
@@ -191,10 +188,8 @@ def _another_size(places: Samples) -> tuple[float, Flag] | None:
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:
-    """Shift of each edge, rad, (stripes,), and the scatter of an edge on a frame, rad.
-
-    The mean is 0 over each group of edges that frames link. The shift is NaN for edges that were seen too rarely.
-    """
+    """Shift of each edge, rad, (stripes,), and the scatter of an edge on a frame, rad."""
+    # The mean is 0 over each group of edges that frames link. The shift is NaN for edges that were seen too rarely.
     from scipy.sparse.csgraph import connected_components
 
     weight = np.isfinite(shifts).astype(float)

@@ -312,10 +312,8 @@ class Video:
 def open_video(
     path: str | Path, frames_per_second: float | None = None, pixel_aspect_ratio: float | None = None
 ) -> Video:
-    """Open a video, a TIFF file of several pages, or a folder of images in their natural order.
-
-    Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
-    """
+    """Open a video, a TIFF file of several pages, or a folder of images in their natural order."""
+    # Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
     path = checked_path(path, VIDEO)
     try:
         if path.is_dir():

@@ -65,10 +65,8 @@ def open_container(path: Path) -> Any:
 
 
 def film_stream(container: Any) -> tuple[Any, list[Flag]]:
-    """The longest stream of pictures that is no thumbnail, and a flag where several are videos.
-
-    Of streams that are about as long, the largest pictures are taken, else the first.
-    """
+    """The longest stream of pictures that is no thumbnail, and a flag where several are videos."""
+    # Of streams that are about as long, the largest pictures are taken, else the first.
     av = import_optional("av", "measuring a video", "video")
     attached = av.stream.Disposition.attached_pic
     streams = list(container.streams.video)
@@ -94,11 +92,9 @@ def _area(stream: Any) -> int:
 
 
 def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
-    """A function that gives the time of each decoded frame in turn, s; None where nothing states it.
-
-    AVI numbers the frames as they are stored. Where codecs store them in another order than they are shown (B frames),
-    these numbers rise with the decoder's time stamps alone.
-    """
+    """A function that gives the time of each decoded frame in turn, s; None where nothing states it."""
+    # AVI numbers the frames as they are stored. Where codecs store them in another order than they are shown (B
+    # frames), these numbers rise with the decoder's time stamps alone.
     if container.format.name != "avi":
         return lambda frame: frame.time
     step, last = 1.0 / float(stream.average_rate or 30.0), math.nan
@@ -115,10 +111,8 @@ def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
 
 
 def stated_length(container: Any, stream: Any) -> Stated:
-    """How long a video is by what its file states of it.
-
-    AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
-    """
+    """How long a video is by what its file states of it."""
+    # AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
     av = import_optional("av", "measuring a video", "video")
     rate = float(stream.average_rate or 0.0)
     tight = 3.0 / rate if rate else _LOOSE
@@ -236,11 +230,9 @@ class ImageSequence:
 
 
 def image_folder(path: Path, aspect: float | None) -> ImageSequence:
-    """The images of a folder in their natural order.
-
-    Numbers at the end of the names count the images as they were recorded, if they rise in steps of which the smallest
-    is 1: a number that is missing is an image that was dropped.
-    """
+    """The images of a folder in their natural order."""
+    # Numbers at the end of the names count the images as they were recorded, if they rise in steps of which the
+    # smallest is 1: a number that is missing is an image that was dropped.
     found = (entry for entry in path.iterdir() if entry.suffix.lower() in IMAGES and entry.is_file())
     files = [entry for entry in found if not entry.name.startswith(".")]
     if len(files) > MOST_IMAGES:
