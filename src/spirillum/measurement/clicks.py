@@ -15,14 +15,10 @@ from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.setup import INDICES
 from spirillum.vision.track.colours import colours_named
 
-_SURE = 0.25
-"""Largest distance of the number of spacings between two clicks from a whole number."""
-_FEWEST = 4
-"""Fewest spacings between two clicks: a pixel beside the mark then matters little."""
-_SHORTEST = 20.0
-"""Shortest distance of two clicks that give a length per pixel, pixels."""
-_AROUND = 2
-"""Pixels on each side of a click over which a colour is averaged."""
+_SURE = 0.25  # largest distance of the number of spacings between two clicks from a whole number
+_FEWEST = 4  # fewest spacings between two clicks: a pixel beside the mark then matters little
+_SHORTEST = 20.0  # shortest distance of two clicks that give a length per pixel, pixels
+_AROUND = 2  # pixels on each side of a click over which a colour is averaged
 
 _RIGHT = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}
 """Direction, in (u, v), of a robot's right-hand side, given that of its nose."""

@@ -28,26 +28,17 @@ if TYPE_CHECKING:
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
 _DURATION, _LONGEST = 20.0, 86400.0
-_POSITION_ERROR = 0.05
-"""Standard error of the position on a frame, pixels."""
-_EDGE_ERROR = 0.25
-"""Standard error of a stripe's edge on a frame, pixels along the circumference."""
-_WAVE_ERROR = 0.1
-"""Standard error of the wire's lateral position on a frame, pixels."""
-_STRIPE_ERROR = math.radians(0.2)
-"""Expected amplitude of errors that repeat with every stripe, rad."""
-_CORRELATION = 4.0
-"""Correlation time of errors of position and wire, frames."""
-_EDGE_CORRELATION = 20.0
-"""Correlation time of errors of the stripes' edges, frames."""
-_FEWEST = 4
-"""Fewest frames that give a rate."""
-_FOREVER = 1e9
-"""Represents the infinite time in view of a robot at rest, s."""
+_POSITION_ERROR = 0.05  # standard error of the position on a frame, pixels
+_EDGE_ERROR = 0.25  # standard error of a stripe's edge on a frame, pixels along the circumference
+_WAVE_ERROR = 0.1  # standard error of the wire's lateral position on a frame, pixels
+_STRIPE_ERROR = math.radians(0.2)  # expected amplitude of errors that repeat with every stripe, rad
+_CORRELATION = 4.0  # correlation time of errors of position and wire, frames
+_EDGE_CORRELATION = 20.0  # correlation time of errors of the stripes' edges, frames
+_FEWEST = 4  # fewest frames that give a rate
+_FOREVER = 1e9  # represents the infinite time in view of a robot at rest, s
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Sizes at which the tracker passes its tests with a margin, pixels."""
-_NEEDED = {"robot": 20.0, "spacing": 3.0}
-"""Sizes below which ruler or robot are not detected, pixels."""
+_NEEDED = {"robot": 20.0, "spacing": 3.0}  # sizes below which ruler or robot are not detected, pixels
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
     f"{_WAVE_ERROR:g} pixels of the wire across; {_CORRELATION:g} neighbouring frames err alike, "
@@ -64,8 +55,7 @@ class Check:
     limit: float
     unit: str
     passed: bool
-    decides: bool
-    """Whether its failure makes the experiment infeasible; otherwise it is a warning."""
+    decides: bool  #: Whether its failure makes the experiment infeasible; otherwise it is a warning.
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:

@@ -30,12 +30,9 @@ tilt it is below 0.1."""
 class Elongation(NamedTuple):
     """Change of the distance between nose and rear from the first frame to the last."""
 
-    change: float
-    """Positive where they drift apart, m; 0 where it is not known."""
-    half_width: float
-    """Of its 95 % interval, m."""
-    pixel: float
-    """Length per pixel, m; NaN without a scale, and so without a known change."""
+    change: float  #: Positive where they drift apart, m; 0 where it is not known.
+    half_width: float  #: Of its 95 % interval, m.
+    pixel: float  #: Length per pixel, m; NaN without a scale, and so without a known change.
 
     def error(self) -> float:
         """Standard error of the robot's displacement by it, m."""
@@ -85,8 +82,7 @@ SYNTHETIC = "synthetic"
 """Word in the metadata of computed videos, and name of the flag."""
 _MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
 """Share and number of outliers above which a flag is raised: a good video may show one or two."""
-_FEWEST_FRAMES = 4
-"""Fewest measured frames of a video that give a rate."""
+_FEWEST_FRAMES = 4  # fewest measured frames of a video that give a rate
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
 _IMPLIED = {
@@ -125,8 +121,7 @@ _IMPLIED = {
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
 """Flags that are redundant where the robot does not move in one direction throughout."""
-_ONCE = {"stripes-unreadable", "tail-unreadable"}
-"""Flags of which only the first is kept."""
+_ONCE = {"stripes-unreadable", "tail-unreadable"}  # flags of which only the first is kept
 
 
 def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: Elongation) -> tuple[Flag, ...]:

@@ -27,19 +27,14 @@ from spirillum.vision.track.track import Track
 
 _WHAT = "a track of trackpy, DeepLabCut or Tracker in pixels (CSV)"
 _NEEDED = "x, y and frame (trackpy) or t (Tracker), or DeepLabCut's table"
-_TIMES = ("t", "time", "time_s")
-"""Columns of times in s, in place of `frame`."""
-_OWNERS = "individuals"
-"""First cell of DeepLabCut's header row that is there in projects of several animals."""
-_ALONE = "single"
-"""DeepLabCut's individual of points that belong to none."""
-_LIKELY = 0.6
-"""A point that DeepLabCut calls less likely than this is left out."""
+_TIMES = ("t", "time", "time_s")  # columns of times in s, in place of `frame`
+_OWNERS = "individuals"  # first cell of DeepLabCut's header row that is there in projects of several animals
+_ALONE = "single"  # DeepLabCut's individual of points that belong to none
+_LIKELY = 0.6  # a point that DeepLabCut calls less likely than this is left out
 _MIDDLES = ("centre", "center", "body", "middle")
 _FRONTS = ("nose", "front")
 _REARS = ("rear", "tail_base", "back")
-_POINT_ERROR = 0.5
-"""Standard error that is taken for a point, pixels."""
+_POINT_ERROR = 0.5  # standard error that is taken for a point, pixels
 
 
 def read_track(
@@ -204,12 +199,9 @@ def _frames(rows: Sequence[TableRow], coordinates: Sequence[str]) -> Samples:
     return np.array(found)
 
 
-_BESIDE = 0.5
-"""Distance from the robot's axis from which on a track is not the robot's, body lengths."""
-_OTHERWISE = 0.25
-"""Relative difference of two velocities in the picture from which on they are not of one robot."""
-_SMALL = 5.0
-"""Way of the robot below which velocities are not compared, pixels."""
+_BESIDE = 0.5  # distance from the robot's axis from which on a track is not the robot's, body lengths
+_OTHERWISE = 0.25  # relative difference of two velocities in the picture from which on they are not of one robot
+_SMALL = 5.0  # way of the robot below which velocities are not compared, pixels
 _PIXELS = "pixels of the stored picture from its upper left corner, y downwards, of the robot"
 
 

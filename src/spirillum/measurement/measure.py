@@ -47,14 +47,10 @@ _LENGTHS = ("forward_velocity", "lateral_position")
 class Summary:
     """Means over trials."""
 
-    quantities: Mapping[str, Measured]
-    """Means by the names of `MEASURED`."""
-    counts: Mapping[str, int]
-    """Number of trials that entered each mean."""
-    trials: int
-    """Number of all trials."""
-    scale_uncertainty: float
-    """Relative standard uncertainty of lengths, common to all trials."""
+    quantities: Mapping[str, Measured]  #: Means by the names of `MEASURED`.
+    counts: Mapping[str, int]  #: Number of trials that entered each mean.
+    trials: int  #: Number of all trials.
+    scale_uncertainty: float  #: Relative standard uncertainty of lengths, common to all trials.
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -202,22 +198,14 @@ def _notes(trial: Trial) -> list[Note]:
 class MeasurementRequest(NamedTuple):
     """Videos of one robot with one setup, checked: one trial each."""
 
-    videos: tuple[Path, ...]
-    """Videos or folders of images."""
-    names: tuple[str, ...]
-    """Names of the trials."""
-    readings: tuple[Marks | None, ...]
-    """Readings by hand of each video."""
-    setup: Setup
-    """The setup, with the requested times."""
-    setup_file: str
-    """The setup file."""
-    robot: Robot
-    """The robot."""
-    track: Path | None
-    """Table of positions that another program has found."""
-    tracking: bool
-    """Whether the robot is looked for in the videos."""
+    videos: tuple[Path, ...]  #: Videos or folders of images.
+    names: tuple[str, ...]  #: Names of the trials.
+    readings: tuple[Marks | None, ...]  #: Readings by hand of each video.
+    setup: Setup  #: The setup, with the requested times.
+    setup_file: str  #: The setup file.
+    robot: Robot  #: The robot.
+    track: Path | None  #: Table of positions that another program has found.
+    tracking: bool  #: Whether the robot is looked for in the videos.
 
     @property
     def folder(self) -> Path:

@@ -51,26 +51,20 @@ _SMALLEST_RATE = 1e-6 * Hz
 class ObservationRow:
     """One row: a trial, or a mean over trials, SI."""
 
-    row: int
-    """Line number in the file."""
+    row: int  #: Line number in the file.
     robot: str
     channel_diameter: float
     wavelength: float
     amplitude: float
-    forward_velocity: float
-    """m/s; NaN where not measured, as all that follow."""
+    forward_velocity: float  #: m/s; NaN where not measured, as all that follow.
     tail_rate: float
     body_rate: float
-    motor_rate: float
-    """Observed, else tail less body rate."""
-    trials: int
-    """1 for a trial, more for a mean."""
+    motor_rate: float  #: Observed, else tail less body rate.
+    trials: int  #: 1 for a trial, more for a mean.
     intervals: tuple[float, float, float, float]
     """Half widths of 95 % intervals in the same order: of a trial, or of a mean over trials."""
-    trial: str = ""
-    """Number or name of the trial, where the file gives one."""
-    motor_derived: bool = False
-    """Whether the motor's rate was not observed itself."""
+    trial: str = ""  #: Number or name of the trial, where the file gives one.
+    motor_derived: bool = False  #: Whether the motor's rate was not observed itself.
 
     @property
     def tail(self) -> tuple[float, float, float]:

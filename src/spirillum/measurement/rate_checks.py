@@ -15,18 +15,13 @@ from spirillum.notes import Note
 from spirillum.robust import mad_scale
 from spirillum.units import Hz
 
-_TYPICAL = 0.03
-"""Typical error of a motor's rate against tail less body rate where no row states one, relative."""
+_TYPICAL = 0.03  # typical error of a motor's rate against tail less body rate where no row states one, relative
 _ASSUMED_WIDTH, _STATED_WIDTH = 1.0, 0.5
 """Standard deviation of the logarithm of the true error over the typical one, and over the stated one."""
-_GAIN = 0.01
-"""Standard deviation of an error that all motor rates of a file share, as of two clocks, relative."""
-_DECISIVE = 1e3
-"""Likelihood ratio from which on the convention of a file is wrong."""
-_DOUBTFUL = 10.0
-"""Likelihood ratio from which on the convention is doubted."""
-_BEYOND = 6.0
-"""Standard errors beyond which a single value is not noise."""
+_GAIN = 0.01  # standard deviation of an error that all motor rates of a file share, as of two clocks, relative
+_DECISIVE = 1e3  # likelihood ratio from which on the convention of a file is wrong
+_DOUBTFUL = 10.0  # likelihood ratio from which on the convention is doubted
+_BEYOND = 6.0  # standard errors beyond which a single value is not noise
 _PRIOR_ERROR, _PRIOR_ROWS = 0.07, 4
 """Error that a row is taken to have before the scatter of the file is known, relative, and its weight in rows."""
 _AGREE, _CONTRADICT = 0.2, 0.8
@@ -37,13 +32,11 @@ _MOST_NAMED = 6
 class RateTriples(NamedTuple):
     """Rows of a file that hold all three rates, rad/s, each (n,)."""
 
-    rows: Sequence[int]
-    """Line numbers."""
+    rows: Sequence[int]  #: Line numbers.
     tail: Samples
     body: Samples
     motor: Samples
-    error: Samples
-    """Stated standard error of motor less tail plus body rate; NaN where none is stated."""
+    error: Samples  #: Stated standard error of motor less tail plus body rate; NaN where none is stated.
 
 
 def rows_in_words(rows: Iterable[int]) -> str:

@@ -22,12 +22,9 @@ NORMAL = 1.959964
 class Mean(NamedTuple):
     """Mean of a few trials with its confidence interval."""
 
-    value: float
-    """Arithmetic mean; NaN without trials."""
-    half_width: float
-    """Half width of the interval; NaN with fewer than two trials."""
-    trials: int
-    """Number of trials."""
+    value: float  #: Arithmetic mean; NaN without trials.
+    half_width: float  #: Half width of the interval; NaN with fewer than two trials.
+    trials: int  #: Number of trials.
 
 
 def student_t_quantile(share: float, free: float) -> float:
@@ -81,22 +78,17 @@ LONG = 100.0
 """Length of a body whose heading has that error, pixels."""
 
 
-_MOST_DIGITS = 7
-"""Digits of a value at most, however narrow its interval is."""
+_MOST_DIGITS = 7  # digits of a value at most, however narrow its interval is
 _MOST_DECIMALS = 9
 
 
 class ShownNumber(NamedTuple):
     """A number with its interval as texts; ``-`` for what is not there."""
 
-    value: str
-    """The value."""
-    low: str
-    """Lower end of its interval."""
-    high: str
-    """Upper end."""
-    unit: str
-    """Unit of all three; empty where there is no value."""
+    value: str  #: The value.
+    low: str  #: Lower end of its interval.
+    high: str  #: Upper end.
+    unit: str  #: Unit of all three; empty where there is no value.
 
 
 def shown(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:

@@ -46,16 +46,11 @@ WOBBLES = (
 """Amplitudes of lateral motion and heading at the rotation rates of tail and body."""
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
 """All quantities of a trial, and of a summary over trials."""
-_FEW_TURNS = 2.0
-"""Fewest turns over which a wobble is fitted."""
-_DEGREE = 5
-"""Degree of the polynomial that smooths an angle."""
-_FEWEST = 12
-"""Fewest frames for that polynomial."""
-_UNSTEADY = 0.5
-"""Largest root mean square residual of that polynomial, rad."""
-_TENTHS = 10
-"""Parts of a track whose mean residuals estimate slow errors."""
+_FEW_TURNS = 2.0  # fewest turns over which a wobble is fitted
+_DEGREE = 5  # degree of the polynomial that smooths an angle
+_FEWEST = 12  # fewest frames for that polynomial
+_UNSTEADY = 0.5  # largest root mean square residual of that polynomial, rad
+_TENTHS = 10  # parts of a track whose mean residuals estimate slow errors
 _TOO_FEW = "it was read on too few frames"
 
 
@@ -91,16 +86,12 @@ class Measured:
 class Trial:
     """The measurement of one video."""
 
-    track: Track = field(repr=False)
-    """Pose, body angle and tail phase on every frame."""
-    quantities: Mapping[str, Measured]
-    """Measured quantities by the names of `MEASURED`."""
+    track: Track = field(repr=False)  #: Pose, body angle and tail phase on every frame.
+    quantities: Mapping[str, Measured]  #: Measured quantities by the names of `MEASURED`.
     fits: Mapping[str, Rate] = field(repr=False)
     """Fitted lines by the names of `RATE_NAMES`, including those that a flag invalidates."""
-    flags: tuple[Flag, ...]
-    """Warnings about the trial."""
-    name: str = ""
-    """Name of the trial and of its files."""
+    flags: tuple[Flag, ...]  #: Warnings about the trial.
+    name: str = ""  #: Name of the trial and of its files.
 
     @property
     def synthetic(self) -> bool:

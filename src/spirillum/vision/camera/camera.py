@@ -18,10 +18,8 @@ from spirillum.vision.video.pictures import reduction
 
 _SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 480_000_000
 """Most and fewest frames from which scale and appearance are learnt, and the bytes that they may take between."""
-_GOLDEN = 0.618034
-"""Step of the low-discrepancy sequence that spreads them."""
-_UNKNOWN = 10.0
-"""Duration from which is learnt where that of the video is unknown, s."""
+_GOLDEN = 0.618034  # step of the low-discrepancy sequence that spreads them
+_UNKNOWN = 10.0  # duration from which is learnt where that of the video is unknown, s
 
 
 def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[CalibratedCamera, Video]:

@@ -23,29 +23,21 @@ from spirillum.vision.track.constants import SINGLE_LINE
 class ColourConstants:
     """Classes of colour of the stripes."""
 
-    pairs: int = 3
-    """Kinds of neighbouring stripes that have to be seen before their order is judged."""
-    whole_samples: int = 4
-    """Fewest angles of a stripe, and of those beside it, when its width is taken."""
+    pairs: int = 3  #: Kinds of neighbouring stripes that have to be seen before their order is judged.
+    whole_samples: int = 4  #: Fewest angles of a stripe, and of those beside it, when its width is taken.
     blurred_width: float = 0.3
     """Width over that of a stripe below which a colour between two others is their blurred edge."""
-    glare: float = 240.0
-    """Brightness of glare to begin with, of 255."""
-    pale: float = 0.7
-    """Ratio of the weakest to the strongest channel from which on a bright colour is glare."""
-    seen: float = 0.03
-    """Share of the samples from which on a class is seen."""
-    contrast: float = 0.25
-    """Least difference of two learnt colours over that of their names."""
-    fits: float = 0.7
-    """Share of neighbouring stripes that have to stand in a given order."""
+    glare: float = 240.0  #: Brightness of glare to begin with, of 255.
+    pale: float = 0.7  #: Ratio of the weakest to the strongest channel from which on a bright colour is glare.
+    seen: float = 0.03  #: Share of the samples from which on a class is seen.
+    contrast: float = 0.25  #: Least difference of two learnt colours over that of their names.
+    fits: float = 0.7  #: Share of neighbouring stripes that have to stand in a given order.
 
 
 COLOURS = ColourConstants()
 
 
-_MANY = 6
-"""Most classes for which all assignments of names are tried; more are assigned by the least total distance."""
+_MANY = 6  # most classes for which all assignments of names are tried; more are assigned by the least total distance
 
 
 def named_colours(names: Sequence[str]) -> Samples:
@@ -260,10 +252,8 @@ def _neighbours(profiles: Samples, angles: Samples, palette: Samples, glare: Sam
 class SeenLine(NamedTuple):
     """What a seal and the line on it look like."""
 
-    palette: Samples
-    """Colour of each class, (2, 3)."""
-    sheen: Samples
-    """What the lamp adds at each angle, (n, 3)."""
+    palette: Samples  #: Colour of each class, (2, 3).
+    sheen: Samples  #: What the lamp adds at each angle, (n, 3).
 
 
 def is_single(stripes: Sequence[str]) -> bool:

@@ -29,36 +29,23 @@ from spirillum.vision.track.visibility import EVERYTHING
 class CutConstants:
     """Videos whose times do not fit what they show."""
 
-    window: int = 8
-    """Frames before and after a moment through which straight lines are fitted."""
-    clear: float = 8.0
-    """Jump over the standard deviation of the other jumps."""
-    place: float = 1.0
-    """Least jump of the place, pixels."""
-    angle: float = 0.12
-    """Least jump of an angle, rad."""
-    persists: float = 0.5
-    """Share of a jump below which a series goes on after it as before."""
-    gap: float = 3.0
-    """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
+    window: int = 8  #: Frames before and after a moment through which straight lines are fitted.
+    clear: float = 8.0  #: Jump over the standard deviation of the other jumps.
+    place: float = 1.0  #: Least jump of the place, pixels.
+    angle: float = 0.12  #: Least jump of an angle, rad.
+    persists: float = 0.5  #: Share of a jump below which a series goes on after it as before.
+    gap: float = 3.0  #: Time between two frames over the usual one from which on it is a gap, and no line goes across.
     long_window: int = 30
     """Readings before and after a gap through which lines are fitted that show whether time has passed."""
-    clock_place: float = 0.3
-    """Distance of these lines below which they meet, pixels."""
-    clock_angle: float = 0.05
-    """Distance of these lines below which they meet, rad."""
+    clock_place: float = 0.3  #: Distance of these lines below which they meet, pixels.
+    clock_angle: float = 0.05  #: Distance of these lines below which they meet, rad.
     clock_errors: float = 5.0
     """Distance over its standard error below which they meet; errors of readings are not independent."""
-    unseen: int = 20
-    """Frames without the robot over which lines go on: it may be lost where it jumps."""
-    advance: float = 0.5
-    """Least advance of a robot that turns, pixels."""
-    tail_turns: float = 1.0
-    """Turns of the tail in which it has to advance by that."""
-    body_turns: float = 0.25
-    """Turns of the body in which it has to."""
-    misread: float = 0.5
-    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
+    unseen: int = 20  #: Frames without the robot over which lines go on: it may be lost where it jumps.
+    advance: float = 0.5  #: Least advance of a robot that turns, pixels.
+    tail_turns: float = 1.0  #: Turns of the tail in which it has to advance by that.
+    body_turns: float = 0.25  #: Turns of the body in which it has to.
+    misread: float = 0.5  #: Jump of the tail's phase, rad, from which on its turns may be miscounted.
 
 
 CUTS = CutConstants()
@@ -83,12 +70,9 @@ def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
 class Hops(NamedTuple):
     """Jumps of what was read on pictures that go on evenly."""
 
-    distance: float
-    """Standard error of the displacement from end to end, m."""
-    angle: float
-    """Standard error of the body's angle from end to end, rad."""
-    phase: float
-    """Standard error of the tail's phase from end to end, rad."""
+    distance: float  #: Standard error of the displacement from end to end, m.
+    angle: float  #: Standard error of the body's angle from end to end, rad.
+    phase: float  #: Standard error of the tail's phase from end to end, rad.
     flags: tuple[Flag, ...]
 
 
@@ -125,8 +109,7 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
 class Clock(NamedTuple):
     """Evidence of the motion about the largest gap between the times of the frames."""
 
-    relative_error: float
-    """Relative standard uncertainty that it leaves in the length of the video."""
+    relative_error: float  #: Relative standard uncertainty that it leaves in the length of the video.
     flags: tuple[Flag, ...]
 
 
@@ -233,10 +216,8 @@ def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: fl
 class _Jump(NamedTuple):
     """The largest jump of a series."""
 
-    moment: float
-    """Time, s."""
-    size: float
-    """Of the series."""
+    moment: float  # time, s
+    size: float  # of the series
 
 
 def _jumps(motion: RobotMotion, length_per_pixel: float) -> list[_Jump | None]:

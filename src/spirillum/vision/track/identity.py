@@ -35,13 +35,11 @@ class Identified(NamedTuple):
     start: Start
     stripes: Stripes
     wire: TailWave
-    size: float
-    """Apparent size over the size of the robot file at the stated scale."""
+    size: float  #: Apparent size over the size of the robot file at the stated scale.
     robot: bool
     """Whether stripes or tail match the robot; both have to where the size is unexpected, the whole tail where the
     contrast is."""
-    stands: bool = False
-    """Whether its stripes were found in the static background, without its tail."""
+    stands: bool = False  #: Whether its stripes were found in the static background, without its tail.
 
     @property
     def whole(self) -> bool:

@@ -18,41 +18,31 @@ from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
 
 _SIDES = tuple(GROUPS.index(name) for name in ("rear", "left", "right", "seal"))
-_FLANKS = False, True, True, False
-"""Which of the sides are silhouettes."""
+_FLANKS = False, True, True, False  # which of the sides are silhouettes
 
 
 class ColourPart(NamedTuple):
     """Blurred colours of a part of a picture."""
 
-    picture: np.ndarray
-    """Red, green and blue, (h, w, 3), single precision."""
-    origin: Samples
-    """Pixel (u, v) of its upper left corner, (2,)."""
+    picture: np.ndarray  #: Red, green and blue, (h, w, 3), single precision.
+    origin: Samples  #: Pixel (u, v) of its upper left corner, (2,).
 
 
 class SealShifts(NamedTuple):
     """Displacements of the seal's edges along their normals on a frame."""
 
-    shifts: Samples
-    """Displacements, pixels, (n,)."""
-    known: np.ndarray
-    """Whether the displacement is valid, (n,)."""
-    variance: Samples
-    """Variances by the misfit of the profiles, pixels^2, (n,)."""
-    kind: np.ndarray
-    """Class of the colour at each edge, (n,)."""
+    shifts: Samples  #: Displacements, pixels, (n,).
+    known: np.ndarray  #: Whether the displacement is valid, (n,).
+    variance: Samples  #: Variances by the misfit of the profiles, pixels^2, (n,).
+    kind: np.ndarray  #: Class of the colour at each edge, (n,).
 
 
 class _Profiles(NamedTuple):
     """Profiles across the seal's edges."""
 
-    share: Samples
-    """Share of the stripe's colour, 1 inside to 0 outside, (n, m)."""
-    distance: Samples
-    """Fisher's squared distance of the stripe from its surroundings, (n,); 0 where they look alike."""
-    kind: np.ndarray
-    """Class of the colour at each edge, (n,)."""
+    share: Samples  # share of the stripe's colour, 1 inside to 0 outside, (n, m)
+    distance: Samples  # fisher's squared distance of the stripe from its surroundings, (n,); 0 where they look alike
+    kind: np.ndarray  # class of the colour at each edge, (n,)
 
 
 class SealEdges:

@@ -35,36 +35,26 @@ from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
 
-_WRONG = 4.0
-"""Ratio beyond the usual lengths per pixel at which a stated spacing is wrong."""
+_WRONG = 4.0  # ratio beyond the usual lengths per pixel at which a stated spacing is wrong
 
 
 class Walls(NamedTuple):
     """Two edges along the channel on either side of the robot."""
 
-    distance: float
-    """Distance between them over the body's diameter."""
-    contrast: float
-    """Step of the brightness at the fainter one over the usual step, from row to row."""
-    ends: Samples
-    """Pixels of both ends of both edges, (2, 2, 2)."""
+    distance: float  #: Distance between them over the body's diameter.
+    contrast: float  #: Step of the brightness at the fainter one over the usual step, from row to row.
+    ends: Samples  #: Pixels of both ends of both edges, (2, 2, 2).
 
 
 class SetupFreeDetection(NamedTuple):
     """Setup-free detection in a video."""
 
-    lines: Lines | None
-    """Lines of the ruler; None where none was found."""
-    known: Identified | None
-    """The robot, in front of the provisional camera; None where none was found."""
-    direction: str
-    """Where in the picture its nose points."""
-    stripes: tuple[str, ...]
-    """Colours of its stripes in the order seen; empty where they could not be read."""
-    walls: Walls | None
-    """Walls of its channel; None where none were found."""
-    frames: list[Frame]
-    """Frames that were looked at."""
+    lines: Lines | None  #: Lines of the ruler; None where none was found.
+    known: Identified | None  #: The robot, in front of the provisional camera; None where none was found.
+    direction: str  #: Where in the picture its nose points.
+    stripes: tuple[str, ...]  #: Colours of its stripes in the order seen; empty where they could not be read.
+    walls: Walls | None  #: Walls of its channel; None where none were found.
+    frames: list[Frame]  #: Frames that were looked at.
     reduction: int
     """Factor by which they may be reduced where they are looked at as a whole: the ruler is resolved in them."""
 

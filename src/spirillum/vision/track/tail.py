@@ -18,12 +18,10 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import TAIL
 
 _TAIL = ("tail_rotation_rate",)
-_COARSE = 13
-"""Stations along the tail at which the optics are evaluated."""
+_COARSE = 13  # stations along the tail at which the optics are evaluated
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
-_FACTORS = np.arange(0.60, 1.66, 0.03)
-"""Candidate wavelengths, over that of the robot file."""
+_FACTORS = np.arange(0.60, 1.66, 0.03)  # candidate wavelengths, over that of the robot file
 _NEAR = np.linspace(0.84, 1.16, 17)
 """Wavelengths over that of the robot file among which the apparent one is interpolated."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -35,10 +33,8 @@ _TURNS = np.column_stack([np.cos(_PHASES), np.sin(_PHASES)])
 class _Strip(NamedTuple):
     """A grid of pixels along and across the tail."""
 
-    middle: Samples
-    """Pixel of the tail's axis in each row, (rows, 2)."""
-    across: Samples
-    """Step from one column to the next, pixels, (rows, 2)."""
+    middle: Samples  # pixel of the tail's axis in each row, (rows, 2)
+    across: Samples  # step from one column to the next, pixels, (rows, 2)
     tilt: Samples
     """Derivatives with height of the shift along (e) and across (f) and of the magnification (g), (rows, 3)."""
 
@@ -46,10 +42,8 @@ class _Strip(NamedTuple):
 class _SeenShape(NamedTuple):
     """The shape of the tail in the picture."""
 
-    wavelength: float
-    """Over that of the robot file."""
-    amplitude: float
-    """Over that of the robot file."""
+    wavelength: float  # over that of the robot file
+    amplitude: float  # over that of the robot file
 
 
 def _other_than_a_helix() -> Flag:

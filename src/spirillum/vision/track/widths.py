@@ -23,26 +23,17 @@ from spirillum.vision.flag import Flag
 class WidthConstants:
     """Uneven stripes."""
 
-    reach: float = radians(14.0)
-    """Largest shift of an edge that is tried, rad: a third of a stripe of eight."""
-    step: float = radians(0.5)
-    """Steps between the shifts that are tried, rad."""
+    reach: float = radians(14.0)  #: Largest shift of an edge that is tried, rad: a third of a stripe of eight.
+    step: float = radians(0.5)  #: Steps between the shifts that are tried, rad.
     steepest: float = radians(52.0)
     """Largest angle from the direction towards the camera at which an edge is located, rad."""
-    around: float = 0.42
-    """Half width over that of a stripe of the surroundings through which an edge is located."""
-    contrast: float = 40.0
-    """Least difference of the colours on either side, of 255."""
-    fewest: int = 8
-    """Fewest samples along the angle."""
-    frames: int = 20
-    """Fewest frames with two edges in view."""
-    rounds: int = 4
-    """Rounds in which stray edges are left out."""
-    stray: float = 4.0
-    """Residual over the usual one from which on an edge of a frame is left out."""
-    seen: int = 10
-    """Fewest frames of an edge."""
+    around: float = 0.42  #: Half width over that of a stripe of the surroundings through which an edge is located.
+    contrast: float = 40.0  #: Least difference of the colours on either side, of 255.
+    fewest: int = 8  #: Fewest samples along the angle.
+    frames: int = 20  #: Fewest frames with two edges in view.
+    rounds: int = 4  #: Rounds in which stray edges are left out.
+    stray: float = 4.0  #: Residual over the usual one from which on an edge of a frame is left out.
+    seen: int = 10  #: Fewest frames of an edge.
     linked: int = 4
     """Fewest frames on which two edges are seen together from which on they determine the distance of these."""
     uneven: float = radians(2.0)
@@ -51,8 +42,7 @@ class WidthConstants:
     """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
 
     On six degraded videos even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
-    left: float = 0.05
-    """Share of that range that is left as an error of each angle. Assumed."""
+    left: float = 0.05  #: Share of that range that is left as an error of each angle. Assumed.
     widest: float = 0.24
     """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
     painted: float = 0.2 / sqrt(3.0)
@@ -75,13 +65,10 @@ _TRIED = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
 class Evened(NamedTuple):
     """Angles of a body without what its stripes' widths do to them."""
 
-    angle: Samples
-    """Continuous, rad, (n,)."""
-    error: Samples
-    """Standard error on each frame, rad, (n,)."""
+    angle: Samples  #: Continuous, rad, (n,).
+    error: Samples  #: Standard error on each frame, rad, (n,).
     flags: tuple[Flag, ...]
-    drift: float = 0.0
-    """Standard uncertainty of the angle from end to end, where less than a turn was seen, rad."""
+    drift: float = 0.0  #: Standard uncertainty of the angle from end to end, where less than a turn was seen, rad.
 
 
 def edge_shifts(

@@ -14,8 +14,7 @@ from spirillum.vision.flag import Flag
 
 ASPECTS = (0.2, 5.0)
 """Least and largest width of a pixel over its height."""
-_SLANT = 0.02
-"""Tangent of an angle to the next quarter turn from which on it is mentioned."""
+_SLANT = 0.02  # tangent of an angle to the next quarter turn from which on it is mentioned
 _QUARTERS = (False, False, False), (True, False, True), (False, True, True), (True, True, False)
 """Transposed, mirrored across and mirrored down, for each number of quarter turns against the clock."""
 
@@ -23,14 +22,10 @@ _QUARTERS = (False, False, False), (True, False, True), (False, True, True), (Tr
 class Display(NamedTuple):
     """How a stored picture is shown: stretched to square pixels, then transposed, then mirrored."""
 
-    aspect: float = 1.0
-    """Width of a stored pixel over its height."""
-    transposed: bool = False
-    """Whether rows and columns are exchanged."""
-    across: bool = False
-    """Whether left and right are exchanged afterwards."""
-    down: bool = False
-    """Whether top and bottom are exchanged afterwards."""
+    aspect: float = 1.0  #: Width of a stored pixel over its height.
+    transposed: bool = False  #: Whether rows and columns are exchanged.
+    across: bool = False  #: Whether left and right are exchanged afterwards.
+    down: bool = False  #: Whether top and bottom are exchanged afterwards.
 
     @property
     def is_turned(self) -> bool:

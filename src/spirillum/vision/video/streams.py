@@ -32,10 +32,8 @@ _OPENING = {
     "max_streams": "100",
 }
 """A video is one file: no playlist that opens other files, or asks a network for them."""
-_FEW = 2
-"""Frames of a stream that is a picture, not a video."""
-_NEAR = 0.02
-"""Least part of a video that is flagged as missing."""
+_FEW = 2  # frames of a stream that is a picture, not a video
+_NEAR = 0.02  # least part of a video that is flagged as missing
 _LOOSE = 0.5
 """Least part of a video that is flagged as missing where its length is that of the whole file, with sound, s."""
 
@@ -43,12 +41,9 @@ _LOOSE = 0.5
 class Stated(NamedTuple):
     """Length of a video as its file states it."""
 
-    duration: float | None
-    """Length in time, s."""
-    frames: int
-    """Number of frames; 0 where it is not stated."""
-    tolerance: float
-    """By how much a video that is read to its end may fall short of that length, s."""
+    duration: float | None  #: Length in time, s.
+    frames: int  #: Number of frames; 0 where it is not stated.
+    tolerance: float  #: By how much a video that is read to its end may fall short of that length, s.
 
 
 UNSTATED = Stated(None, 0, _LOOSE)
@@ -185,20 +180,13 @@ _SAMPLED_IMAGES = 10
 class ImageSequence:
     """Images that are read one by one."""
 
-    files: tuple[Path, ...]
-    """The files of the images, or the one whose pages they are."""
-    pages: int
-    """Number of pages; 0 where each image is a file."""
-    numbers: tuple[int, ...] = field(repr=False)
-    """Numbers of the images from 0, counted as they were recorded."""
-    display: Display
-    """How the images are shown."""
-    header: Header = field(repr=False)
-    """What the first image states."""
-    bits: int
-    """Number of bits that their values fill."""
-    flags: tuple[Flag, ...] = ()
-    """What was done to them."""
+    files: tuple[Path, ...]  #: The files of the images, or the one whose pages they are.
+    pages: int  #: Number of pages; 0 where each image is a file.
+    numbers: tuple[int, ...] = field(repr=False)  #: Numbers of the images from 0, counted as they were recorded.
+    display: Display  #: How the images are shown.
+    header: Header = field(repr=False)  #: What the first image states.
+    bits: int  #: Number of bits that their values fill.
+    flags: tuple[Flag, ...] = ()  #: What was done to them.
 
     def __len__(self) -> int:
         """Number of images."""
