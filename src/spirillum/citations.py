@@ -11,8 +11,7 @@ from spirillum.fluid.registry import find_model
 from spirillum.version import own_version
 
 _TABLE = Path(__file__).with_name("references.csv").read_text(encoding="utf-8")
-REFERENCES: dict[str, str] = dict(csv.reader(_TABLE.splitlines()[1:]))
-"""Key to full reference."""
+REFERENCES: dict[str, str] = dict(csv.reader(_TABLE.splitlines()[1:]))  #: Key to full reference.
 
 _SOFTWARE = "The Spirillum developers. spirillum, version {version}."
 

@@ -22,10 +22,8 @@ def _explanations() -> dict[str, dict[str, str]]:
 
 
 _EXPLAINED = _explanations()
-TRACKING = _EXPLAINED["video"]
-"""Flags that the tracker and `measure` raise, by their names, with what they mean."""
-LONGEST = 160
-"""Largest number of characters of a sentence, without the names of robots and files in it."""
+TRACKING = _EXPLAINED["video"]  #: Flags that the tracker and `measure` raise, by their names, with what they mean.
+LONGEST = 160  #: Largest number of characters of a sentence, without the names of robots and files in it.
 
 
 class NoteKind(NamedTuple):

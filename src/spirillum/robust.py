@@ -8,8 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4)."""
+MAD_TO_SIGMA = 1.4826  #: Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4).
 _MOST_PIECES = 60  # points through which a repeated-median line goes at most: its work grows with their square
 
 

@@ -60,7 +60,6 @@ def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    """All tables of files."""
     for model in base.__subclasses__():
         yield model
         yield from _models(model)

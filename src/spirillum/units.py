@@ -30,8 +30,7 @@ _POWER_OF_A_POWER = re.compile(r"\d\s*(?:\*\*|\^)")
 _LONGEST_UNIT = 40
 _PREFIX = re.compile(r"([^\W\d]+)-(?=\s)")
 
-Hz = 2 * math.pi
-"""One turn per second in rad/s."""
+Hz = 2 * math.pi  #: One turn per second in rad/s.
 
 _SI: dict[str, float] = {
     **dict.fromkeys(("1", "m", "m/s", "rad/s", "kg", "N", "N m", "N m s/rad", "W", "A", "V", "s"), 1.0),

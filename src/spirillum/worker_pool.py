@@ -181,7 +181,6 @@ def map_tasks(
 
 
 def _client(address: str) -> Any:
-    """A connection to a scheduler."""
     distributed = import_optional("distributed", "a study on a cluster", "cluster")
     for name in ("distributed", "distributed.core", "distributed.client", "distributed.comm"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is said in a sentence
@@ -195,7 +194,6 @@ def _client(address: str) -> Any:
 
 
 def _about() -> tuple[str, str]:
-    """Versions of a worker."""
     return own_version(), versions()
 
 

@@ -97,7 +97,6 @@ def calibrate(
 
 
 def _stated(given: Sequence[str]) -> dict[str, str]:
-    """Field to share of `--assume-uncertainty`."""
     found: dict[str, str] = {}
     for item in given:
         name, equals, share = item.partition("=")

@@ -159,7 +159,6 @@ def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
 
 
 def _lab(path: Path | None, changes: list[str] | None) -> Lab:
-    """The lab of a file with fields changed."""
     from spirillum.controllers.lab import Lab
     from spirillum.robot.load import parse_setting
 

@@ -63,8 +63,7 @@ _EXAMPLES = {
     "spacing": "2mm",
 }
 """Of quantities, by kind or argument."""
-GIVEN_OTHERWISE = ("robot", "progress", "tell")
-"""Arguments of functions that every command gives in its own way."""
+GIVEN_OTHERWISE = ("robot", "progress", "tell")  #: Arguments of functions that every command gives in its own way.
 
 
 class Declaration(NamedTuple):
@@ -224,7 +223,6 @@ class FunctionCommand(InterruptibleCommand):
 
 
 def _complete(source: FunctionSource) -> Callable[..., None]:
-    """The command with all its parameters."""
     own = dict(list(inspect.signature(source.body).parameters.items())[1:])
     hints = get_type_hints(source.body, include_extras=True)
     made = {
@@ -391,7 +389,6 @@ def _class_fields(module: str, table: str) -> Iterator[Declaration]:
 
 
 def _is_table(module: str, name: str) -> bool:
-    """Whether a name is a table of options."""
     home = _home(module, name)
     bases = [item.bases for item in _tree(home).body if isinstance(item, ast.ClassDef) and item.name == name]
     return any(ast.unparse(base) == "Options" for found in bases for base in found)

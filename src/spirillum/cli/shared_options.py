@@ -12,10 +12,8 @@ import typer
 
 from spirillum.cli.interrupts import InterruptibleCommand
 
-MODEL_PANEL = "Model"
-"""Panel of the help: which model answers, with which friction and calibration, how finely."""
-PLACE_PANEL = "Pose in the channel (model tube)"
-"""Panel of the help: pose of the robot in its channel."""
+MODEL_PANEL = "Model"  #: Panel of the help: which model answers, with which friction and calibration, how finely.
+PLACE_PANEL = "Pose in the channel (model tube)"  #: Panel of the help: pose of the robot in its channel.
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
@@ -114,8 +112,7 @@ PANELS = {
     "setup_errors.": "Errors of the setup file",
 }
 """Panels of the help by argument, or by table (with a point)."""
-LISTED = "NAME,..."
-"""Placeholder of names separated by commas."""
+LISTED = "NAME,..."  #: Placeholder of names separated by commas.
 METAVARS = {
     "camera.size": "WIDTHxHEIGHT",
     "free": LISTED,

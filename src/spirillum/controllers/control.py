@@ -54,8 +54,7 @@ if TYPE_CHECKING:
 
 
 _TASKS: tuple[type[Task], ...] = (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask, KeepAxisTask)
-TASKS = {task.kind: task for task in _TASKS}
-"""Tasks by their kinds."""
+TASKS = {task.kind: task for task in _TASKS}  #: Tasks by their kinds.
 
 
 def task_of(value: Task | Mapping[str, Any]) -> Task:
@@ -351,7 +350,6 @@ def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
 
 
 def _check_memory(duration: float, lab: Lab) -> None:
-    """Refuse a run whose record does not fit into memory."""
     rate = lab.camera.fps + lab.meter.rate + 2.0 / lab.remote.period
     cause = f"task.duration = {show(duration, 's')} with {rate:.4g} frames, readings, decisions and commands a second"
     check_memory(cause, duration * rate, "events", _EVENT, "as with a shorter duration or a lower camera.fps")
@@ -373,7 +371,6 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
 
 
 def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
-    """What to be careful about in a run."""
     warnings = []
     end, latency = run.moments[-1].time, lab.camera.latency
     if latency >= end:
@@ -392,7 +389,6 @@ def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
 
 
 def _fields(options: Any) -> dict[str, Any]:
-    """Fields of options as data."""
     return {
         item.path: item.value if item.unit is None or item.value is None else quantity(item.value, item.unit)
         for item in field_values(options)

@@ -37,8 +37,7 @@ from spirillum.robot.fields import Length, Velocity
 from spirillum.units import show
 
 _CATCH_UP = 3.0  # T, s
-LEASH = 0.3
-"""l / (T v) of a controller that holds a speed."""
+LEASH = 0.3  #: l / (T v) of a controller that holds a speed.
 _WALK, _DRIFT = 0.05, 3e-5
 """Of the follower. Where the duty changes little, s and w show in the same way: a w that may be large would take what
 belongs to s, and forget it."""

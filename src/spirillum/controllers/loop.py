@@ -20,8 +20,7 @@ from spirillum.dynamics.integration import INTERRUPTED, Progress
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError
 
-SILENCE = 1.0
-"""The drive is off so long after the last frame has arrived, s."""
+SILENCE = 1.0  #: The drive is off so long after the last frame has arrived, s.
 _LEAST_PATIENCE = 0.5 * SILENCE
 """A remote that needs more than the rest of `SILENCE` switches the drive off later, by what it needs more, s."""
 _LONGEST_WAIT = 12.0  # so long the robot swims on without being seen while it is learnt how it looks, s

@@ -46,8 +46,7 @@ Law = Literal["position", "aim"]
 
 _CLOSED = 5.0  # T, s
 _AHEAD = 2.0  # L over the body's length
-MOST_TILT = np.radians(3.0)
-"""Largest tilt, rad."""
+MOST_TILT = np.radians(3.0)  #: Largest tilt, rad.
 _OBSERVED_OVER = 0.7  # time constant of the observer, s
 _TURNS_OVER = 2.0  # time over which the body's turning is compared with the field's, s
 _SLIPS, _SLOWER = 0.9, 0.8

@@ -161,8 +161,7 @@ def entity(name: str, frame: str, shapes: Sequence[Json], kind: str) -> Json:
     }
 
 
-RECORDINGS = {".mcap": "a recording for Foxglove"}
-"""Endings of the files that can be written."""
+RECORDINGS = {".mcap": "a recording for Foxglove"}  #: Endings of the files that can be written.
 _LAB, _BODY, _ROTOR = "lab", "body", "rotor"
 _TRANSFORM, _POSE_IN_FRAME, _SCENE, _IMAGE, _LOG = SCHEMAS
 _NUMBERS = "spirillum.Quantities"
@@ -172,8 +171,7 @@ _QUALITY = 85
 _SLOWEST, _FASTEST = 1e-6, 1e6
 _LONGEST_TUBE = 2.0  # length of a tube of unspecified length, over that of the robot's path and the robot together
 
-Message = tuple[str, str, float, dict[str, Any]]
-"""Topic, name of the schema, time in s, content."""
+Message = tuple[str, str, float, dict[str, Any]]  #: Topic, name of the schema, time in s, content.
 
 
 @dataclass(frozen=True, repr=False)
@@ -309,7 +307,6 @@ def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:
 
 
 def _numbers_of(dataset: xr.Dataset) -> list[str]:
-    """Variables that are one number at each time."""
     return [
         str(name) for name, item in dataset.data_vars.items() if item.dims == ("time",) and item.dtype.kind in "fiu"
     ]
@@ -321,7 +318,6 @@ def _meanings(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
-    """Robot and tube; the parts move with their frames."""
     pieces = robot_mesh(robot, fineness=_FINENESS)
     entities = [
         entity(piece.name, piece.part, triangles(piece.vertices, piece.faces, piece.colours), "triangles")
@@ -366,7 +362,6 @@ def _events(dataset: xr.Dataset) -> Iterator[Message]:
 
 
 def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[Message]:
-    """Frames of a video during the run."""
     from spirillum.vision.video.frames import open_video
 
     pictures = import_optional("PIL.Image", "a video in a recording", "video")

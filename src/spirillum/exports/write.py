@@ -108,8 +108,7 @@ KINDS_OF_FILES = {
     ".fmu": "a co-simulation unit (FMI 3.0)",
 }
 """Endings of the files that can be written."""
-STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
-"""Units of STL files, m."""
+STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}  #: Units of STL files, m.
 
 
 class ExportFile(NamedTuple):
@@ -352,7 +351,6 @@ def _shape_of(
 
 
 def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    """The FMU of a robot in axial motion, written."""
     from spirillum.interfaces.fmu import axial_model
 
     axial = axial_robot(robot, **options)
@@ -361,7 +359,6 @@ def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **o
 
 
 def _released_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    """The FMU of a robot that is released in its tube, written."""
     from spirillum.interfaces.fmu import free_model
 
     if options["model"] not in (AUTO, "tube"):

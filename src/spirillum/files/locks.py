@@ -15,8 +15,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
-LEFTOVER = ".spirillum-part-"
-"""Prefix of the hidden folders in which files are made before they are renamed."""
+LEFTOVER = ".spirillum-part-"  #: Prefix of the hidden folders in which files are made before they are renamed.
 _TRIES = 20
 _held: set[int] = set()
 _swept: set[Path] = set()

@@ -169,7 +169,6 @@ def _declared(item: Any, path: Path, what: str) -> int:
 
 
 def _texts(item: Any, path: Path, what: str) -> int:
-    """Bytes of all texts of a variable."""
     count = prod(item.shape or ())
     if count * item.file.id.get_filesize() <= _LONGEST_TEXTS or item.ndim != 1:
         if item.ndim > 1 and count > MOST_VARIABLES:

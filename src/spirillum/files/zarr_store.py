@@ -27,8 +27,7 @@ _SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "asyn
 _LEVEL = 1  # of compression: faster than a disk, and floats gain nothing from more
 _CHECKSUM = 4  # bytes of the checksum at the end of a chunk
 
-Place = Sequence[tuple[int, int]]
-"""First index, and the one behind the last, along each dimension."""
+Place = Sequence[tuple[int, int]]  #: First index, and the one behind the last, along each dimension.
 
 
 class Stored(NamedTuple):

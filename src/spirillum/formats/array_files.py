@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Variable: TypeAlias = tuple[tuple[str, ...], Any, Mapping[str, Any]]
-"""Dimensions, values and attributes."""
+Variable: TypeAlias = tuple[tuple[str, ...], Any, Mapping[str, Any]]  #: Dimensions, values and attributes.
 
 
 class Labelled(NamedTuple):

@@ -65,7 +65,6 @@ def _checked_names(path: Path, metadata: Any) -> list[str]:
 
 
 def _values(path: Path, name: str, column: Any) -> list[Any]:
-    """Cells of a column."""
     texts = column.dictionary if hasattr(column, "dictionary") else column
     if texts.nbytes > LONGEST_CELL * max(len(texts), 1) + (1 << 16):
         raise InputError(f"{path}, column {name[:60]}: texts of {texts.nbytes} bytes; allowed: short ones")

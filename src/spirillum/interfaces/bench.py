@@ -17,8 +17,7 @@ from spirillum.interfaces.serial_remote import SerialRemote, VirtualRemote
 from spirillum.live.tracker import LiveTracker
 from spirillum.virtual.live_camera import VirtualCamera
 
-VIRTUAL = "virtual"
-"""Port of a remote that is made for the run, on a pseudo-terminal."""
+VIRTUAL = "virtual"  #: Port of a remote that is made for the run, on a pseudo-terminal.
 _TRIES = 3
 """How often a virtual remote is polled before it counts as gone: a busy machine may delay it, but not the robot, whose
 time stands still.

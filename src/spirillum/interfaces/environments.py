@@ -84,7 +84,6 @@ _BAR = 40
 
 
 def _spaces(task: TaskEnvironment) -> tuple[spaces.Box, spaces.Space[Any]]:
-    """Observation and actions of one robot."""
     low, high = (np.array([getattr(item, end) for item in task.observed], dtype=np.float32) for end in ("low", "high"))
     actions = spaces.Discrete(2) if task.on_off else spaces.Box(0.0, 1.0, (1,), dtype=np.float32)
     return spaces.Box(low, high, dtype=np.float32), actions

@@ -233,7 +233,6 @@ def _sources(model: FmuModel) -> dict[str, bytes]:
 
 
 def _header(model: FmuModel, token: str) -> str:
-    """The robot for the C source: `robot.h`."""
     defined = {
         "TOKEN": f'"{token}"',
         "FLOW_INPUT": str(int(model.flow is not None)),

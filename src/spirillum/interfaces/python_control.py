@@ -187,7 +187,6 @@ def _inputs(axial: AxialRobot) -> list[str]:
 
 
 def _inputs_of(u: Samples) -> tuple[float, float]:
-    """Duty and flow from a system's inputs."""
     if not np.all(np.isfinite(u)):
         name = INPUTS[int(np.flatnonzero(~np.isfinite(u))[0])]
         raise InputError(f"{name} = {float(u[~np.isfinite(u)][0])}; allowed: a number")

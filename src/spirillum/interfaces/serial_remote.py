@@ -26,10 +26,8 @@ from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, as_given, parse_option
 
-LONGEST_LINE = 80
-"""Bytes of a line, its end included; what is longer is thrown away."""
-WATCHDOG = 0.5
-"""Without a valid command for so long the receiver switches the motor off, s."""
+LONGEST_LINE = 80  #: Bytes of a line, its end included; what is longer is thrown away.
+WATCHDOG = 0.5  #: Without a valid command for so long the receiver switches the motor off, s.
 
 
 def framed(body: str) -> bytes:

@@ -200,7 +200,6 @@ class TaskEnvironment(ABC):
         """The numbers of `observed`, each (count,), before they are cut off at their bounds."""
 
     def _duty(self, actions: Any) -> Samples:
-        """The commanded duties."""
         try:
             values = np.asarray(actions, dtype=np.float64).reshape(-1)
         except (TypeError, ValueError, OverflowError):

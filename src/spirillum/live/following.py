@@ -106,7 +106,6 @@ class CameraWatch:
         return flags
 
     def _compared(self, pictures: list[np.ndarray]) -> tuple[Flag, ...]:
-        """Flags on some pictures, against the first ones."""
         now = view_of(pictures, self._start, ruled=self._ruled)
         if self._first is None:
             self._first = now
@@ -255,7 +254,6 @@ class Following:
         return (Flag("uneven-stripes", sentence, (_BODY,)),)
 
     def _rates(self, body_error: float, tail_error: float) -> dict[str, Measured]:
-        """Speed and rates over the window."""
         slopes = {name: window.slope(LEVEL) for name, window in self.windows.items()}
         pixel, scale = self.scale.length_per_pixel, self.scale.relative_uncertainty
         known = {name: slope[0] if math.isfinite(slope[0]) else 0.0 for name, slope in slopes.items()}
@@ -291,7 +289,6 @@ class Following:
         return found
 
     def _forget(self, count: int) -> None:
-        """Forget the first frames."""
         record = self.follower.record
         columns = (record.time, record.index, record.placed, record.roll, record.edges, record.tail, record.change)
         for column in columns:

@@ -152,7 +152,6 @@ def _shown(source: Source, stream: Any, frame: Any) -> Callable[[Any], np.ndarra
 
 
 def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | None) -> tuple[int, int]:
-    """The size of the pictures."""
     if size == expected:
         return size
     if expected is not None:

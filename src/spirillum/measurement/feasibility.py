@@ -210,7 +210,6 @@ def _first(*values: tuple[float | None, str]) -> tuple[float, str]:
 def _warnings(
     checks: Sequence[Check], expected: Mapping[str, tuple[float, str]], pixel: float, shares: Mapping[str, float]
 ) -> list[Note]:
-    """What to be careful about in the checks."""
     warnings = [Note("cannot-resolve", check.sentence, (check.name,)) for check in checks if not check.passed]
     if not math.isfinite(pixel):
         words = "the size of a pixel is unknown: sizes in the picture and intervals are not given; state --view-width"

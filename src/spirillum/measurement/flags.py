@@ -74,12 +74,9 @@ def elongation_of(track: Track) -> Elongation:
 
 SEEN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
 """Rates measured directly; that of the motor follows from them."""
-BY_HAND = "by-hand"
-"""Name of the flag of a track of manual readings alone."""
-IMPORTED = "imported"
-"""Name of the flag of a track from another program."""
-SYNTHETIC = "synthetic"
-"""Word in the metadata of computed videos, and name of the flag."""
+BY_HAND = "by-hand"  #: Name of the flag of a track of manual readings alone.
+IMPORTED = "imported"  #: Name of the flag of a track from another program.
+SYNTHETIC = "synthetic"  #: Word in the metadata of computed videos, and name of the flag.
 _MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
 """Share and number of outliers above which a flag is raised: a good video may show one or two."""
 _FEWEST_FRAMES = 4  # fewest measured frames of a video that give a rate

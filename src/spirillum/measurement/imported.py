@@ -79,7 +79,6 @@ def read_track(
 
 
 def _check_inside(rows: Sequence[TableRow], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
-    """Refuse points from outside the picture."""
     for name, values, pixels in zip(names, points.T, size, strict=True):
         for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
             raise rows[int(place)].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")

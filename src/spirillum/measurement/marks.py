@@ -281,7 +281,6 @@ def frames_read(track: Track, marks: Marks) -> np.ndarray:
 
 
 def _frames_of(track: Track, marks: Marks) -> np.ndarray:
-    """Index into the track of each reading."""
     step = float(np.median(np.diff(track.time))) if track.time.size > 1 else np.inf
     found = np.empty(marks.frame.size, dtype=np.int64)
     for number, (frame, time) in enumerate(zip(marks.frame, marks.time, strict=True)):

@@ -116,8 +116,7 @@ def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
 
 
 Progress = Callable[[str, int, int], None]
-TABLE = "observations.csv"
-"""Name of the table that a measurement writes."""
+TABLE = "observations.csv"  #: Name of the table that a measurement writes.
 
 
 @dataclass(frozen=True, repr=False)
@@ -356,7 +355,6 @@ def _clash(one: str, other: str) -> bool:
 def _readings(
     paths: Sequence[Path], marks: str | Path | None, track: str | Path | None, *, tracking: bool
 ) -> list[Marks | None]:
-    """The readings by hand of each video."""
     if track is not None and len(paths) != 1:
         raise InputError(f"track = {track} with {len(paths)} videos; allowed: one video")
     if marks is None:

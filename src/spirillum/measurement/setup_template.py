@@ -69,8 +69,7 @@ def depth_shares(setup: Setup) -> dict[str, float]:
     return found
 
 
-OPEN = "FILL IN"
-"""Placeholder of a number that only the experimenter knows: no file with it is valid."""
+OPEN = "FILL IN"  #: Placeholder of a number that only the experimenter knows: no file with it is valid.
 _YOURS = "CHECK: a usual standard uncertainty, not yours"
 _TEMPLATE = Path(__file__).with_name("setup_template.toml")
 """A setup file whose fields have an example and a comment. What is commented out is left out until needed."""
@@ -227,8 +226,7 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     return seen, (*video.flags, *learnt.sight.flags, *size_flags, *learnt.flags, *moved)
 
 
-Fields = Mapping[str, Any]
-"""Texts with their unit, numbers and lists of names by dotted field."""
+Fields = Mapping[str, Any]  #: Texts with their unit, numbers and lists of names by dotted field.
 
 
 def setup_file(fields: Fields) -> str:

@@ -15,8 +15,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.units import for_people, shown_in
 
-NORMAL = 1.959964
-"""Half width of a 95 % interval over its standard deviation, of a normal distribution."""
+NORMAL = 1.959964  #: Half width of a 95 % interval over its standard deviation, of a normal distribution.
 
 
 class Mean(NamedTuple):
@@ -64,18 +63,15 @@ STRIPE_ERROR = math.radians(0.2)
 """Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
 PHASE_ERROR = math.radians(1.0)
 """Least expected amplitude of errors of the tail's phase that repeat once or twice a turn, rad."""
-DRIFT_PIXELS = 0.01
-"""Drift of the position error from end to end, by light and perspective, pixels."""
-DRIFT_BARE = 0.1
-"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos."""
+DRIFT_PIXELS = 0.01  #: Drift of the position error from end to end, by light and perspective, pixels.
+DRIFT_BARE = 0.1  #: Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos.
 DRIFT_ANGLE = math.radians(0.1)
 """Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
 POSITION_ERROR = 0.25
 """Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
 HEADING_ERROR = math.radians(0.2)
 """Systematic standard error of the heading of a body that is `LONG` pixels long, rad."""
-LONG = 100.0
-"""Length of a body whose heading has that error, pixels."""
+LONG = 100.0  #: Length of a body whose heading has that error, pixels.
 
 
 _MOST_DIGITS = 7  # digits of a value at most, however narrow its interval is

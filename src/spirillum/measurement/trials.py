@@ -33,10 +33,8 @@ from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.track import Track
 
-LEVEL = 0.95
-"""Confidence level of all intervals."""
-RATE_NAMES = (*SEEN, "motor_rotation_rate")
-"""Quantities that are slopes of a series."""
+LEVEL = 0.95  #: Confidence level of all intervals.
+RATE_NAMES = (*SEEN, "motor_rotation_rate")  #: Quantities that are slopes of a series.
 WOBBLES = (
     "lateral_wobble_at_tail_rate",
     "lateral_wobble_at_body_rate",

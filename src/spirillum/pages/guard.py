@@ -81,8 +81,7 @@ HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
 }
 """Headers of every response."""
-LARGEST_MESSAGE = 4096
-"""Bytes of a message from a client."""
+LARGEST_MESSAGE = 4096  #: Bytes of a message from a client.
 _KEY_BYTES = 24
 
 

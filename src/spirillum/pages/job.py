@@ -48,8 +48,7 @@ async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _A
     return await future
 
 
-Tell = Callable[..., None]
-"""Callback of progress messages, by name."""
+Tell = Callable[..., None]  #: Callback of progress messages, by name.
 
 
 class BackgroundJob:

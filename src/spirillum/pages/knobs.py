@@ -85,11 +85,9 @@ def _knobs() -> Iterator[Knob]:
         yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")
 
 
-KNOBS = tuple(_knobs())
-"""All knobs, in their order, without the model, the remote and the duty."""
+KNOBS = tuple(_knobs())  #: All knobs, in their order, without the model, the remote and the duty.
 
-MODELS = ("auto", "tube", "slender", "rft")
-"""Models that can move a free robot."""
+MODELS = ("auto", "tube", "slender", "rft")  #: Models that can move a free robot.
 _BY_FIELD = {knob.field: knob for knob in KNOBS}
 _RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 

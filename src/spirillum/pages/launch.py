@@ -115,7 +115,6 @@ def _is_host(host: str) -> bool:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """A socket that listens."""
     found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -131,7 +130,6 @@ def _listening(host: str, port: int) -> socket.socket:
 
 
 def _replay(run: xr.Dataset | str | Path) -> tuple[Robot, dict[str, Any]]:
-    """The robot of a run, and the run to replay."""
     from spirillum.dynamics.run_file import open_run, robot_of
     from spirillum.pages.replay import replay_of_run
 

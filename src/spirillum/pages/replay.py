@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-LARGEST_RUN = 64 << 20
-"""Bytes of a run that is dropped on the page."""
+LARGEST_RUN = 64 << 20  #: Bytes of a run that is dropped on the page.
 _MOST = 6_000  # samples of a replay; longer runs are thinned, which the replay states
 
 

@@ -211,8 +211,7 @@ def _finite(value: Any) -> float | None:
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
-MOST = 12_000
-"""Samples that are kept; beyond it every other one is dropped."""
+MOST = 12_000  #: Samples that are kept; beyond it every other one is dropped.
 _DRAWN = 900  # samples of a plot's past, at most
 
 

@@ -38,8 +38,7 @@ def _entries() -> Iterator[Entry]:
         )
 
 
-FORM = tuple(_entries())
-"""Fields of the form, without the robot's file."""
+FORM = tuple(_entries())  #: Fields of the form, without the robot's file.
 
 _NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
 _KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}

@@ -114,7 +114,6 @@ def write_tables(dataset: xr.Dataset, folder: Path) -> tuple[list[dict[str, Any]
 
 
 def _ranking_rows(ranking: StudyRanking) -> str:
-    """The ranking as CSV, all of its robots; SI."""
     names = ranking.quantities
     header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of_ranked(name)]}" for name in names for end in _ENDS)]
     table = io.StringIO()

@@ -147,7 +147,6 @@ def _options(table: Mapping[str, Any]) -> ModelOptions:
 
 
 def _calibrations(robots: list[Mapping[str, Any]], models: list[str]) -> Iterator[dict[str, str]]:
-    """A line for each robot and model."""
     for robot in robots:
         for model in models:
             entry = (robot.get("calibration") or {}).get(model)

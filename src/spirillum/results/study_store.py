@@ -125,7 +125,6 @@ def _has_note(path: Path) -> bool:
 
 
 def _note_of(path: Path) -> _Note:
-    """Notes of a region."""
     what = "a note of a study"
     found = read_json(path, what)
     try:
@@ -192,7 +191,6 @@ def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
 
 
 def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
-    """The merged notes of all regions."""
     warnings = warnings_of(loaded)
     warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
     warnings += warnings_of_calibrations(loaded)

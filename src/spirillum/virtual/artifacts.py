@@ -139,8 +139,7 @@ _DISTURBANCES: dict[str, dict[str, Any]] = {
     "hand": {"hand": True},
 }
 """Artifacts that are disturbances of the picture (`Degradation`), and their typical size."""
-NAMES = (*_USUAL, *_DISTURBANCES)
-"""All artifacts that a rendered video may have."""
+NAMES = (*_USUAL, *_DISTURBANCES)  #: All artifacts that a rendered video may have.
 
 
 def with_troubles(

@@ -234,7 +234,6 @@ class _Filmed(NamedTuple):
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
-    """Robots of a study; None: the paper's robots."""
     if study is None:
         return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None)
     from spirillum.studies.study_loader import load_study
@@ -271,7 +270,6 @@ def _planned(
     index: int,
     gap: float | None = None,
 ) -> list[Planned]:
-    """The trials of the robot at an index of the study."""
     planned = []
     low, high = swimming_range(robot, camera)
     for number in range(1, plan.trials + 1):

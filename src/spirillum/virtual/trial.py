@@ -202,7 +202,6 @@ def _shown(
     camera: CameraOptions,
     progress: Callable[[str, int, int], None] | None,
 ) -> tuple[Robot, TrialMotion]:
-    """The robot of a video and its motion."""
     from spirillum.dynamics.run_file import open_run, robot_of
 
     if run is None or (isinstance(run, str | Path) and str(run) == RELEASED):

@@ -256,7 +256,6 @@ _NONE: Answer = {"value": None}  # of the time, which has no mean
 
 
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """What happened, a line each."""
     for event in merged_events([(event["time"], event["what"]) for event in events]):
         again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
         yield f"{event.time:.4g} s: {event.what}{again}"
@@ -404,7 +403,6 @@ def _learnt(learnt: Answer, drawn: Answer) -> str:
 
 
 def _scores(scores: Answer, unit: str) -> Blocks:
-    """Every controller with its intervals."""
     rows = grid("", "controller", "runs", "good", "mean error", "beyond feedback", "energy")
     for column in rows.columns[1:]:
         column.justify = "right"

@@ -150,7 +150,6 @@ def design(answer: Answer) -> Blocks:
 
 
 def _confirmed(designs: Sequence[Answer]) -> Table:
-    """Held and trial of the best designs."""
     paths = list(designs[0]["design"])
     units = {
         path: display_unit(designs[0]["design"][path]["value"], designs[0]["design"][path]["unit"]) for path in paths

@@ -70,7 +70,6 @@ def _in_words(text: str) -> str:
 
 
 def _legend(design: Design) -> list[Line2D]:
-    """Legend entries of the plotted elements."""
     found = [Line2D([], [], **_BEST, label="best")]
     if design.landscape is not None and _today(design) is not None:
         found.append(Line2D([], [], **_TODAY, label="today"))

@@ -260,7 +260,6 @@ def _at_glass(view: _View) -> tuple[Values, Values]:
 
 
 def _draw_strip(axes: Axes, view: _View) -> None:
-    """The pressure along the tube."""
     x, pressure = _at_glass(view)
     scale = UnitPrefix.of(pressure, "Pa")
     axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)

@@ -91,7 +91,6 @@ def plot(answer: Any) -> Plot:
 
 
 def _of_measurement(answer: Measurement) -> Figure:
-    """The first figure of a measurement."""
     for picture in measurement_figures(answer).values():
         return picture.figure()
     raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")

@@ -66,7 +66,6 @@ def prediction_figure(prediction: Prediction) -> Figure:
 
 
 def _rows(prediction: Prediction) -> Iterator[_Row]:
-    """The motions that have a speed."""
     over = prediction.band or prediction.intervals
     band = {} if over is None else over.of(_SPEED)
     held = "held at a pose" if prediction.model.placed else "axial motion"
@@ -95,7 +94,6 @@ def _bars(prediction: Prediction) -> Iterator[str]:
 
 
 def _missing(prediction: Prediction) -> Iterator[str]:
-    """Why a motion has no speed."""
     released = {"trial": prediction.trial, "steady motion": prediction.steady}
     reasons = {name: motion.reason for name, motion in released.items() if motion is not None and motion.reason}
     for reason in dict.fromkeys(reasons.values()):

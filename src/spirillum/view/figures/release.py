@@ -98,7 +98,6 @@ _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewi
 
 
 def _steady(axes: Axes, value: float) -> None:
-    """Plot the resting pose."""
     axes.axhline(value, **_STEADY)
 
 

@@ -16,12 +16,9 @@ from spirillum.units import Hz
 from spirillum.view.figures.study_panels import StudyView, spread
 from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, label_of_model, look_of_model
 
-MOST_CURVES = 6
-"""Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
-FEW_CURVES = 2
-"""Amplitudes with a curve of their own, for more than two models."""
-MOST_LARGE_MARKS = 60
-"""Robots of a list whose marks have full size."""
+MOST_CURVES = 6  #: Amplitudes with a curve of their own against the assumed motor rate, for one or two models.
+FEW_CURVES = 2  #: Amplitudes with a curve of their own, for more than two models.
+MOST_LARGE_MARKS = 60  #: Robots of a list whose marks have full size.
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
 _OBSERVED = COLOURS["black"]
 HOLLOW: Any = {"linestyle": "none", "marker": "D", "markersize": 7.5, "markerfacecolor": "none"}

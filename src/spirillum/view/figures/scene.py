@@ -17,8 +17,7 @@ from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.style import PAGE, UnitPrefix
 
-Metal = tuple[str, str, str]
-"""Colours of a shaded surface: shadow, middle, highlight."""
+Metal = tuple[str, str, str]  #: Colours of a shaded surface: shadow, middle, highlight.
 
 _SHELLS = 48
 _LARGEST_WIRE = 4000
@@ -100,8 +99,7 @@ def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: f
     )
 
 
-PHASE = 0.35 * np.pi
-"""Phase of the tail in the picture, rad."""
+PHASE = 0.35 * np.pi  #: Phase of the tail in the picture, rad.
 INK = "#1d2b33"
 FAINT = "#6b7d88"
 HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)

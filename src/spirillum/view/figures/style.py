@@ -37,10 +37,8 @@ COLUMN, PAGE = 3.35, 6.69
 """Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider."""
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings on the display of a session's own figures, which do not change ours."""
-PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}
-"""Line that represents an area in a legend."""
-DPI = 200
-"""Of PNG files."""
+PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}  #: Line that represents an area in a legend.
+DPI = 200  #: Of PNG files.
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}

@@ -27,8 +27,7 @@ from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plai
 if TYPE_CHECKING:
     import xarray as xr
 
-COLUMNS = {"single": COLUMN, "double": PAGE}
-"""Widths of a figure that fills one or both columns of a page, inches."""
+COLUMNS = {"single": COLUMN, "double": PAGE}  #: Widths of a figure that fills one or both columns of a page, inches.
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
 _LETTERS_BESIDE = 40  # letters of a legend, with seven for each line's sample, above which it has two columns
@@ -137,8 +136,7 @@ _LINE_OF: dict[str, Any] = {
 
 
 _MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")  # panels of the short figure, the first two that a run has
-PANELS = ("main", "all")
-"""Which panels a figure has: speed and gap, or everything."""
+PANELS = ("main", "all")  #: Which panels a figure has: speed and gap, or everything.
 
 
 def trajectory_figure(dataset: xr.Dataset, column: str = "double", panels: str = "all") -> Figure:
@@ -226,7 +224,6 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
-    """Settings of the run."""
     attrs = dataset.attrs
     found = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
     if in_tube:

@@ -81,7 +81,6 @@ def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _runs(truth: Any) -> list[slice]:
-    """Stretches of consecutive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], truth, [False]]).astype(np.int8)))
     return [slice(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 

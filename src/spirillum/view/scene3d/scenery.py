@@ -122,8 +122,7 @@ def _framed(
     return camera
 
 
-WALL = 0.035
-"""Displayed thickness of the glass, in radii: the true one is unknown."""
+WALL = 0.035  #: Displayed thickness of the glass, in radii: the true one is unknown.
 _SIDES = 144
 _MOST_MARKS = 300
 _CLEAR = 0.004  # alpha below which a side of a tube is not rendered

@@ -159,7 +159,6 @@ def _matrix(pose: PictureRegistration, size: tuple[int, int]) -> Samples:
 
 
 def _flat(image: np.ndarray) -> Samples:
-    """High-pass filtered brightness, about 0."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     grey = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_RGB2GRAY)
     wide = max(15.0, grey.shape[1] / 20.0)

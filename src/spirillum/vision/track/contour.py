@@ -42,8 +42,7 @@ CONTOUR = ContourConstants()
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""
 
-EDGE_CUES = ("outline", "seal", "coupling")
-"""What edges belong to, each a cue of its own to where the body is."""
+EDGE_CUES = ("outline", "seal", "coupling")  #: What edges belong to, each a cue of its own to where the body is.
 
 _ORDERS = 7, 4  # orders of the polynomials in the lens's x and y
 _NODES = 8, 5  # interpolation nodes in x and y

@@ -53,8 +53,7 @@ class AppearanceConstants:
 APPEARANCE = AppearanceConstants()
 
 
-Appearance = Literal["opaque", "glass", "unknown"]
-"""As `robot.appearance` of a setup."""
+Appearance = Literal["opaque", "glass", "unknown"]  #: As `robot.appearance` of a setup.
 
 
 def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> Appearance:

@@ -12,8 +12,7 @@ from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 
-ASPECTS = (0.2, 5.0)
-"""Least and largest width of a pixel over its height."""
+ASPECTS = (0.2, 5.0)  #: Least and largest width of a pixel over its height.
 _SLANT = 0.02  # tangent of an angle to the next quarter turn from which on it is mentioned
 _QUARTERS = (False, False, False), (True, False, True), (False, True, True), (True, True, False)
 """Transposed, mirrored across and mirrored down, for each number of quarter turns against the clock."""
@@ -68,8 +67,7 @@ class Display(NamedTuple):
         return picture[:: -1 if self.down else 1, :: -1 if self.across else 1]
 
 
-AS_STORED = Display()
-"""Display of pictures with square pixels that stand upright."""
+AS_STORED = Display()  #: Display of pictures with square pixels that stand upright.
 
 
 def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:

@@ -73,8 +73,7 @@ def ahead(items: Iterator[T], count: int) -> Iterator[T]:
         thread.join()
 
 
-FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
-"""Endings of videos."""
+FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")  #: Endings of videos.
 
 _PURPOSE = "measuring a video"
 _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
@@ -357,7 +356,6 @@ def _replaced(given: float | None, own: float) -> list[Flag]:
 
 
 def _images(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:
-    """A folder of images, or a TIFF file."""
     sequence = image_folder(path, aspect) if path.is_dir() else image_stack(path, aspect)
     if frames_per_second is None:
         what = "a folder of images" if path.is_dir() else "a TIFF file"

@@ -17,10 +17,8 @@ from spirillum.files.limits import LARGEST_PICTURE, MOST_IMAGES, MOST_PIXELS
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.video.display import Display
 
-IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-"""Endings of images."""
-STACKS = (".tif", ".tiff")
-"""Endings of files that may hold several pictures, one a page."""
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")  #: Endings of images.
+STACKS = (".tif", ".tiff")  #: Endings of files that may hold several pictures, one a page.
 _WHAT = "an image (png, jpg, tif, bmp)"
 _USUAL = 1280  # longest side of pictures that are looked at as a whole as they are, pixels
 _OPENERS = ("PNG", "JPEG", "TIFF", "BMP")  # formats as Pillow names what opens them; that of JPEG opens MPO too

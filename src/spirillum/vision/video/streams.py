@@ -46,8 +46,7 @@ class Stated(NamedTuple):
     tolerance: float  #: By how much a video that is read to its end may fall short of that length, s.
 
 
-UNSTATED = Stated(None, 0, _LOOSE)
-"""Length of a video whose file states none."""
+UNSTATED = Stated(None, 0, _LOOSE)  #: Length of a video whose file states none.
 
 
 def open_container(path: Path) -> Any:
