@@ -6,12 +6,14 @@ own (`units.txt`) where angle is a dimension, because 1 Hz of a rotating part is
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
@@ -91,35 +93,8 @@ class Kind:
         return f"{self.low} to {self.high}"
 
 
-KINDS: dict[str, Kind] = {
-    "length": Kind("length", "m", "18 mm", "1 nm", "100 m"),
-    "length or zero": Kind("length", "m", "10 mm", "0 m", "100 m"),
-    "length of either sign": Kind("length", "m", "10 mm", "-100 m", "100 m"),
-    "mass": Kind("mass", "kg", "10.7 g", "1e-21 kg", "1e6 kg"),
-    "density": Kind("density", "kg/m**3", "985 kg/m^3", "1e-3 kg/m^3", "1e5 kg/m^3"),
-    "viscosity": Kind("viscosity", "Pa s", "3.5 Pa s", "1e-6 Pa s", "1e6 Pa s"),
-    "pressure": Kind("pressure", "Pa", "100 kPa", "1 kPa", "1e9 Pa"),
-    "rate": Kind("rotation rate", "rad/s", "1.5 Hz", "-1e6 rad/s", "1e6 rad/s"),
-    "torque": Kind("torque", "N m", "0.1 mN m", "-1e6 N m", "1e6 N m"),
-    "rotary friction": Kind("rotary friction", "N m s/rad", "7e-7 N m s/rad", "0 N m s/rad", "1e6 N m s/rad", "N m s"),
-    "voltage": Kind("voltage", "V", "3.7 V", "1e-6 V", "1e4 V"),
-    "resistance": Kind("resistance", "ohm", "10.4 ohm", "0 ohm", "1e6 ohm"),
-    "inductance": Kind("inductance", "H", "0.082 H", "1e-9 H", "1e3 H"),
-    "torque constant": Kind("torque constant", "N m/A", "0.00045 N m/A", "1e-12 N m/A", "1e3 N m/A"),
-    "back-emf constant": Kind("back-emf constant", "V s/rad", "0.004 V s/rad", "0 V s/rad", "1e3 V s/rad", "V s"),
-    "magnetic moment": Kind("magnetic moment", "A m**2", "1e-4 A m^2", "1e-25 A m^2", "1e6 A m^2"),
-    "magnetic field": Kind("magnetic flux density", "T", "5 mT", "1e-12 T", "1e3 T"),
-    "moment angle": Kind("angle", "rad", "90 deg", "0 deg", "180 deg"),
-    "current": Kind("current", "A", "300 mA", "0 A", "1e6 A"),
-    "charge": Kind("charge", "C", "70 mA h", "1e-9 C", "1e9 C"),
-    "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
-    "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),
-    "angle": Kind("angle", "rad", "90 deg", "-1e6 rad", "1e6 rad"),
-    "pitch": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
-    "yaw": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
-    "velocity": Kind("velocity", "m/s", "-2 mm/s", "-1e3 m/s", "1e3 m/s"),
-    "time": Kind("time", "s", "2 s", "0 s", "1e9 s"),
-}
+_ROWS = csv.reader(Path(__file__).with_name("kinds.csv").read_text(encoding="utf-8").splitlines()[1:])
+KINDS: dict[str, Kind] = {kind: Kind(*words, also or None) for kind, *words, also in _ROWS}
 
 
 @lru_cache(maxsize=1)

@@ -23,6 +23,7 @@ from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
     COMPLETIONS,
+    EXAMPLES,
     LISTED,
     METAVARS,
     NAMES,
@@ -47,22 +48,6 @@ _BY_FIELD_TYPE = {
     "Pitch": "ANGLE",
     "Yaw": "ANGLE",
 }
-_EXAMPLES = {
-    "LENGTH": "0.5mm",
-    "ANGLE": "2deg",
-    "TIME": "2s",
-    "RATE": "1.2Hz",
-    "VELOCITY": "-2mm/s",
-    "phase": "90deg",
-    "camera.exposure": "5ms",
-    "camera.field_of_view": "5mm",
-    "until": "0.1mm",
-    "roughness": "20um",
-    "feasibility.speed": "1mm/s",
-    "feasibility.view_width": "5mm",
-    "spacing": "2mm",
-}
-"""Of quantities, by kind or argument."""
 GIVEN_OTHERWISE = ("robot", "progress", "tell")  #: Arguments of functions that every command gives in its own way.
 
 
@@ -348,7 +333,7 @@ def _help(item: Declaration, metavar: str | None) -> str:
     text = f"{text[:1].upper()}{text[1:]}"
     if metavar is None or "such as" in text:
         return text
-    example = _EXAMPLES.get(item.path, _EXAMPLES[metavar])
+    example = EXAMPLES.get(item.path, EXAMPLES[metavar])
     first, mark, rest = text.rstrip(".").partition(";")
     return f"{first}, such as {example}{mark}{rest}."
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import typer
 
     from spirillum.robot.robot import Robot
@@ -26,66 +26,16 @@ class Rule(NamedTuple):
     """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
 
 
-_FIELDS = ("gap", "eccentricity", "pitch", "yaw", "tail_drop", "ends")
-RULES: dict[str, tuple[Rule, ...]] = {
-    "calibrate": (
-        Rule(
-            "no posterior",
-            ("seed", "doublings"),
-            "with method '{method}', which samples no posterior; allowed: with method posterior",
-        ),
-    ),
-    "export": (
-        Rule(
-            "recording",
-            (
-                *("phase", "fineness", "unit", "sidecar", "no_sidecar", "model", "friction", "calibration"),
-                *("gap", "pitch", "flow", "settings"),
-            ),
-            "with .mcap; allowed: --film and --speed, for the run has its robot",
-        ),
-        Rule("no recording", ("film", "speed"), "with {ending}; allowed: only with .mcap"),
-    ),
-    "flow": (
-        Rule(
-            "no plane",
-            ("plane", "offset", "resolution"),
-            "without a plane (-o FILE), to which it belongs; allowed: both or neither",
-        ),
-        Rule(
-            "no volume", ("volume_resolution",), "without --volume FILE, to which it belongs; allowed: both or neither"
-        ),
-        Rule(
-            "run",
-            ("robot", "tail_rate", "friction", "settings", "phase", *_FIELDS, "flow"),
-            "together with a run, which states it; allowed: --run and --time alone",
-        ),
-        Rule(
-            "run with another model",
-            ("model",),
-            "together with a run, which states it; allowed: --run and --time alone",
-        ),
-    ),
-    "measure": (
-        Rule(
-            "feasibility",
-            ("output", "marks", "tracking", "track", "annotated", "figures", "start", "end"),
-            "with --feasibility, which measures nothing; allowed: without it",
-        ),
-        Rule(
-            "no feasibility",
-            (
-                *("feasibility_tail_rate", "feasibility_body_rate", "feasibility_speed", "duration"),
-                *("feasibility_frames_per_second", "view_width", "feasibility_picture_width"),
-            ),
-            "without --feasibility; allowed: with it",
-        ),
-    ),
-    "study": (
-        Rule("store", ("rows",), "{rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)"),
-        Rule("store", ("figures",), "with --store, which draws none; allowed: a folder of results (-o DIR)"),
-    ),
-}
+def _rules() -> dict[str, list[Rule]]:
+    """The rows of `rules.csv`."""
+    found: dict[str, list[Rule]] = {}
+    for row in csv.DictReader(Path(__file__).with_name("rules.csv").read_text(encoding="utf-8").splitlines()):
+        rule = Rule(row["state"], tuple(row["options"].split()), row["conflict"])
+        found.setdefault(row["command"], []).append(rule)
+    return found
+
+
+RULES = _rules()
 """Rules by command, in the order in which they are checked."""
 
 

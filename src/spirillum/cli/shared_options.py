@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from copy import copy
@@ -77,24 +78,18 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "direction": choices("left", "right"),
 }
 """Completions of the shell, by argument or field of a table."""
-NAMES = {
-    "answer": "--as",
-    "calibrated": "--no-calibration",
-    "degradation.glare_moves": "--glare-fixed",
-    "field.pitch": "--field-pitch",
-    "feasibility.body_rate": "--expect-body-rate",
-    "feasibility.frames_per_second": "--fps",
-    "feasibility.picture_width": "--width",
-    "feasibility.speed": "--expect-speed",
-    "feasibility.tail_rate": "--expect-tail-rate",
-    "field.yaw": "--field-yaw",
-    "in_tube.continued": "--continue",
-    "models": "--model",
-    "overwrite": "--force",
-    "posterior_for": "--for",
-    "rates": "--rate",
-}
-"""Options that are not named after the argument or field."""
+_ROWS = list(csv.DictReader(Path(__file__).with_name("options.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def _column(name: str) -> dict[str, str]:
+    """A column of `options.csv` by argument or field, which the docstrings of the functions do not have."""
+    return {path: row[name] for row in _ROWS for path in row["paths"].split() if row[name]}
+
+
+NAMES = _column("option")  #: Options that are not named after the argument or field.
+METAVARS = _column("placeholder")  #: Placeholder of a value in the help, where its kind does not give one.
+EXAMPLES = _column("example")  #: Of quantities, by kind or argument.
+TEXTS = _column("help")  #: Helps of arguments that docstrings explain elsewhere.
 PANELS = {
     **dict.fromkeys(("model", "friction", "calibrated", "calibration", "posterior", "posterior_for"), MODEL_PANEL),
     "resolution.": MODEL_PANEL,
@@ -113,42 +108,6 @@ PANELS = {
 }
 """Panels of the help by argument, or by table (with a point)."""
 LISTED = "NAME,..."  #: Placeholder of names separated by commas.
-METAVARS = {
-    "camera.size": "WIDTHxHEIGHT",
-    "free": LISTED,
-    "size": "WIDTHxHEIGHT",
-    "udp": "[HOST:]PORT",
-    "judged.statistic": "mean|quantile",
-    "maximise": "QUANTITY",
-    "minimise": "QUANTITY",
-    "posterior_for": "new|measured",
-    "subject_to": "CONDITION",
-}
-"""Placeholder of a value in the help, where its kind does not give one."""
-_FRICTION = (
-    "Friction model. none; rotor: in the joint, between body and tail; body: between body and "
-    "wall; paper: as eq. (19) is printed, on the tail from outside."
-)
-_TAIL_RATE = "Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive decides."
-TEXTS = {
-    "calibration": "Calibration file whose factors replace the robot's.",
-    "posterior": "Posterior of a calibration: its median replaces the robot's values, and the answer has intervals.",
-    "friction": _FRICTION,
-    "motion.friction": _FRICTION,
-    "degradation.glare_moves": "The glare stands still instead of moving with the body.",
-    "roughness": "Height of the asperities, such as 20um; else 1e-4 of the body's radius.",
-    "seed": "Seed of all random numbers.",
-    "tail_rate": _TAIL_RATE,
-    "motion.tail_rate": _TAIL_RATE,
-    "weight": "Do not let weight and buoyancy act, if the masses are known.",
-    "task.at": "stop-at: x of the body's mid-length at which to stop, such as 5mm.",
-    "task.law": "keep-axis: `position` (feedback of the position) or `aim` (at a point of the axis ahead).",
-    "task.rate": "keep-axis: rate of the field, such as 1Hz; else the robot's.",
-    "task.speed": "Tasks of speed: along the robot's path, such as 0.1mm/s.",
-    "task.tolerance": "Allowed distance from goal or course, such as 1mm.",
-    "tracking": "Use readings by hand alone; the video gives scale and times.",
-}
-"""Helps of arguments that docstrings explain elsewhere."""
 NO_FORM = {"resolution.form": "an option of the robot, model.tube.form"}
 """Fields of tables that are no options of commands, with the reason; so below."""
 NO_START = dict.fromkeys(("in_tube.wait", "in_tube.flow", "in_tube.continued"), "of a run over time: simulate")
