@@ -45,18 +45,9 @@ def calibrate(
     context: typer.Context,
     observations: _Observations,
     robot: _Robots,
-    friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
-    assume_uncertainty: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FIELD=SHARE",
-            help="Uncertainty of fluid.viscosity, motor.torque_constant or motor.back_emf_constant: half of its "
-            "relative 95 % interval, such as fluid.viscosity=5%; repeatable. Else taken as exact.",
-        ),
-    ] = None,
-    output: Annotated[
-        str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
-    ] = "spirillum-calibration",
+    friction: str = "rotor",
+    assume_uncertainty: list[str] | None = None,
+    output: str = "spirillum-calibration",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -161,12 +152,12 @@ def rank_models(
 def suggest(
     request: Request,
     *,
-    posterior: Annotated[Path, typer.Argument(help="Posterior of a calibration (posterior.nc).")],
+    posterior: Path,
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
     ] = None,
-    rows: Annotated[int, typer.Option(help="Candidates in the table.")] = 10,
+    rows: int = 10,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -204,27 +195,11 @@ def design(
     request: Request,
     *,
     vary: _Pairs,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Robot file of the best design (.toml).")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw objective, sensitivity and front: .png, .pdf or .svg.")
-    ] = None,
-    stl: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The best design as one closed body for a printer (.stl, in mm)."),
-    ] = None,
-    unknown: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIELD=LOW:HIGH", help="An unknown field, uniform over its range; repeatable."),
-    ] = None,
-    model: Annotated[
-        str,
-        typer.Option(
-            help="Hydrodynamic model: sbt, rft, slender or tube; auto: tube for a robot in a channel, slender without "
-            "one, by a surrogate in about a minute."
-        ),
-    ] = "auto",
+    output: Path | None = None,
+    plot: Path | None = None,
+    stl: Path | None = None,
+    unknown: list[str] | None = None,
+    model: str = "auto",
     json: Json = False,
 ) -> None:
     """Find the tail to build: the best values of some fields, under conditions and what is not known.

@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, TEXTS, Json, RunMovie, RunPlot, choices, starting
+from spirillum.cli.shared_options import PANELS, Json, RunMovie, RunPlot, choices, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -72,18 +72,8 @@ def control(
             rich_help_panel=PANELS["task."],
         ),
     ] = "stop-at",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
-    ] = None,
-    with_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--with",
-            metavar="PATH=VALUE",
-            help="A field of the lab, such as camera.latency=50ms; repeatable.",
-            rich_help_panel=_LAB,
-        ),
-    ] = None,
+    output: Path | None = None,
+    with_: list[str] | None = None,
     seen_by: Annotated[
         str,
         typer.Option(
@@ -92,16 +82,9 @@ def control(
             rich_help_panel=_LAB,
         ),
     ] = "model",
-    remote: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PORT",
-            help="Send the commands through a remote at a serial port; virtual: a simulated one.",
-            rich_help_panel=_LAB,
-        ),
-    ] = None,
-    model: Annotated[str, typer.Option(help="Hydrodynamic model: tube, slender, rft; or auto.")] = "auto",
-    roughness: Annotated[str | None, typer.Option(metavar="LENGTH", help=TEXTS["roughness"])] = None,
+    remote: str | None = None,
+    model: str = "auto",
+    roughness: str | None = None,
     plot: RunPlot = None,
     movie: RunMovie = None,
     json: Json = False,
@@ -170,7 +153,7 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
 def remote(
     request: Request,
     *,
-    port: Annotated[str, typer.Argument(help="Serial port of the remote, such as /dev/ttyUSB0 or COM3.")],
+    port: str,
     json: Json = False,
 ) -> None:
     """Switch a real motor on for a time, through a remote at a serial port. Needs the extra `control`.

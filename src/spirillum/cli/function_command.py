@@ -27,6 +27,7 @@ from spirillum.cli.shared_options import (
     LISTED,
     METAVARS,
     NAMES,
+    OWN,
     PANELS,
     TEXTS,
     NotedCommand,
@@ -220,7 +221,8 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
         needed = type(None) not in get_args(get_args(source.robot)[0])
         parameters = [_parameter("robot", source.robot, inspect.Parameter.empty if needed else None)]
     parameters += [_parameter(name, kind, default) for name, (_, kind, default) in made.items()]
-    parameters += [_parameter(name, hints[name], item.default) for name, item in own.items()]
+    command = source.body.__name__
+    parameters += [_parameter(name, _own(command, name, hints[name]), item.default) for name, item in own.items()]
     if source.robot is not None:
         parameters.insert(-1, _parameter("settings", Settings, None))
 
@@ -240,6 +242,16 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
     run.__annotations__ = {item.name: item.annotation for item in parameters}
     run.__doc__ = source.body.__doc__
     return run
+
+
+def _own(command: str, name: str, kind: Any) -> Any:
+    """Annotation of what a command takes beside the function's arguments: by `own_options.csv`, or as it is."""
+    row = OWN.get((command, name))
+    if row is None:
+        return kind
+    about: Any = {"metavar": row["placeholder"] or None, "help": row["help"], "rich_help_panel": row["panel"] or None}
+    argument = row["option"] == "argument"
+    return Annotated[kind, typer.Argument(**about) if argument else typer.Option(*row["option"].split(), **about)]
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:

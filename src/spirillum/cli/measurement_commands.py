@@ -12,7 +12,6 @@ from spirillum.cli.function_command import FunctionCommand, Request, from_functi
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
     DISTURBANCES_PANEL,
-    PANELS,
     Json,
     NotedCommand,
     Settings,
@@ -38,21 +37,10 @@ def measure(
     request: Request,
     *,
     context: typer.Context,
-    videos: Annotated[
-        list[Path] | None, typer.Argument(metavar="VIDEO...", help="Videos or folders of images, one a trial.")
-    ] = None,
-    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
-        "spirillum-measurement"
-    ),
-    feasibility: Annotated[
-        bool,
-        typer.Option(
-            "--feasibility",
-            help="Does the camera of --setup resolve the expected rates?",
-            rich_help_panel=PANELS["feasibility."],
-        ),
-    ] = False,
+    videos: list[Path] | None = None,
+    setup: Path | None = None,
+    output: Path = Path("spirillum-measurement"),
+    feasibility: bool = False,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -103,10 +91,8 @@ def measure(
 def track(
     request: Request,
     *,
-    source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...).")
-    ],
-    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
+    source: str,
+    setup: Path | None = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -194,9 +180,7 @@ _Trouble = Annotated[
 def render(
     request: Request,
     *,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
-    ],
+    output: Path,
     preset: _Preset = "clean",
     trouble: _Trouble = None,
     json: Json = False,
@@ -226,12 +210,8 @@ def render(
 def virtual_experiment(
     request: Request,
     *,
-    study: Annotated[
-        Path | None, typer.Argument(help="Study file (see `spirillum schema study`); else the paper's two presets.")
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the videos.")] = Path(
-        "spirillum-virtual-experiment"
-    ),
+    study: Path | None = None,
+    output: Path = Path("spirillum-virtual-experiment"),
     preset: _Preset = "clean",
     json: Json = False,
 ) -> None:
@@ -252,7 +232,7 @@ setup_app = typer.Typer(name="setup", help="Setup files: camera, tank, ruler and
 
 @setup_app.command("new", cls=FunctionCommand)
 @from_function("spirillum.measurement.setup_template:new_setup_file", without={"path": "the argument"}, robot=None)
-def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to write (.toml).")]) -> None:
+def new(request: Request, *, file: Path) -> None:
     """Write a setup file to fill in.
 
     Example: `spirillum setup new setup.toml`
@@ -266,13 +246,9 @@ def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to 
 def propose(
     request: Request,
     *,
-    film: Annotated[Path, typer.Argument(help="A film, or a folder of images.")],
-    robot: Annotated[
-        str | None, typer.Argument(help="Preset or robot file; else the paper's robot is looked for.")
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.toml).")] = Path(
-        "setup.toml"
-    ),
+    film: Path,
+    robot: str | None = None,
+    output: Path = Path("setup.toml"),
     json: Json = False,
 ) -> None:
     """Inspect a video and write a setup file: detected values are filled in, the rest is marked.

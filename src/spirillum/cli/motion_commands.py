@@ -14,9 +14,6 @@ from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
-    PICTURES_PANEL,
-    START_PANEL,
-    TIMING_PANEL,
     Json,
     Output,
     RunMovie,
@@ -55,38 +52,13 @@ _FullModel = Annotated[
 def simulate(
     request: Request,
     *,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
-    ] = None,
+    output: Path | None = None,
     model: _FullModel = "auto",
-    on: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FROM:TO",
-            help="When the remote switches the drive on, such as 0s:2s; repeatable.",
-            rich_help_panel=TIMING_PANEL,
-        ),
-    ] = None,
-    flow: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VELOCITY|FILE",
-            help="Free, tube: imposed mean flow, such as 1mm/s, or over time: CSV with the columns time_s, flow_mm_s.",
-            rich_help_panel=START_PANEL,
-        ),
-    ] = None,
+    on: list[str] | None = None,
+    flow: str | None = None,
     plot: RunPlot = None,
-    panels: Annotated[
-        str | None,
-        typer.Option(help="With --plot: main (speed and gap) or all; else main.", rich_help_panel=PICTURES_PANEL),
-    ] = None,
-    column: Annotated[
-        str | None,
-        typer.Option(
-            help="With --plot: its width, single or double, as the columns of a page; else double.",
-            rich_help_panel=PICTURES_PANEL,
-        ),
-    ] = None,
+    panels: str | None = None,
+    column: str | None = None,
     movie: RunMovie = None,
     json: Json = False,
 ) -> None:
@@ -187,7 +159,7 @@ def magnetic_sweep(
     request: Request,
     *,
     output: Output,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Also plot it: .png, .pdf or .svg.")] = None,
+    plot: Path | None = None,
     json: Json = False,
 ) -> None:
     """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.
@@ -213,10 +185,7 @@ def magnetic_sweep(
 def settle(
     request: Request,
     *,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", "--plot", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg."),
-    ] = None,
+    output: Path | None = None,
     json: Json = False,
 ) -> None:
     """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.

@@ -139,19 +139,11 @@ def export(
     request: Request,
     *,
     context: typer.Context,
-    target: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
-        ),
-    ],
-    sidecar: Annotated[
-        bool,
-        typer.Option("--sidecar", help="Masses and 12x12 resistance in a JSON file beside .stl, .glb and .vtp too."),
-    ] = False,
-    no_sidecar: Annotated[bool, typer.Option("--no-sidecar", help="Leave it out beside .urdf and .mjcf.")] = False,
-    film: Annotated[Path | None, typer.Option(metavar="FILE", help="For .mcap: a video of the run to include.")] = None,
-    speed: Annotated[float, typer.Option(help="For .mcap: time of the run over time of that film.")] = 1.0,
+    target: Path,
+    sidecar: bool = False,
+    no_sidecar: bool = False,
+    film: Path | None = None,
+    speed: float = 1.0,
     json: Json = False,
 ) -> None:
     """Write the robot for a printer, Blender, ParaView, MuJoCo, a simulator of robots or systems; a run for Foxglove.

@@ -78,7 +78,13 @@ COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
     "direction": choices("left", "right"),
 }
 """Completions of the shell, by argument or field of a table."""
-_ROWS = list(csv.DictReader(Path(__file__).with_name("options.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def _rows(table: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(Path(__file__).with_name(table).read_text(encoding="utf-8").splitlines()))
+
+
+_ROWS = _rows("options.csv")
 
 
 def _column(name: str) -> dict[str, str]:
@@ -90,6 +96,8 @@ NAMES = _column("option")  #: Options that are not named after the argument or f
 METAVARS = _column("placeholder")  #: Placeholder of a value in the help, where its kind does not give one.
 EXAMPLES = _column("example")  #: Of quantities, by kind or argument.
 TEXTS = _column("help")  #: Helps of arguments that docstrings explain elsewhere.
+OWN = {(row["command"], row["parameter"]): row for row in _rows("own_options.csv")}
+"""Options and arguments that a command has beside those of its function."""
 PANELS = {
     **dict.fromkeys(("model", "friction", "calibrated", "calibration", "posterior", "posterior_for"), MODEL_PANEL),
     "resolution.": MODEL_PANEL,

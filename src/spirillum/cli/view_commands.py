@@ -37,10 +37,8 @@ _View = Annotated[str, typer.Option(autocompletion=_VIEWS, help="perspective, or
 def show(
     request: Request,
     *,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
-    ] = None,
-    window: Annotated[bool, typer.Option("--window", help="Open an interactive window.")] = False,
+    output: Path | None = None,
+    window: bool = False,
     json: Json = False,
 ) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
@@ -111,30 +109,17 @@ def flow(
     request: Request,
     *,
     context: typer.Context,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
-    ] = None,
-    volume: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A box around the robot: .vti for ParaView, or .nc.")
-    ] = None,
+    output: Path | None = None,
+    volume: Path | None = None,
     plane: Annotated[
         str, typer.Option(autocompletion=choices("xy", "xz", "yz"), help="xz (side), xy (from above) or yz (across).")
     ] = "xz",
-    offset: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Position of the plane on the axis normal to it, such as -50mm.")
-    ] = "0mm",
-    extent: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
-    ] = None,
-    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
-    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
-    run: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The flow at a moment of a free run in a tube instead, by `simulate`."),
-    ] = None,
-    time: Annotated[str | None, typer.Option(metavar="TIME", help="With --run: the moment, such as 0.5s.")] = None,
+    offset: str = "0mm",
+    extent: str | None = None,
+    resolution: int = 240,
+    volume_resolution: int = 80,
+    run: Path | None = None,
+    time: str | None = None,
     json: Json = False,
 ) -> None:
     """Compute velocity and pressure of the fluid around the swimming robot: a picture, or numbers on a grid.
