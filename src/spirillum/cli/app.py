@@ -23,7 +23,6 @@ from spirillum.cli.shared_options import (
     All,
     Json,
     NotedCommand,
-    Picture,
     Settings,
     choices,
     complete_auto_models,
@@ -117,7 +116,7 @@ def predict(
 def compare_models(
     request: Request,
     *,
-    output: Picture = None,
+    output: Path | None = None,
     plot: Path | None = None,
     calibrated: bool = False,
     all_of_it: All = False,

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from spirillum.calibration.suggest import Suggestion
 
 
-_Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str], typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel.")
 ]
@@ -43,7 +42,7 @@ def calibrate(
     request: Request,
     *,
     context: typer.Context,
-    observations: _Observations,
+    observations: Path,
     robot: _Robots,
     friction: str = "rotor",
     assume_uncertainty: list[str] | None = None,
@@ -116,7 +115,7 @@ def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str
 def rank_models(
     request: Request,
     *,
-    observations: _Observations,
+    observations: Path,
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
@@ -181,20 +180,11 @@ def suggest(
     renderer.show(found.to_dict(), json=json, rows=rows)
 
 
-_Pairs = Annotated[
-    list[str],
-    typer.Option(
-        metavar="FIELD=LOW:HIGH",
-        help="A design variable with its range, such as tail.wavelength=5mm:40mm or tail.turns=2:6; repeatable.",
-    ),
-]
-
-
 @from_function("spirillum.designs.design:design")
 def design(
     request: Request,
     *,
-    vary: _Pairs,
+    vary: list[str],
     output: Path | None = None,
     plot: Path | None = None,
     stl: Path | None = None,

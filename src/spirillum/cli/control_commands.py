@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, Json, RunMovie, RunPlot, choices, starting
+from spirillum.cli.shared_options import PANELS, Json, choices, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -85,8 +85,8 @@ def control(
     remote: str | None = None,
     model: str = "auto",
     roughness: str | None = None,
-    plot: RunPlot = None,
-    movie: RunMovie = None,
+    plot: Path | None = None,
+    movie: Path | None = None,
     json: Json = False,
 ) -> None:
     """Control a robot in a closed loop: late and noisy camera, on/off remote, flow, unknown friction; and score it.

@@ -160,16 +160,6 @@ _Preset = Annotated[
         rich_help_panel=DISTURBANCES_PANEL,
     ),
 ]
-_Trouble = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME,...",
-        help="Artifacts of a recording: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
-        "mirrored-lamps, grid-paper, glass-cover, noise, lamp, compression, missing-frames, tilted, glare, "
-        "standing-glare, bubbles, hand; with commas between them, or repeated.",
-        rich_help_panel=DISTURBANCES_PANEL,
-    ),
-]
 
 
 @from_function(
@@ -182,7 +172,7 @@ def render(
     *,
     output: Path,
     preset: _Preset = "clean",
-    trouble: _Trouble = None,
+    trouble: list[str] | None = None,
     json: Json = False,
 ) -> None:
     """Film a robot with a virtual laboratory camera, to try `measure` before the experiment. Needs the extra `video`.

@@ -15,9 +15,6 @@ from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
     Json,
-    Output,
-    RunMovie,
-    RunPlot,
     complete_auto_models,
     complete_models,
 )
@@ -56,10 +53,10 @@ def simulate(
     model: _FullModel = "auto",
     on: list[str] | None = None,
     flow: str | None = None,
-    plot: RunPlot = None,
+    plot: Path | None = None,
     panels: str | None = None,
     column: str | None = None,
-    movie: RunMovie = None,
+    movie: Path | None = None,
     json: Json = False,
 ) -> None:
     """Simulate swimming from rest: six degrees of freedom, weight, floor, motor and remote; or two (`--motion held`).
@@ -158,7 +155,7 @@ def _after_the_run(what: str, *, written: bool) -> Iterator[None]:
 def magnetic_sweep(
     request: Request,
     *,
-    output: Output,
+    output: Path,
     plot: Path | None = None,
     json: Json = False,
 ) -> None:

@@ -18,7 +18,6 @@ PLACE_PANEL = "Pose in the channel (model tube)"  #: Panel of the help: pose of 
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
-PICTURES_PANEL = "Pictures"
 
 
 def starting(words: Iterable[str], incomplete: str) -> list[str]:
@@ -133,20 +132,6 @@ Settings = Annotated[
 ]
 All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-RunPlot = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=PICTURES_PANEL),
-]
-RunMovie = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=PICTURES_PANEL
-    ),
-]
-Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
-Picture = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg.")
-]
 
 
 class NotedCommand(InterruptibleCommand):
