@@ -131,28 +131,21 @@ class Control(DisplayMixin):
 
     robot: Robot
     model: str
-    model_reason: str
-    """Why the model was taken; empty where it was named."""
+    model_reason: str  #: Why the model was taken; empty where it was named.
     task: Task
     lab: Lab
     controller: str
     seed: int
-    speed: float
-    """Predicted while the drive is on, m/s, with its sign."""
-    drawn: SampledErrors
-    """What the robot and the flow of this run were, and the controller did not know."""
+    speed: float  #: Predicted while the drive is on, m/s, with its sign.
+    drawn: SampledErrors  #: What the robot and the flow of this run were, and the controller did not know.
     score: Score
     run: LoopRun
-    dataset: xr.Dataset
-    """The run, see `docs/control.md`."""
-    late: float | None
-    """Live: by how much the last decision was late against the clock on the wall, s."""
+    dataset: xr.Dataset  #: The run, see `docs/control.md`.
+    late: float | None  #: Live: by how much the last decision was late against the clock on the wall, s.
     learnt: RobotEstimate | None
     """Friction and gap as estimated by the end of the run; None without `learn` or with too few data."""
-    scores: Scores | None
-    """Over many seeds; None without `seeds`."""
-    interrupted: bool
-    """Whether run or scores were interrupted; what was done until then is here."""
+    scores: Scores | None  #: Over many seeds; None without `seeds`.
+    interrupted: bool  #: Whether run or scores were interrupted; what was done until then is here.
     warnings: tuple[Note, ...]
 
     def to_dict(self) -> dict[str, Any]:

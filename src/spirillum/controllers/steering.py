@@ -172,8 +172,7 @@ class SteeringBrief(Brief):
     """What is known of a magnetic robot beforehand."""
 
     steering: Steering
-    tilts: tuple[tuple[float, complex], ...]
-    """Of the open loop: times, s, and tilts, rad."""
+    tilts: tuple[tuple[float, complex], ...]  #: Of the open loop: times, s, and tilts, rad.
 
 
 class KeepAxisTask(Task):

@@ -178,14 +178,10 @@ Message = tuple[str, str, float, dict[str, Any]]  #: Topic, name of the schema, 
 class Recording(DisplayMixin):
     """Summary of a recording file."""
 
-    path: Path
-    """The file."""
-    robot: Robot
-    """The robot of the run."""
-    duration: float
-    """Length of the run, s."""
-    topics: Mapping[str, int]
-    """Number of messages by topic."""
+    path: Path  #: The file.
+    robot: Robot  #: The robot of the run.
+    duration: float  #: Length of the run, s.
+    topics: Mapping[str, int]  #: Number of messages by topic.
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum export run.nc run.mcap --json`."""

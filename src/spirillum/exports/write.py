@@ -201,22 +201,15 @@ class Written:
 class Export(DisplayMixin):
     """Summary of the exported files and their geometry."""
 
-    robot: Robot
-    """The robot."""
-    phase: float
-    """Phase of the tail, rad."""
-    files: tuple[Written, ...]
-    """Files, the requested one first."""
-    pieces: tuple[RobotMesh, ...]
-    """Pieces of the robot, before they were joined or coloured."""
-    links: Links
-    """Mass, centre, inertia and displaced volume of body and rotor."""
+    robot: Robot  #: The robot.
+    phase: float  #: Phase of the tail, rad.
+    files: tuple[Written, ...]  #: Files, the requested one first.
+    pieces: tuple[RobotMesh, ...]  #: Pieces of the robot, before they were joined or coloured.
+    links: Links  #: Mass, centre, inertia and displaced volume of body and rotor.
     solid: Mapping[str, Any] | None
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
-    warnings: tuple[Note, ...]
-    """What to be careful about, a sentence each."""
-    unit: FmuModel | None = None
-    """Of an FMU: the equations in it."""
+    warnings: tuple[Note, ...]  #: What to be careful about, a sentence each.
+    unit: FmuModel | None = None  #: Of an FMU: the equations in it.
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum export --json`."""

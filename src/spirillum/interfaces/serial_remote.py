@@ -274,16 +274,11 @@ def _ports() -> str:
 class RemoteRun(DisplayMixin):
     """A motor that was on for a time, through a remote."""
 
-    port: str
-    """The port."""
-    name: str
-    """What the far end calls itself."""
-    duty: float
-    """Duty of the motor, in steps of 0.001."""
-    duration: float
-    """How long it was on, s."""
-    watchdog: float
-    """Time after which the far end switches off by itself, s."""
+    port: str  #: The port.
+    name: str  #: What the far end calls itself.
+    duty: float  #: Duty of the motor, in steps of 0.001.
+    duration: float  #: How long it was on, s.
+    watchdog: float  #: Time after which the far end switches off by itself, s.
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum remote --json`."""

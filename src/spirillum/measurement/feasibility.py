@@ -76,18 +76,15 @@ class Feasibility(DisplayMixin):
 
     robot: Robot
     setup: str
-    expected: Mapping[str, tuple[float, str]]
-    """Expected values, SI, and their sources."""
+    expected: Mapping[str, tuple[float, str]]  #: Expected values, SI, and their sources.
     checks: tuple[Check, ...]
     intervals: Mapping[str, tuple[float, float]]
     """Expected half width of the 95 % interval of one trial, absolute and relative.
 
     Empty where the scale is unknown, robot or ruler are too small to be detected, or the robot exceeds the view.
     """
-    measured: float
-    """Time for which the whole robot is in view, s."""
-    shares: Mapping[str, float]
-    """Relative standard uncertainty of lengths by source."""
+    measured: float  #: Time for which the whole robot is in view, s.
+    shares: Mapping[str, float]  #: Relative standard uncertainty of lengths by source.
     warnings: tuple[Note, ...]
 
     @property

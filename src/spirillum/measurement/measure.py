@@ -123,22 +123,14 @@ TABLE = "observations.csv"  #: Name of the table that a measurement writes.
 class Measurement(DisplayMixin):
     """What was measured of a robot in one or several trials."""
 
-    trials: tuple[Trial, ...]
-    """The trials, in the order of the videos."""
-    summary: Summary
-    """Means over trials."""
-    robot: Robot = field(repr=False)
-    """The robot."""
-    setup: str
-    """The setup file."""
-    failures: tuple[tuple[str, str], ...] = ()
-    """Videos that could not be measured, each with a sentence."""
-    files: tuple[str, ...] = ()
-    """Files that were written."""
-    interrupted: bool = False
-    """Whether it was interrupted before the last video."""
-    left: tuple[str, ...] = ()
-    """Datasets of other measurements in the same folder."""
+    trials: tuple[Trial, ...]  #: The trials, in the order of the videos.
+    summary: Summary  #: Means over trials.
+    robot: Robot = field(repr=False)  #: The robot.
+    setup: str  #: The setup file.
+    failures: tuple[tuple[str, str], ...] = ()  #: Videos that could not be measured, each with a sentence.
+    files: tuple[str, ...] = ()  #: Files that were written.
+    interrupted: bool = False  #: Whether it was interrupted before the last video.
+    left: tuple[str, ...] = ()  #: Datasets of other measurements in the same folder.
 
     @property
     def warnings(self) -> tuple[Note, ...]:

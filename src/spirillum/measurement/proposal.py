@@ -60,20 +60,13 @@ class Finding:
 class Proposal(DisplayMixin):
     """A setup as far as a video determines it."""
 
-    film: str
-    """Name of the video."""
-    size: tuple[int, int]
-    """Width and height of its pictures, pixels."""
-    robot: str
-    """The robot that was looked for: a preset's name or a file."""
-    findings: tuple[Finding, ...]
-    """What was found."""
-    to_fill: tuple[tuple[str, str], ...]
-    """Fields that only the experimenter knows, each with what it means."""
-    text: str
-    """The setup file."""
-    file: str | None = None
-    """Where it was written; None: nowhere."""
+    film: str  #: Name of the video.
+    size: tuple[int, int]  #: Width and height of its pictures, pixels.
+    robot: str  #: The robot that was looked for: a preset's name or a file.
+    findings: tuple[Finding, ...]  #: What was found.
+    to_fill: tuple[tuple[str, str], ...]  #: Fields that only the experimenter knows, each with what it means.
+    text: str  #: The setup file.
+    file: str | None = None  #: Where it was written; None: nowhere.
     warnings: tuple[Note, ...] = ()
 
     def found(self, name: str) -> Finding:

@@ -91,18 +91,12 @@ class VirtualExperiment(DisplayMixin):
     """A virtual experiment that was written."""
 
     folder: Path
-    robots: tuple[str, ...]
-    """Folder of each robot."""
-    trials: int
-    """Trials of each robot."""
-    kept: int
-    """Trials that were there already."""
-    spread: float
-    """Planted standard deviation of the motor's rate from trial to trial, relative."""
-    observations: Path
-    """The true rates of all trials as an observations file."""
-    rates: Mapping[str, Mapping[str, float]]
-    """Rates of each robot without the planted differences, SI."""
+    robots: tuple[str, ...]  #: Folder of each robot.
+    trials: int  #: Trials of each robot.
+    kept: int  #: Trials that were there already.
+    spread: float  #: Planted standard deviation of the motor's rate from trial to trial, relative.
+    observations: Path  #: The true rates of all trials as an observations file.
+    rates: Mapping[str, Mapping[str, float]]  #: Rates of each robot without the planted differences, SI.
     models: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """Of each robot, what its rates are from, and why that model was taken."""
     warnings: tuple[Note, ...] = ()

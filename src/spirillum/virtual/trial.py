@@ -135,32 +135,21 @@ _LEAST_DEPTH = 1e-6  # least distance of the stated axis from the floor and from
 class VirtualTrial(DisplayMixin):
     """A virtual trial that was written."""
 
-    path: Path
-    """The video, or the folder of frames."""
-    setup: Path
-    """The setup file."""
-    truth: Path
-    """The truth, JSON; beside it the truth on every frame (NetCDF)."""
+    path: Path  #: The video, or the folder of frames.
+    setup: Path  #: The setup file.
+    truth: Path  #: The truth, JSON; beside it the truth on every frame (NetCDF).
     robot: Robot
     rates: Mapping[str, float]
     """True `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`, `motor_rotation_rate`, SI."""
-    model: str
-    """Model, `prescribed`, or `run`: the source of the motion."""
-    frames: int
-    """Number of frames in the video."""
-    dropped: int
-    """Number of frames that were lost."""
-    size: tuple[int, int]
-    """Width and height, pixels."""
-    fps: float
-    """Frames a second."""
-    seed: int
-    """Of all random numbers."""
+    model: str  #: Model, `prescribed`, or `run`: the source of the motion.
+    frames: int  #: Number of frames in the video.
+    dropped: int  #: Number of frames that were lost.
+    size: tuple[int, int]  #: Width and height, pixels.
+    fps: float  #: Frames a second.
+    seed: int  #: Of all random numbers.
     warnings: tuple[Note, ...] = ()
-    model_reason: str = ""
-    """Why the model was taken; empty where it was named."""
-    motion: str = HELD
-    """`held`, `trial`, `run`, or `prescribed`."""
+    model_reason: str = ""  #: Why the model was taken; empty where it was named.
+    motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""

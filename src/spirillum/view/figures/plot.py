@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 class Plot:
     """A figure that notebooks show by themselves."""
 
-    figure: Figure = field(repr=False)
-    """The figure of matplotlib."""
+    figure: Figure = field(repr=False)  #: The figure of matplotlib.
 
     def save(self, path: str | Path) -> Path:
         """Write the figure as PNG, PDF or SVG, and give its path.

@@ -100,12 +100,9 @@ class Film(DisplayMixin):
     frames: int
     size: tuple[int, int]
     fps: int
-    speed: float
-    """Time of the run over time of the video."""
-    follows: bool
-    """Whether the camera follows the robot."""
-    turn_per_frame: float
-    """Largest part of a turn of the tail between two frames."""
+    speed: float  #: Time of the run over time of the video.
+    follows: bool  #: Whether the camera follows the robot.
+    turn_per_frame: float  #: Largest part of a turn of the tail between two frames.
     warnings: tuple[Note, ...]
 
     @property

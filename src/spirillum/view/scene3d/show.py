@@ -36,16 +36,11 @@ class Picture3D(DisplayMixin):
 
     robot: Robot
     view: View
-    phase: float
-    """Phase of the tail, rad."""
-    pixels: np.ndarray
-    """(height, width, 3) the picture, sRGB bytes."""
-    camera: SceneCamera
-    """View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab."""
-    pose: RobotPose
-    """Pose of the robot: its body's mid-length, attitude, and the angle of its tail."""
-    path: Path | None
-    """The file that was written."""
+    phase: float  #: Phase of the tail, rad.
+    pixels: np.ndarray  #: (height, width, 3) the picture, sRGB bytes.
+    camera: SceneCamera  #: View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab.
+    pose: RobotPose  #: Pose of the robot: its body's mid-length, attitude, and the angle of its tail.
+    path: Path | None  #: The file that was written.
 
     def to_dict(self) -> dict[str, Any]:
         """The picture's facts, as ``show --json`` prints them."""
