@@ -55,10 +55,8 @@ class Note(str):
     """A sentence about an answer, with its code; it cannot be changed."""
 
     __slots__ = ("code", "fields")
-    code: str
-    """What the note is about, such as `walls-left-out`; a key of `KINDS`."""
-    fields: tuple[str, ...]
-    """Fields or quantities that it concerns, by their dotted names."""
+    code: str  #: What the note is about, such as `walls-left-out`; a key of `KINDS`.
+    fields: tuple[str, ...]  #: Fields or quantities that it concerns, by their dotted names.
 
     def __new__(cls, code: str, sentence: str, fields: Iterable[str] = ()) -> Note:
         """A note of a known code."""

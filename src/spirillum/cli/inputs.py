@@ -35,8 +35,7 @@ def _rules() -> dict[str, list[Rule]]:
     return found
 
 
-RULES = _rules()
-"""Rules by command, in the order in which they are checked."""
+RULES = _rules()  #: Rules by command, in the order in which they are checked.
 
 
 def check_rules(command: str, states: Collection[str], given: Callable[..., list[str]], **words: object) -> None:

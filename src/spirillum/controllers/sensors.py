@@ -58,8 +58,7 @@ class Message:
     """Information that a controller has when it decides."""
 
     time: float  #: Now, s.
-    sights: tuple[Detection, ...] = ()
-    """Those that have arrived since the last decision, in the order of their frames."""
+    sights: tuple[Detection, ...] = ()  #: Those that have arrived since the last decision, in the order of their frames
     readings: tuple[MeterReading, ...] = ()
     """Readings of the meter that have arrived since the last decision, in the order of their times."""
     truth: Snapshot | None = field(default=None, compare=False)
@@ -71,8 +70,7 @@ class Controller(Protocol):
 
     blind: bool = False
     """Whether it continues without a camera; else the drive is switched off when the camera is silent."""
-    knowing: bool = False
-    """Whether it is given the truth."""
+    knowing: bool = False  #: Whether it is given the truth.
 
     def decide(self, news: Message) -> float | Command:
         """Duty from now on, 0 (off) to 1; for a magnetic robot a command with its field."""

@@ -64,12 +64,9 @@ class _Past:
 class TaskEnvironment(ABC):
     """Robots with camera, remote and flow; a task adds goal, actions, observation and score."""
 
-    observed: ClassVar[tuple[ObservedNumber, ...]]
-    """The numbers of an observation."""
-    goals: ClassVar[tuple[float, float]]
-    """Least and largest goal, unless others are given."""
-    on_off: ClassVar[bool]
-    """Whether an action is 0 (off) or 1 (on); else it is a duty from 0 to 1."""
+    observed: ClassVar[tuple[ObservedNumber, ...]]  #: The numbers of an observation.
+    goals: ClassVar[tuple[float, float]]  #: Least and largest goal, unless others are given.
+    on_off: ClassVar[bool]  #: Whether an action is 0 (off) or 1 (on); else it is a duty from 0 to 1.
 
     def __init__(
         self,

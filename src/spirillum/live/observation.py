@@ -28,8 +28,7 @@ class Observation(DisplayMixin):
     time: float  #: When it was taken, s.
     state: State  #: `learning`, `tracking` or `lost`.
     reason: str = ""  #: Why it is not tracking, in one sentence.
-    x: float = math.nan
-    """The body's mid-length along the channel, from the middle of the picture, towards the nose, m."""
+    x: float = math.nan  #: The body's mid-length along the channel, from the middle of the picture, towards the nose, m
     y: float = math.nan  #: Across the channel, m.
     heading: float = math.nan  #: Angle of the motor axis to the channel, rad.
     body_angle: float = math.nan

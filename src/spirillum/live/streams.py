@@ -52,8 +52,7 @@ class Source:
     kind: Kind  #: `film`, `camera` or `stream`.
     options: Mapping[str, Any] = field(repr=False)  #: How it is opened: see `source_of`.
     words: str = ""  #: Metadata of a video, such as that it is synthetic.
-    flags: list[Flag] = field(default_factory=list, repr=False)
-    """What was odd about its pictures while they were read."""
+    flags: list[Flag] = field(default_factory=list, repr=False)  #: What was odd about its pictures while they were read
 
     def frames(self) -> Generator[Arrived, None, None]:
         """Its pictures until it ends."""

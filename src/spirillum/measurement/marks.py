@@ -30,8 +30,7 @@ _LENGTH_ERROR = 0.5e-3
 the paper's ruler."""
 _APART = 0.75  # largest difference between the time of a row and that of its frame, s: times may be rounded to seconds
 _ANGLE_ERROR = math.radians(5.0)  # assumed standard error of an angle read by eye, rad
-EDGE = 0.5
-"""Distance of the border from the centres of the outermost pixels, pixels; centres have integer coordinates."""
+EDGE = 0.5  #: Distance of the border from the centres of the outermost pixels, pixels; centres have integer coordinates
 _LATER = 1.02  # latest time of a reading over the duration of the video, which is known to about a frame
 
 

@@ -69,8 +69,7 @@ DRIFT_ANGLE = math.radians(0.1)
 """Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
 POSITION_ERROR = 0.25
 """Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
-HEADING_ERROR = math.radians(0.2)
-"""Systematic standard error of the heading of a body that is `LONG` pixels long, rad."""
+HEADING_ERROR = math.radians(0.2)  #: Systematic standard error of the heading of a body that is `LONG` pixels long, rad
 LONG = 100.0  #: Length of a body whose heading has that error, pixels.
 
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
-_TEXT, _SMALLEST_TEXT = 0.45, 0.4
-"""Scale of the font in a picture 480 pixels high, and the least one that can be read."""
+_TEXT, _SMALLEST_TEXT = 0.45, 0.4  # scale of the font in a picture 480 pixels high, and the least one that can be read
 _DIAL = 16.0  # radius of a dial in a picture 480 pixels high, pixels
 _MOST_OF_HEIGHT = 0.25  # largest share of a picture's height that text covers
 _SHIFT = 4  # subpixel resolution of lines: sixteenths

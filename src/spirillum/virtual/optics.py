@@ -227,8 +227,7 @@ _SURFACE = 60e-3  # height of the oil's surface above the reference plane, m; as
 _EYE = _SURFACE + 150e-3  # height of the lens: 150 mm above the oil, as the paper has its camera above the tank
 _INDEX = 1.40  # refractive index of silicone oil
 _FOCAL = 740.0 / 640.0  # focal length over the width of the usual picture; assumed
-_SHORTEST, _LONGEST = 24, 2.0
-"""Shortest robot in pixels, longest in widths of the picture."""
+_SHORTEST, _LONGEST = 24, 2.0  # shortest robot in pixels, longest in widths of the picture
 _LOOKS = 1001  # times at which the visibility of the robot is checked
 
 

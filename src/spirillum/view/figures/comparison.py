@@ -36,8 +36,7 @@ from spirillum.view.figures.style import (
 
 MOST = 12  #: Robots in the figure.
 _ROW, _ENDS = 0.24, 1.2  # inches
-_LINE, _WIDE = 0.19, 68
-"""Height of a line of the title, inches, and the characters that it holds."""
+_LINE, _WIDE = 0.19, 68  # height of a line of the title, inches, and the characters that it holds
 
 
 _NO_WALLS = "The channel's walls are not computed"

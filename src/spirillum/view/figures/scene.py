@@ -102,8 +102,7 @@ def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: f
 PHASE = 0.35 * np.pi  #: Phase of the tail in the picture, rad.
 INK = "#1d2b33"
 FAINT = "#6b7d88"
-HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)
-"""White rim that keeps text legible on any background."""
+HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)  #: White rim that keeps text legible on any background
 
 
 @dataclass(frozen=True)

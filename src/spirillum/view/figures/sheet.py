@@ -37,8 +37,7 @@ class Picture:
 
 
 _NARROWEST = 5.2
-_MARGINS, _GAP = 0.94, 0.14
-"""Typical room for the labels beside a row of panels, and between panels, inches."""
+_MARGINS, _GAP = 0.94, 0.14  # typical room for the labels beside a row of panels, and between panels, inches
 _EDGE = 0.012  # free edge at the left and at the right, share of the width
 
 

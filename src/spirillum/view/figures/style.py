@@ -33,8 +33,7 @@ COLOURS = {
 }
 """Palette of Okabe and Ito, distinguishable for colour-blind readers (without its yellow, too pale for lines)."""
 
-COLUMN, PAGE = 3.35, 6.69
-"""Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider."""
+COLUMN, PAGE = 3.35, 6.69  #: Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider.
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings on the display of a session's own figures, which do not change ours."""
 PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}  #: Line that represents an area in a legend.

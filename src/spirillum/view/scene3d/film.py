@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 _SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
 """Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
 _FINE = 3  # rendered pixels per displayed pixel, along each side (supersampling)
-_RIM, _ROOM = 0.93, 0.90
-"""Radius of the tube, outside and inside, over half of the square."""
+_RIM, _ROOM = 0.93, 0.90  # radius of the tube, outside and inside, over half of the square
 _GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
 _MOST = 600  # number of plotted points of the path
 

@@ -24,8 +24,7 @@ from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_v
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
 
-SMALLEST, LARGEST = 64, 4096
-"""Allowed widths and heights of a picture, pixels."""
+SMALLEST, LARGEST = 64, 4096  #: Allowed widths and heights of a picture, pixels.
 _FINER = 2  # rendered pixels per pixel of a picture, along width and height (supersampling)
 _MOST_FINER = 5_000_000  # pixels of a picture above which supersampling is off: it would take gigabytes
 

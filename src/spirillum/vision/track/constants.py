@@ -204,11 +204,9 @@ class StandingConstants:
     beside: float = 1.0  #: Half width of these surroundings, over the body's diameter.
     moved: float = 0.1  #: Largest displacement along the channel of a robot that stands, pixels.
     turned: float = radians(1.0)  #: Largest rotation of its body and of its tail, rad.
-    blur: float = 2.0
-    """Standard deviation of the blur under which pictures are compared with their background, pixels."""
+    blur: float = 2.0  #: Standard deviation of the blur under which pictures are compared with their background, pixels
     at_rest: float = 0.999  #: Share of the pixels that change by noise alone where nothing moves.
-    noise: float = 5.0
-    """Largest change by noise, of 255; it was 1.5 in empty tubes, and 30 and more with a slow robot."""
+    noise: float = 5.0  #: Largest change by noise, of 255; it was 1.5 in empty tubes, and 30 and more with a slow robot
 
 
 @dataclass(frozen=True)
@@ -238,8 +236,7 @@ class StripeConstants:
     floor: float = radians(0.05)  #: Standard error of the geometry of seal and stripes, rad.
     pixel_locking: float = 0.05  #: Standard error of an edge by where it lies within a pixel, pixels.
     unreadable: float = 0.6  #: Loss over that of one even colour above which nothing is read.
-    good: float = 0.3
-    """Loss over that of a uniform colour below which the named colours are not tried as initial ones."""
+    good: float = 0.3  #: Loss over that of a uniform colour below which the named colours are not tried as initial ones
     faces: float = radians(60.0)
     """Largest angle from the direction towards the camera at which an edge is surely read, rad."""
     fits: float = 0.25

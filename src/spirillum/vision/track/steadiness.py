@@ -50,12 +50,10 @@ class SteadinessConstants:
 STEADINESS = SteadinessConstants()
 
 
-_STEPS, _STILL = 8, 0.01
-"""Most Gauss-Newton steps, and the step below which they end, pixels."""
+_STEPS, _STILL = 8, 0.01  # most Gauss-Newton steps, and the step below which they end, pixels
 _ROW = 100  # edge pixels that are interpolated side by side
 _MOST_EDGES = 8000  # about as many edge pixels are compared; more of them would not make a shift more certain
-_THREADS, _LARGE = 2, 6_000_000
-"""Threads, and the bytes of a picture from which on one has to do, for its memory."""
+_THREADS, _LARGE = 2, 6_000_000  # threads, and the bytes of a picture from which on one has to do, for its memory
 
 
 class StillPicture(NamedTuple):

@@ -42,8 +42,7 @@ class Cue(NamedTuple):
     """How far a cue was used in a video."""
 
     share: float  #: Share of the frames on which it was used, 0 to 1.
-    disagreement: float
-    """Root mean square distance from the joint fit, standard deviations; NaN where it is not known."""
+    disagreement: float  #: Root mean square distance from the joint fit, standard deviations; NaN where it is not known
 
 
 class Agreement(NamedTuple):
