@@ -31,12 +31,9 @@ R = TypeVar("R")
 class _Kind(NamedTuple):
     """One kind of values."""
 
-    words: str
-    """For the sentence of an error."""
-    holds: Callable[[Any], bool]
-    """Whether a value is of it; of a list, whether it is a list at all."""
-    items: tuple[_Kind, ...] = ()
-    """Kinds of the items of a list; empty: any."""
+    words: str  # for the sentence of an error
+    holds: Callable[[Any], bool]  # whether a value is of it; of a list, whether it is a list at all
+    items: tuple[_Kind, ...] = ()  # kinds of the items of a list; empty: any
 
 
 def _is_list(value: Any) -> bool:

@@ -25,12 +25,9 @@ else:
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
-Samples: TypeAlias = Float[_Floats, "..."]
-"""Floats of any shape, unrelated to others."""
-Whole: TypeAlias = Int[_Integers, "..."]
-"""Whole numbers of any shape, such as indices."""
-Amplitudes: TypeAlias = Complex[_Complexes, "..."]
-"""Complex amplitudes of Fourier modes."""
+Samples: TypeAlias = Float[_Floats, "..."]  #: Floats of any shape, unrelated to others.
+Whole: TypeAlias = Int[_Integers, "..."]  #: Whole numbers of any shape, such as indices.
+Amplitudes: TypeAlias = Complex[_Complexes, "..."]  #: Complex amplitudes of Fourier modes.
 Vectors: TypeAlias = Float[_Floats, "*#n 3"]
 """Cartesian vectors."""
 Tensors: TypeAlias = Float[_Floats, "*#n 3 3"]

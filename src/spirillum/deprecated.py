@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-RENAMED = {"HeldPlants": "AxialBatch"}
-"""Old names in `spirillum` to new ones."""
+RENAMED = {"HeldPlants": "AxialBatch"}  #: Old names in `spirillum` to new ones.
 
 
 def current_name(name: str) -> str:

@@ -15,16 +15,12 @@ from spirillum.units import among, in_unit, speed_unit
 class QuantityRow(NamedTuple):
     """A quantity as people read it."""
 
-    name: str
-    """Its name in words."""
+    name: str  #: Its name in words.
     value: str
-    low: str
-    """Least value of its band or interval; empty without one."""
+    low: str  #: Least value of its band or interval; empty without one.
     high: str
-    unit: str
-    """Unit of the three; empty for pure numbers."""
-    si: str
-    """The value in SI, where that is another unit."""
+    unit: str  #: Unit of the three; empty for pure numbers.
+    si: str  #: The value in SI, where that is another unit.
 
 
 def rows_of(items: Mapping[str, Any], only: Iterable[str] | None = None) -> list[QuantityRow]:

@@ -7,8 +7,7 @@ from difflib import get_close_matches
 from typing import Any
 
 _LONGEST = 800
-TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"
-"""Message of a MemoryError."""
+TOO_LARGE = "the request does not fit into memory; allowed: a smaller one"  #: Message of a MemoryError.
 
 
 class InputError(ValueError):
@@ -70,8 +69,7 @@ def clipped(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-_SYNONYMS = {"weight": "mass", "radius": "diameter"}
-"""Names of fields by other words for them."""
+_SYNONYMS = {"weight": "mass", "radius": "diameter"}  # names of fields by other words for them
 
 
 def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> str:
@@ -82,8 +80,7 @@ def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.5) -> st
     return f" (did you mean {near[0]}?)" if near else ""
 
 
-MOST_MEMORY = 4 << 30
-"""Memory that the arrays of one request may take, bytes."""
+MOST_MEMORY = 4 << 30  #: Memory that the arrays of one request may take, bytes.
 
 
 def check_memory(cause: str, count: float, items: str, each: float, instead: str) -> None:

@@ -8,21 +8,16 @@ import numpy as np
 
 from spirillum.arrays import Samples
 
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4)."""
-_MOST_PIECES = 60
-"""Points through which a repeated-median line goes at most: its work grows with their square."""
+MAD_TO_SIGMA = 1.4826  #: Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4).
+_MOST_PIECES = 60  # points through which a repeated-median line goes at most: its work grows with their square
 
 
 class LineFit(NamedTuple):
     """A straight line of one or several quantities over time."""
 
-    time: float
-    """Time at which it has `value`."""
-    value: Samples
-    """Its value there, (...)."""
-    slope: Samples
-    """Change per unit of time, (...)."""
+    time: float  #: Time at which it has `value`.
+    value: Samples  #: Its value there, (...).
+    slope: Samples  #: Change per unit of time, (...).
 
     def at(self, time: Samples | float) -> Samples:
         """Its value at a time; at several times, (n,), of a line of one quantity."""
@@ -72,10 +67,8 @@ def _medians_of_stretches(values: Samples) -> Samples:
 
 
 def repeated_median_line(time: Samples, values: Samples) -> LineFit:
-    """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
-
-    It goes through the medians of at most 60 stretches of the series.
-    """
+    """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong."""
+    # It goes through the medians of at most 60 stretches of the series.
     t, y = _medians_of_stretches(time), _medians_of_stretches(values)
     apart = ~np.eye(t.size, dtype=bool)
     with np.errstate(invalid="ignore"):

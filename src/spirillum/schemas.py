@@ -34,8 +34,7 @@ def schema_of(name: str) -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-_REQUIRING = ("required", "if", "else")
-"""Keys of a table that state its requirements."""
+_REQUIRING = ("required", "if", "else")  # keys of a table that state its requirements
 
 
 def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
@@ -61,7 +60,6 @@ def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    """All tables of files."""
     for model in base.__subclasses__():
         yield model
         yield from _models(model)

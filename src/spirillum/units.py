@@ -6,12 +6,14 @@ own (`units.txt`) where angle is a dimension, because 1 Hz of a rotating part is
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
@@ -32,67 +34,25 @@ _POWER_OF_A_POWER = re.compile(r"\d\s*(?:\*\*|\^)")
 _LONGEST_UNIT = 40
 _PREFIX = re.compile(r"([^\W\d]+)-(?=\s)")
 
-Hz = 2 * math.pi
-"""One turn per second in rad/s."""
+Hz = 2 * math.pi  #: One turn per second in rad/s.
 
 _SI: dict[str, float] = {
-    "1": 1.0,
-    "m": 1.0,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "m/s": 1.0,
-    "mm/s": 1e-3,
-    "um/s": 1e-6,
-    "nm/s": 1e-9,
-    "rad/s": 1.0,
-    "Hz": Hz,
-    "kg": 1.0,
-    "g": 1e-3,
-    "mg": 1e-6,
-    "ug": 1e-9,
-    "pg": 1e-15,
-    "N": 1.0,
-    "mN": 1e-3,
-    "uN": 1e-6,
-    "nN": 1e-9,
-    "pN": 1e-12,
-    "fN": 1e-15,
-    "N m": 1.0,
-    "mN m": 1e-3,
-    "uN m": 1e-6,
-    "nN m": 1e-9,
-    "pN m": 1e-12,
-    "pN um": 1e-18,
+    **dict.fromkeys(("1", "m", "m/s", "rad/s", "kg", "N", "N m", "N m s/rad", "W", "A", "V", "s"), 1.0),
+    **dict.fromkeys(("m/rad", "kg/m^3"), 1.0),
+    **dict.fromkeys(("mm", "mm/s", "g", "mN", "mN m", "mW", "mA", "mT", "mPa s", "mV"), 1e-3),
+    **dict.fromkeys(("um", "um/s", "mg", "uN", "uN m", "uW", "ml"), 1e-6),
+    **dict.fromkeys(("nm", "nm/s", "ug", "nN", "nN m", "nW", "ul"), 1e-9),
+    **dict.fromkeys(("pg", "fN", "fW"), 1e-15),
+    **dict.fromkeys(("pN", "pN m", "pW"), 1e-12),
+    **dict.fromkeys(("pN um", "aW", "um^3"), 1e-18),
     "pN nm": 1e-21,
-    "N m s/rad": 1.0,
-    "W": 1.0,
-    "mW": 1e-3,
-    "uW": 1e-6,
-    "nW": 1e-9,
-    "pW": 1e-12,
-    "fW": 1e-15,
-    "aW": 1e-18,
-    "A": 1.0,
-    "mA": 1e-3,
-    "V": 1.0,
+    **dict.fromkeys(("Hz", "turn"), Hz),
     "deg": math.pi / 180,
-    "ml": 1e-6,
-    "ul": 1e-9,
-    "um^3": 1e-18,
-    "mT": 1e-3,
-    "s": 1.0,
     "mm/turn": 1e-3 / (2 * math.pi),
     "um/turn": 1e-6 / (2 * math.pi),
     "nm/turn": 1e-9 / (2 * math.pi),
-    "m/rad": 1.0,
     "min": 60.0,
-    "turn": 2 * math.pi,
-    "%": 1e-2,
-    "cm": 1e-2,
-    "nm": 1e-9,
-    "kg/m^3": 1.0,
-    "mPa s": 1e-3,
-    "mV": 1e-3,
+    **dict.fromkeys(("%", "cm"), 1e-2),
     "mA h": 3.6,
 }
 """SI values of the units that are shown, and of those that files mostly state."""
@@ -135,35 +95,8 @@ class Kind:
         return f"{self.low} to {self.high}"
 
 
-KINDS: dict[str, Kind] = {
-    "length": Kind("length", "m", "18 mm", "1 nm", "100 m"),
-    "length or zero": Kind("length", "m", "10 mm", "0 m", "100 m"),
-    "length of either sign": Kind("length", "m", "10 mm", "-100 m", "100 m"),
-    "mass": Kind("mass", "kg", "10.7 g", "1e-21 kg", "1e6 kg"),
-    "density": Kind("density", "kg/m**3", "985 kg/m^3", "1e-3 kg/m^3", "1e5 kg/m^3"),
-    "viscosity": Kind("viscosity", "Pa s", "3.5 Pa s", "1e-6 Pa s", "1e6 Pa s"),
-    "pressure": Kind("pressure", "Pa", "100 kPa", "1 kPa", "1e9 Pa"),
-    "rate": Kind("rotation rate", "rad/s", "1.5 Hz", "-1e6 rad/s", "1e6 rad/s"),
-    "torque": Kind("torque", "N m", "0.1 mN m", "-1e6 N m", "1e6 N m"),
-    "rotary friction": Kind("rotary friction", "N m s/rad", "7e-7 N m s/rad", "0 N m s/rad", "1e6 N m s/rad", "N m s"),
-    "voltage": Kind("voltage", "V", "3.7 V", "1e-6 V", "1e4 V"),
-    "resistance": Kind("resistance", "ohm", "10.4 ohm", "0 ohm", "1e6 ohm"),
-    "inductance": Kind("inductance", "H", "0.082 H", "1e-9 H", "1e3 H"),
-    "torque constant": Kind("torque constant", "N m/A", "0.00045 N m/A", "1e-12 N m/A", "1e3 N m/A"),
-    "back-emf constant": Kind("back-emf constant", "V s/rad", "0.004 V s/rad", "0 V s/rad", "1e3 V s/rad", "V s"),
-    "magnetic moment": Kind("magnetic moment", "A m**2", "1e-4 A m^2", "1e-25 A m^2", "1e6 A m^2"),
-    "magnetic field": Kind("magnetic flux density", "T", "5 mT", "1e-12 T", "1e3 T"),
-    "moment angle": Kind("angle", "rad", "90 deg", "0 deg", "180 deg"),
-    "current": Kind("current", "A", "300 mA", "0 A", "1e6 A"),
-    "charge": Kind("charge", "C", "70 mA h", "1e-9 C", "1e9 C"),
-    "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
-    "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),
-    "angle": Kind("angle", "rad", "90 deg", "-1e6 rad", "1e6 rad"),
-    "pitch": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
-    "yaw": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
-    "velocity": Kind("velocity", "m/s", "-2 mm/s", "-1e3 m/s", "1e3 m/s"),
-    "time": Kind("time", "s", "2 s", "0 s", "1e9 s"),
-}
+_ROWS = csv.reader(Path(__file__).with_name("kinds.csv").read_text(encoding="utf-8").splitlines()[1:])
+KINDS: dict[str, Kind] = {kind: Kind(*words, also or None) for kind, *words, also in _ROWS}
 
 
 @lru_cache(maxsize=1)
@@ -429,8 +362,7 @@ def speed_unit(speed: float | None, rate: float | None) -> str:
     return display_unit(speed, "m/s")
 
 
-_ROBOTS_ADVANCE = 5e-6
-"""Advance in a turn of the tail from which a robot is one of millimetres and more, m."""
+_ROBOTS_ADVANCE = 5e-6  # advance in a turn of the tail from which a robot is one of millimetres and more, m
 
 
 def among(value: float | None, unit: str, others: Iterable[float | None]) -> str:

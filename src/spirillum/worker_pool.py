@@ -103,11 +103,9 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _start_of_processes() -> Iterator[None]:
-    """Tasks are handed to the pool here, and any of them may start a process.
-
-    It does not run the caller's script again, for what it does is in this package; and it never sees Ctrl-C, which a
-    terminal sends to it too: its parent ends it.
-    """
+    """Tasks are handed to the pool here, and any of them may start a process."""
+    # It does not run the caller's script again, for what it does is in this package; and it never sees Ctrl-C, which a
+    # terminal sends to it too: its parent ends it.
     own = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     held = hasattr(signal, "pthread_sigmask")  # not on Windows
@@ -123,12 +121,9 @@ def _start_of_processes() -> Iterator[None]:
 ESTIMATE = "estimate: "
 """Prefix of a progress message that estimates the work: a command prints it as a line of its own."""
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss|inproc)://\S{1,200}")
-_PATIENCE = 5.0
-"""Time in which a scheduler has to answer, s."""
-_LOOK = 1.0
-"""Time between two looks whether the scheduler is still there, s."""
-_LONGEST_TRANSFER = 120.0
-"""Time in which an answer has to come from the worker that has it, s."""
+_PATIENCE = 5.0  # time in which a scheduler has to answer, s
+_LOOK = 1.0  # time between two looks whether the scheduler is still there, s
+_LONGEST_TRANSFER = 120.0  # time in which an answer has to come from the worker that has it, s
 _MOST_DEATHS = 100
 """Tasks that may be given up because several workers ended at them, before the tasks are taken for the cause."""
 _MOST_WORKERS = 64
@@ -141,8 +136,7 @@ class WorkerPool:
     """Workers: processes of this machine, or those of a cluster."""
 
     workers: int = 1
-    cluster: str | None = None
-    """Address of a Dask scheduler; None: this machine."""
+    cluster: str | None = None  #: Address of a Dask scheduler; None: this machine.
 
     @property
     def size(self) -> int:
@@ -187,7 +181,6 @@ def map_tasks(
 
 
 def _client(address: str) -> Any:
-    """A connection to a scheduler."""
     distributed = import_optional("distributed", "a study on a cluster", "cluster")
     for name in ("distributed", "distributed.core", "distributed.client", "distributed.comm"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is said in a sentence
@@ -201,7 +194,6 @@ def _client(address: str) -> Any:
 
 
 def _about() -> tuple[str, str]:
-    """Versions of a worker."""
     return own_version(), versions()
 
 

@@ -30,11 +30,9 @@ _INSTEAD = {
 """Sentences for options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """Errors of a name or location, not of the program."""
-_TERMINATED = 128 + signal.SIGTERM
-"""Exit code after SIGTERM, which schedulers expect, however the command ends then."""
+_TERMINATED = 128 + signal.SIGTERM  # exit code after SIGTERM, which schedulers expect, however the command ends then
 _KEPT = "interrupted; finished files are kept"
-_AGAIN = 0.02
-"""After this time an interrupt that was dropped comes again, s."""
+_AGAIN = 0.02  # after this time an interrupt that was dropped comes again, s
 _OBJECTS = 50_000
 """New objects between two looks for garbage: imports make many that stay. The last look, at the end, is left out."""
 
@@ -108,8 +106,7 @@ class _Closed(TextIOBase):
         raise InputError("standard output is closed, and the answer is lost; allowed: a terminal, a file or a pipe")
 
 
-_interrupts: list[int] = []
-"""Signals that have come to end this process."""
+_interrupts: list[int] = []  # signals that have come to end this process
 
 
 class _Interrupt(KeyboardInterrupt):

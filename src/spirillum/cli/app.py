@@ -23,11 +23,10 @@ from spirillum.cli.shared_options import (
     All,
     Json,
     NotedCommand,
-    Picture,
     Settings,
+    choices,
     complete_auto_models,
     complete_resistance_models,
-    complete_schemas,
 )
 from spirillum.cli.view_commands import film, flow, page, show
 
@@ -76,10 +75,6 @@ def _root(
     """
 
 
-_RELEASED = ("duration", "roughness", "in_tube")
-"""Arguments of `predict` for the motions after release."""
-
-
 @from_function(
     "spirillum.dynamics.prediction:predict",
     without={
@@ -91,10 +86,7 @@ _RELEASED = ("duration", "roughness", "in_tube")
 def predict(
     request: Request,
     *,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Plot the speeds beside each other: .png, .pdf or .svg."),
-    ] = None,
+    plot: Path | None = None,
     all_of_it: All = False,
     json: Json = False,
 ) -> None:
@@ -125,11 +117,9 @@ def predict(
 def compare_models(
     request: Request,
     *,
-    output: Picture = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Plot why models differ, effect by effect: .png, .pdf or .svg.")
-    ] = None,
-    calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
+    output: Path | None = None,
+    plot: Path | None = None,
+    calibrated: bool = False,
     all_of_it: All = False,
     json: Json = False,
 ) -> None:
@@ -180,18 +170,11 @@ def study(
     request: Request,
     *,
     context: typer.Context,
-    source: Annotated[Path | None, typer.Argument(help="A study file, or a paper's name; else biorob2012.")] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study.")
-    ] = None,
+    source: Path | None = None,
+    output: Path | None = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
-    cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute: tcp://HOST:8786.")
-    ] = None,
-    store: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER.zarr", help="Write a Zarr store, piece by piece; no folder of results."),
-    ] = None,
+    cluster: str | None = None,
+    store: Path | None = None,
     rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = _ROWS,
     settings: Settings = None,
     json: Json = False,
@@ -228,7 +211,12 @@ def study(
 
 
 def schema(
-    name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study, calibration or setup.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=choices("calibration", "robot", "setup", "study"), help="robot, study, calibration or setup."
+        ),
+    ],
 ) -> None:
     """Print the JSON schema of a file: robot, study, calibration or setup.
 

@@ -12,7 +12,7 @@ import typer
 from spirillum.calibration.methods import METHODS
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import loaded_robot, overrides_from, pairs_of, refuse_conflicts
-from spirillum.cli.shared_options import Json, Settings, complete_robots, starting
+from spirillum.cli.shared_options import Json, Settings, choices, complete_robots
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,14 +20,9 @@ if TYPE_CHECKING:
     from spirillum.calibration.suggest import Suggestion
 
 
-_Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
 _Robots = Annotated[
     list[str], typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel.")
 ]
-
-
-def _complete_methods(incomplete: str) -> list[str]:
-    return starting(METHODS, incomplete)
 
 
 _SAMPLER = dict.fromkeys(
@@ -39,7 +34,7 @@ _SAMPLING = {"sampling": ("spirillum.calibration.posterior:Sampling",)}
 @from_function(
     "spirillum.results.calibration:calibrate",
     without={**_SAMPLER, "robots": "the argument"},
-    complete={"method": _complete_methods},
+    complete={"method": choices(*METHODS)},
     robot=None,
     tables=_SAMPLING,
 )
@@ -47,20 +42,11 @@ def calibrate(
     request: Request,
     *,
     context: typer.Context,
-    observations: _Observations,
+    observations: Path,
     robot: _Robots,
-    friction: Annotated[str, typer.Option(help="Friction model of B_eff in (18): rotor or paper.")] = "rotor",
-    assume_uncertainty: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FIELD=SHARE",
-            help="Uncertainty of fluid.viscosity, motor.torque_constant or motor.back_emf_constant: half of its "
-            "relative 95 % interval, such as fluid.viscosity=5%; repeatable. Else taken as exact.",
-        ),
-    ] = None,
-    output: Annotated[
-        str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
-    ] = "spirillum-calibration",
+    friction: str = "rotor",
+    assume_uncertainty: list[str] | None = None,
+    output: str = "spirillum-calibration",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -101,7 +87,6 @@ def calibrate(
 
 
 def _stated(given: Sequence[str]) -> dict[str, str]:
-    """Field to share of `--assume-uncertainty`."""
     found: dict[str, str] = {}
     for item in given:
         name, equals, share = item.partition("=")
@@ -130,7 +115,7 @@ def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str
 def rank_models(
     request: Request,
     *,
-    observations: _Observations,
+    observations: Path,
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
@@ -166,12 +151,12 @@ def rank_models(
 def suggest(
     request: Request,
     *,
-    posterior: Annotated[Path, typer.Argument(help="Posterior of a calibration (posterior.nc).")],
+    posterior: Path,
     robot: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
     ] = None,
-    rows: Annotated[int, typer.Option(help="Candidates in the table.")] = 10,
+    rows: int = 10,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -195,41 +180,16 @@ def suggest(
     renderer.show(found.to_dict(), json=json, rows=rows)
 
 
-_Pairs = Annotated[
-    list[str],
-    typer.Option(
-        metavar="FIELD=LOW:HIGH",
-        help="A design variable with its range, such as tail.wavelength=5mm:40mm or tail.turns=2:6; repeatable.",
-    ),
-]
-
-
 @from_function("spirillum.designs.design:design")
 def design(
     request: Request,
     *,
-    vary: _Pairs,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Robot file of the best design (.toml).")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw objective, sensitivity and front: .png, .pdf or .svg.")
-    ] = None,
-    stl: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The best design as one closed body for a printer (.stl, in mm)."),
-    ] = None,
-    unknown: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FIELD=LOW:HIGH", help="An unknown field, uniform over its range; repeatable."),
-    ] = None,
-    model: Annotated[
-        str,
-        typer.Option(
-            help="Hydrodynamic model: sbt, rft, slender or tube; auto: tube for a robot in a channel, slender without "
-            "one, by a surrogate in about a minute."
-        ),
-    ] = "auto",
+    vary: list[str],
+    output: Path | None = None,
+    plot: Path | None = None,
+    stl: Path | None = None,
+    unknown: list[str] | None = None,
+    model: str = "auto",
     json: Json = False,
 ) -> None:
     """Find the tail to build: the best values of some fields, under conditions and what is not known.

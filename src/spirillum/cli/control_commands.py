@@ -12,7 +12,7 @@ import typer
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import each_once
 from spirillum.cli.motion_commands import check_movie
-from spirillum.cli.shared_options import PANELS, TEXTS, Json, starting
+from spirillum.cli.shared_options import PANELS, Json, choices, starting
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 _LAB = PANELS["lab"]
-_PICTURES = "Pictures"
 _EYES = ("model", "tracker")
 
 
@@ -42,10 +41,6 @@ def _complete_laws(incomplete: str) -> list[str]:
     from spirillum.controllers.steering import Law
 
     return starting(get_args(Law), incomplete)
-
-
-def _complete_eyes(incomplete: str) -> list[str]:
-    return starting(_EYES, incomplete)
 
 
 @from_function(
@@ -77,46 +72,21 @@ def control(
             rich_help_panel=PANELS["task."],
         ),
     ] = "stop-at",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
-    ] = None,
-    with_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--with",
-            metavar="PATH=VALUE",
-            help="A field of the lab, such as camera.latency=50ms; repeatable.",
-            rich_help_panel=_LAB,
-        ),
-    ] = None,
+    output: Path | None = None,
+    with_: list[str] | None = None,
     seen_by: Annotated[
         str,
         typer.Option(
-            autocompletion=_complete_eyes,
+            autocompletion=choices(*_EYES),
             help="model (the camera of the lab) or tracker (rendered frames, tracked).",
             rich_help_panel=_LAB,
         ),
     ] = "model",
-    remote: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PORT",
-            help="Send the commands through a remote at a serial port; virtual: a simulated one.",
-            rich_help_panel=_LAB,
-        ),
-    ] = None,
-    model: Annotated[str, typer.Option(help="Hydrodynamic model: tube, slender, rft; or auto.")] = "auto",
-    roughness: Annotated[str | None, typer.Option(metavar="LENGTH", help=TEXTS["roughness"])] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
-    ] = None,
-    movie: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
-        ),
-    ] = None,
+    remote: str | None = None,
+    model: str = "auto",
+    roughness: str | None = None,
+    plot: Path | None = None,
+    movie: Path | None = None,
     json: Json = False,
 ) -> None:
     """Control a robot in a closed loop: late and noisy camera, on/off remote, flow, unknown friction; and score it.
@@ -173,7 +143,6 @@ def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
 
 
 def _lab(path: Path | None, changes: list[str] | None) -> Lab:
-    """The lab of a file with fields changed."""
     from spirillum.controllers.lab import Lab
     from spirillum.robot.load import parse_setting
 
@@ -185,7 +154,7 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
 def remote(
     request: Request,
     *,
-    port: Annotated[str, typer.Argument(help="Serial port of the remote, such as /dev/ttyUSB0 or COM3.")],
+    port: str,
     json: Json = False,
 ) -> None:
     """Switch a real motor on for a time, through a remote at a serial port. Needs the extra `control`.

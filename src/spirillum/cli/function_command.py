@@ -23,9 +23,11 @@ from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.interrupts import InterruptibleCommand
 from spirillum.cli.shared_options import (
     COMPLETIONS,
+    EXAMPLES,
     LISTED,
     METAVARS,
     NAMES,
+    OWN,
     PANELS,
     TEXTS,
     NotedCommand,
@@ -47,35 +49,16 @@ _BY_FIELD_TYPE = {
     "Pitch": "ANGLE",
     "Yaw": "ANGLE",
 }
-_EXAMPLES = {
-    "LENGTH": "0.5mm",
-    "ANGLE": "2deg",
-    "TIME": "2s",
-    "RATE": "1.2Hz",
-    "VELOCITY": "-2mm/s",
-    "phase": "90deg",
-    "camera.exposure": "5ms",
-    "camera.field_of_view": "5mm",
-    "until": "0.1mm",
-    "roughness": "20um",
-    "feasibility.speed": "1mm/s",
-    "feasibility.view_width": "5mm",
-    "spacing": "2mm",
-}
-"""Of quantities, by kind or argument."""
-GIVEN_OTHERWISE = ("robot", "progress", "tell")
-"""Arguments of functions that every command gives in its own way."""
+GIVEN_OTHERWISE = ("robot", "progress", "tell")  #: Arguments of functions that every command gives in its own way.
 
 
 class Declaration(NamedTuple):
     """One argument of a function, or one field of its options tables."""
 
-    path: str
-    """`argument`, or `argument.field` of a table."""
+    path: str  #: `argument`, or `argument.field` of a table.
     annotation: str
     default: Any
-    text: str
-    """Of the docstring."""
+    text: str  #: Of the docstring.
 
     @property
     def name(self) -> str:
@@ -104,11 +87,9 @@ class FunctionSource(NamedTuple):
 
     body: Callable[..., None]
     target: str
-    without: Mapping[str, str]
-    """Arguments and fields that are no option, with the reason."""
+    without: Mapping[str, str]  #: Arguments and fields that are no option, with the reason.
     completions: Mapping[str, Any]
-    robot: Any
-    """Annotation of the argument that names the robot; None for a function without one."""
+    robot: Any  #: Annotation of the argument that names the robot; None for a function without one.
     tables: Mapping[str, Sequence[str]] = {}
     """Arguments that are mappings, with the functions or classes (`module:name`) that declare their fields."""
 
@@ -128,8 +109,7 @@ class Request:
     """A call of the public function of a command, with the arguments that were typed."""
 
     source: FunctionSource
-    typed: dict[str, Any]
-    """Argument or `argument.field` to its value; what was not typed is left out."""
+    typed: dict[str, Any]  #: Argument or `argument.field` to its value; what was not typed is left out.
     named_robot: str | None = None
     settings: list[str] | None = None
 
@@ -229,7 +209,6 @@ class FunctionCommand(InterruptibleCommand):
 
 
 def _complete(source: FunctionSource) -> Callable[..., None]:
-    """The command with all its parameters."""
     own = dict(list(inspect.signature(source.body).parameters.items())[1:])
     hints = get_type_hints(source.body, include_extras=True)
     made = {
@@ -242,13 +221,14 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
         needed = type(None) not in get_args(get_args(source.robot)[0])
         parameters = [_parameter("robot", source.robot, inspect.Parameter.empty if needed else None)]
     parameters += [_parameter(name, kind, default) for name, (_, kind, default) in made.items()]
-    parameters += [_parameter(name, hints[name], item.default) for name, item in own.items()]
+    command = source.body.__name__
+    parameters += [_parameter(name, _own(command, name, hints[name]), item.default) for name, item in own.items()]
     if source.robot is not None:
         parameters.insert(-1, _parameter("settings", Settings, None))
 
     def run(**given: Any) -> None:
         typed = {
-            item.path: _as_argument(item, given[name])
+            item.path: not item.default if item.is_switch else given[name]
             for name, (item, _, default) in made.items()
             if given[name] is not None and given[name] != default
         }
@@ -264,17 +244,21 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
     return run
 
 
+def _own(command: str, name: str, kind: Any) -> Any:
+    """Annotation of what a command takes beside the function's arguments: by `own_options.csv`, or as it is."""
+    row = OWN.get((command, name))
+    if row is None:
+        return kind
+    about: Any = {"metavar": row["placeholder"] or None, "help": row["help"], "rich_help_panel": row["panel"] or None}
+    argument = row["option"] == "argument"
+    return Annotated[kind, typer.Argument(**about) if argument else typer.Option(*row["option"].split(), **about)]
+
+
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
 
 
-def _as_argument(item: Declaration, value: Any) -> Any:
-    """The value of an argument; a switch turns the default round."""
-    return not item.default if item.is_switch else value
-
-
-_IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")
-"""Tables of functions whose fields no file has."""
+_IN_PYTHON = ("in_tube.", "timing.", "resolution.", "field.", "task.")  # tables of functions whose fields no file has
 
 
 def _with_options(error: InputError, items: Iterable[Declaration]) -> InputError:
@@ -361,7 +345,7 @@ def _help(item: Declaration, metavar: str | None) -> str:
     text = f"{text[:1].upper()}{text[1:]}"
     if metavar is None or "such as" in text:
         return text
-    example = _EXAMPLES.get(item.path, _EXAMPLES[metavar])
+    example = EXAMPLES.get(item.path, EXAMPLES[metavar])
     first, mark, rest = text.rstrip(".").partition(";")
     return f"{first}, such as {example}{mark}{rest}."
 
@@ -402,7 +386,6 @@ def _class_fields(module: str, table: str) -> Iterator[Declaration]:
 
 
 def _is_table(module: str, name: str) -> bool:
-    """Whether a name is a table of options."""
     home = _home(module, name)
     bases = [item.bases for item in _tree(home).body if isinstance(item, ast.ClassDef) and item.name == name]
     return any(ast.unparse(base) == "Options" for found in bases for base in found)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import typer
 
     from spirillum.robot.robot import Robot
@@ -20,75 +20,22 @@ if TYPE_CHECKING:
 class Rule(NamedTuple):
     """Options that a request in some state has no use for."""
 
-    state: str
-    """States of the request, such as `run`: its command defines which of them hold."""
-    options: tuple[str, ...]
-    """Names of the command's parameters."""
+    state: str  #: States of the request, such as `run`: its command defines which of them hold.
+    options: tuple[str, ...]  #: Names of the command's parameters.
     conflict: str
     """Rest of the sentence after the options: the conflict, and what is allowed; the request fills words in braces."""
 
 
-_FIELDS = ("gap", "eccentricity", "pitch", "yaw", "tail_drop", "ends")
-RULES: dict[str, tuple[Rule, ...]] = {
-    "calibrate": (
-        Rule(
-            "no posterior",
-            ("seed", "doublings"),
-            "with method '{method}', which samples no posterior; allowed: with method posterior",
-        ),
-    ),
-    "export": (
-        Rule(
-            "recording",
-            (
-                *("phase", "fineness", "unit", "sidecar", "no_sidecar", "model", "friction", "calibration"),
-                *("gap", "pitch", "flow", "settings"),
-            ),
-            "with .mcap; allowed: --film and --speed, for the run has its robot",
-        ),
-        Rule("no recording", ("film", "speed"), "with {ending}; allowed: only with .mcap"),
-    ),
-    "flow": (
-        Rule(
-            "no plane",
-            ("plane", "offset", "resolution"),
-            "without a plane (-o FILE), to which it belongs; allowed: both or neither",
-        ),
-        Rule(
-            "no volume", ("volume_resolution",), "without --volume FILE, to which it belongs; allowed: both or neither"
-        ),
-        Rule(
-            "run",
-            ("robot", "tail_rate", "friction", "settings", "phase", *_FIELDS, "flow"),
-            "together with a run, which states it; allowed: --run and --time alone",
-        ),
-        Rule(
-            "run with another model",
-            ("model",),
-            "together with a run, which states it; allowed: --run and --time alone",
-        ),
-    ),
-    "measure": (
-        Rule(
-            "feasibility",
-            ("output", "marks", "tracking", "track", "annotated", "figures", "start", "end"),
-            "with --feasibility, which measures nothing; allowed: without it",
-        ),
-        Rule(
-            "no feasibility",
-            (
-                *("feasibility_tail_rate", "feasibility_body_rate", "feasibility_speed", "duration"),
-                *("feasibility_frames_per_second", "view_width", "feasibility_picture_width"),
-            ),
-            "without --feasibility; allowed: with it",
-        ),
-    ),
-    "study": (
-        Rule("store", ("rows",), "{rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)"),
-        Rule("store", ("figures",), "with --store, which draws none; allowed: a folder of results (-o DIR)"),
-    ),
-}
-"""Rules by command, in the order in which they are checked."""
+def _rules() -> dict[str, list[Rule]]:
+    """The rows of `rules.csv`."""
+    found: dict[str, list[Rule]] = {}
+    for row in csv.DictReader(Path(__file__).with_name("rules.csv").read_text(encoding="utf-8").splitlines()):
+        rule = Rule(row["state"], tuple(row["options"].split()), row["conflict"])
+        found.setdefault(row["command"], []).append(rule)
+    return found
+
+
+RULES = _rules()  #: Rules by command, in the order in which they are checked.
 
 
 def check_rules(command: str, states: Collection[str], given: Callable[..., list[str]], **words: object) -> None:
@@ -102,11 +49,7 @@ _V = TypeVar("_V")
 
 
 def given_options(context: typer.Context, *parameters: str) -> list[str]:
-    """Options that were typed, also those with the value that they have otherwise.
-
-    Returns:
-        The options as they are typed, such as ``--volume-resolution``, in the order of `parameters`.
-    """
+    """Options that were typed, in the order of `parameters`, also those with the value that they have otherwise."""
     options = {parameter.name: max(parameter.opts, key=len) for parameter in context.command.params}
     return [
         options[name]
@@ -140,14 +83,7 @@ def each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
 def loaded_robot(
     robot: str, settings: list[str] | None, calibration: Path | None = None, posterior: Path | None = None
 ) -> Robot:
-    """The robot with its fields set.
-
-    Args:
-        robot: a preset's name or a robot file.
-        settings: the options `--set`.
-        calibration: calibration file that will be applied to the robot; None without one.
-        posterior: posterior that will be applied to it; None without one.
-    """
+    """The robot with its fields set, none of which may be one that calibration or posterior replace."""
     from spirillum.robot.load import load
 
     overrides = overrides_from(settings)

@@ -12,12 +12,11 @@ from spirillum.cli.function_command import FunctionCommand, Request, from_functi
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
     DISTURBANCES_PANEL,
-    PANELS,
     Json,
     NotedCommand,
     Settings,
+    choices,
     optional_robot,
-    starting,
 )
 from spirillum.cli.wrapping import wrapped
 
@@ -38,21 +37,10 @@ def measure(
     request: Request,
     *,
     context: typer.Context,
-    videos: Annotated[
-        list[Path] | None, typer.Argument(metavar="VIDEO...", help="Videos or folders of images, one a trial.")
-    ] = None,
-    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
-        "spirillum-measurement"
-    ),
-    feasibility: Annotated[
-        bool,
-        typer.Option(
-            "--feasibility",
-            help="Does the camera of --setup resolve the expected rates?",
-            rich_help_panel=PANELS["feasibility."],
-        ),
-    ] = False,
+    videos: list[Path] | None = None,
+    setup: Path | None = None,
+    output: Path = Path("spirillum-measurement"),
+    feasibility: bool = False,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -94,23 +82,17 @@ def measure(
         raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
 
 
-def _complete_paces(incomplete: str) -> list[str]:
-    return starting(("fast", "real"), incomplete)
-
-
 @from_function(
     "spirillum.live.session:track",
     without={"overrides": "--set", "on_observation": "the terminal or --udp"},
-    complete={"pace": _complete_paces},
+    complete={"pace": choices("fast", "real")},
     robot=None,
 )
 def track(
     request: Request,
     *,
-    source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="A film, camera:0, or the address of a stream (rtsp://, ...).")
-    ],
-    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
+    source: str,
+    setup: Path | None = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -169,26 +151,12 @@ def _size(word: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def _complete_presets(incomplete: str) -> list[str]:
-    return starting(("clean", "degraded"), incomplete)
-
-
 _Preset = Annotated[
     str,
     typer.Option(
         "--preset",
-        autocompletion=_complete_presets,
+        autocompletion=choices("clean", "degraded"),
         help="clean, or degraded: all disturbances but bubbles and hand.",
-        rich_help_panel=DISTURBANCES_PANEL,
-    ),
-]
-_Trouble = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME,...",
-        help="Artifacts of a recording: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, "
-        "mirrored-lamps, grid-paper, glass-cover, noise, lamp, compression, missing-frames, tilted, glare, "
-        "standing-glare, bubbles, hand; with commas between them, or repeated.",
         rich_help_panel=DISTURBANCES_PANEL,
     ),
 ]
@@ -202,11 +170,9 @@ _Trouble = Annotated[
 def render(
     request: Request,
     *,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
-    ],
+    output: Path,
     preset: _Preset = "clean",
-    trouble: _Trouble = None,
+    trouble: list[str] | None = None,
     json: Json = False,
 ) -> None:
     """Film a robot with a virtual laboratory camera, to try `measure` before the experiment. Needs the extra `video`.
@@ -234,12 +200,8 @@ def render(
 def virtual_experiment(
     request: Request,
     *,
-    study: Annotated[
-        Path | None, typer.Argument(help="Study file (see `spirillum schema study`); else the paper's two presets.")
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the videos.")] = Path(
-        "spirillum-virtual-experiment"
-    ),
+    study: Path | None = None,
+    output: Path = Path("spirillum-virtual-experiment"),
     preset: _Preset = "clean",
     json: Json = False,
 ) -> None:
@@ -260,7 +222,7 @@ setup_app = typer.Typer(name="setup", help="Setup files: camera, tank, ruler and
 
 @setup_app.command("new", cls=FunctionCommand)
 @from_function("spirillum.measurement.setup_template:new_setup_file", without={"path": "the argument"}, robot=None)
-def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to write (.toml).")]) -> None:
+def new(request: Request, *, file: Path) -> None:
     """Write a setup file to fill in.
 
     Example: `spirillum setup new setup.toml`
@@ -274,13 +236,9 @@ def new(request: Request, *, file: Annotated[Path, typer.Argument(help="File to 
 def propose(
     request: Request,
     *,
-    film: Annotated[Path, typer.Argument(help="A film, or a folder of images.")],
-    robot: Annotated[
-        str | None, typer.Argument(help="Preset or robot file; else the paper's robot is looked for.")
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.toml).")] = Path(
-        "setup.toml"
-    ),
+    film: Path,
+    robot: str | None = None,
+    output: Path = Path("setup.toml"),
     json: Json = False,
 ) -> None:
     """Inspect a video and write a setup file: detected values are filled in, the rest is marked.

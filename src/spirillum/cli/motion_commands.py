@@ -14,10 +14,7 @@ from spirillum.cli.inputs import time_window
 from spirillum.cli.shared_options import (
     NO_FORM,
     NO_START,
-    START_PANEL,
-    TIMING_PANEL,
     Json,
-    Output,
     complete_auto_models,
     complete_models,
 )
@@ -26,8 +23,6 @@ from spirillum.notes import note_attributes, notes_in
 if TYPE_CHECKING:
     import xarray as xr
 
-
-_PICTURES = "Pictures"
 
 _FullModel = Annotated[
     str,
@@ -54,47 +49,14 @@ _FullModel = Annotated[
 def simulate(
     request: Request,
     *,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also write the run: NetCDF (.nc).")
-    ] = None,
+    output: Path | None = None,
     model: _FullModel = "auto",
-    on: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FROM:TO",
-            help="When the remote switches the drive on, such as 0s:2s; repeatable.",
-            rich_help_panel=TIMING_PANEL,
-        ),
-    ] = None,
-    flow: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VELOCITY|FILE",
-            help="Free, tube: imposed mean flow, such as 1mm/s, or over time: CSV with the columns time_s, flow_mm_s.",
-            rich_help_panel=START_PANEL,
-        ),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Also plot the run: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
-    ] = None,
-    panels: Annotated[
-        str | None,
-        typer.Option(help="With --plot: main (speed and gap) or all; else main.", rich_help_panel=_PICTURES),
-    ] = None,
-    column: Annotated[
-        str | None,
-        typer.Option(
-            help="With --plot: its width, single or double, as the columns of a page; else double.",
-            rich_help_panel=_PICTURES,
-        ),
-    ] = None,
-    movie: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Also film the run: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
-        ),
-    ] = None,
+    on: list[str] | None = None,
+    flow: str | None = None,
+    plot: Path | None = None,
+    panels: str | None = None,
+    column: str | None = None,
+    movie: Path | None = None,
     json: Json = False,
 ) -> None:
     """Simulate swimming from rest: six degrees of freedom, weight, floor, motor and remote; or two (`--motion held`).
@@ -194,8 +156,8 @@ def _after_the_run(what: str, *, written: bool) -> Iterator[None]:
 def magnetic_sweep(
     request: Request,
     *,
-    output: Output,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Also plot it: .png, .pdf or .svg.")] = None,
+    output: Path,
+    plot: Path | None = None,
     json: Json = False,
 ) -> None:
     """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.
@@ -221,10 +183,7 @@ def magnetic_sweep(
 def settle(
     request: Request,
     *,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", "--plot", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg."),
-    ] = None,
+    output: Path | None = None,
     json: Json = False,
 ) -> None:
     """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.

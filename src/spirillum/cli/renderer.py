@@ -25,18 +25,12 @@ from spirillum.display import counted
 from spirillum.envelope import as_json, with_notes_last
 from spirillum.notes import Note, notes_in_answer, shown_cautions
 
-_PERIOD = 15.0
-"""Least time between two lines, s."""
-_FIRST = 5.0
-"""Time after which the first line is printed, s; shorter work prints none."""
-_SHARE = 0.05
-"""Least time between two lines over the time since the start, so that a long log stays readable."""
-_AT_ONCE = 1.0
-"""Work that is done within this time from the start of a stage was cached and does not enter the pace, s."""
-_FEWEST = 2
-"""Steps from which on a time left is stated."""
-_LOOK = 1.0
-"""Time between two looks whether a line is due, s: a step may take minutes."""
+_PERIOD = 15.0  # least time between two lines, s
+_FIRST = 5.0  # time after which the first line is printed, s; shorter work prints none
+_SHARE = 0.05  # least time between two lines over the time since the start, so that a long log stays readable
+_AT_ONCE = 1.0  # work that is done within this time from the start of a stage was cached and does not enter the pace, s
+_FEWEST = 2  # steps from which on a time left is stated
+_LOOK = 1.0  # time between two looks whether a line is due, s: a step may take minutes
 
 
 @contextmanager
@@ -129,8 +123,7 @@ class ProgressLines:
         return f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
-_FINE = 10.0
-"""Minutes below which a duration is printed with its seconds."""
+_FINE = 10.0  # minutes below which a duration is printed with its seconds
 
 
 def _duration(seconds: float) -> str:
@@ -220,13 +213,9 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
 
 
 def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str | None]:
-    """A function that draws an answer into a file, which is checked now; it returns the file's name, or None.
-
-    Args:
-        path: of the picture; None without one.
-        example: of a file's name, for the sentence of an error.
-        figure: function that makes the figure of an answer, `module:name`.
-    """
+    """A function that draws an answer into a file, which is checked now; it returns the file's name, or None."""
+    # `figure` is the function `module:name` that makes the figure, `example` a file's name for the sentence of an
+    # error.
     from spirillum.files import PICTURES, output_target
 
     target = None if path is None else output_target(path, PICTURES, example)
@@ -265,10 +254,8 @@ def answer_kept(answer: Callable[[], Answer], *, json: bool, **options: Any) -> 
 
 
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:
-    """A sign of life while a model solves; its first run on a machine compiles for some seconds.
-
-    That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
-    """
+    """A sign of life while a model solves; its first run on a machine compiles for some seconds."""
+    # That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
     from spirillum.fluid.registry import MODELS
     from spirillum.fluid.tube.progress_messages import TILTED
 
@@ -306,17 +293,14 @@ def _print_line(line: str) -> None:
             sys.stderr.flush()
 
 
-_SOON = 2.0
-"""Time after which progress is shown, and why an answer is not there at once, s."""
+_SOON = 2.0  # time after which progress is shown, and why an answer is not there at once, s
 
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """A progress bar on standard error with the time left, plain lines where it is no terminal; silent for `--json`.
-
-    That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will take,
-    are lines of their own on standard error in any case; so is, after two seconds, that there is no table.
-    """
+    """A progress bar on standard error with the time left, plain lines where it is no terminal; silent for `--json`."""
+    # That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will
+    # take, are lines of their own on standard error in any case; so is, after two seconds, that there is no table.
     from spirillum.fluid.tube.progress_messages import LEVEL
 
     waiting: list[Timer] = []

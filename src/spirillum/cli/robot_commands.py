@@ -14,6 +14,7 @@ from spirillum.cli.shared_options import (
     NotedCommand,
     RobotArgument,
     Settings,
+    choices,
     complete_presets,
     complete_robots,
     starting,
@@ -117,10 +118,6 @@ def prepare(
     renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)
 
 
-def _complete_units(incomplete: str) -> list[str]:
-    return starting(("m", "mm", "um"), incomplete)
-
-
 @from_function(
     "spirillum.exports.write:export",
     without={
@@ -130,7 +127,7 @@ def _complete_units(incomplete: str) -> list[str]:
             "a unit is held at a gap and pitch, with a flow as its input",
         ),
     },
-    complete={"unit": _complete_units},
+    complete={"unit": choices("m", "mm", "um")},
     robot=Annotated[
         str,
         typer.Argument(
@@ -142,19 +139,11 @@ def export(
     request: Request,
     *,
     context: typer.Context,
-    target: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
-        ),
-    ],
-    sidecar: Annotated[
-        bool,
-        typer.Option("--sidecar", help="Masses and 12x12 resistance in a JSON file beside .stl, .glb and .vtp too."),
-    ] = False,
-    no_sidecar: Annotated[bool, typer.Option("--no-sidecar", help="Leave it out beside .urdf and .mjcf.")] = False,
-    film: Annotated[Path | None, typer.Option(metavar="FILE", help="For .mcap: a video of the run to include.")] = None,
-    speed: Annotated[float, typer.Option(help="For .mcap: time of the run over time of that film.")] = 1.0,
+    target: Path,
+    sidecar: bool = False,
+    no_sidecar: bool = False,
+    film: Path | None = None,
+    speed: float = 1.0,
     json: Json = False,
 ) -> None:
     """Write the robot for a printer, Blender, ParaView, MuJoCo, a simulator of robots or systems; a run for Foxglove.

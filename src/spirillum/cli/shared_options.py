@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
 from copy import copy
@@ -12,10 +13,8 @@ import typer
 
 from spirillum.cli.interrupts import InterruptibleCommand
 
-MODEL_PANEL = "Model"
-"""Panel of the help: which model answers, with which friction and calibration, how finely."""
-PLACE_PANEL = "Pose in the channel (model tube)"
-"""Panel of the help: pose of the robot in its channel."""
+MODEL_PANEL = "Model"  #: Panel of the help: which model answers, with which friction and calibration, how finely.
+PLACE_PANEL = "Pose in the channel (model tube)"  #: Panel of the help: pose of the robot in its channel.
 START_PANEL = "Start of a free run, and its tube"
 TIMING_PANEL = "Timing and remote"
 DISTURBANCES_PANEL = "Disturbances"
@@ -24,6 +23,11 @@ DISTURBANCES_PANEL = "Disturbances"
 def starting(words: Iterable[str], incomplete: str) -> list[str]:
     """Words that begin with what is typed."""
     return [word for word in words if word.startswith(incomplete)]
+
+
+def choices(*words: str) -> Callable[[str], list[str]]:
+    """Completion of one of some words."""
+    return lambda incomplete: starting(words, incomplete)
 
 
 def complete_presets(incomplete: str) -> list[str]:
@@ -59,86 +63,40 @@ def complete_resistance_models(incomplete: str) -> list[str]:
     return starting(sorted(MODELS), incomplete)
 
 
-def complete_parts(incomplete: str) -> list[str]:
-    """Parts of a robot."""
-    return starting(("body", "both", "coupling", "robot", "rotor", "tail"), incomplete)
-
-
-def complete_planes(incomplete: str) -> list[str]:
-    """Planes through a robot."""
-    return starting(("xy", "xz", "yz"), incomplete)
-
-
-def complete_frames(incomplete: str) -> list[str]:
-    """Frames of a flow."""
-    return starting(("body", "lab"), incomplete)
-
-
-def complete_schemas(incomplete: str) -> list[str]:
-    """Names of schemas."""
-    return starting(("calibration", "robot", "setup", "study"), incomplete)
-
-
-def _complete_accuracies(incomplete: str) -> list[str]:
-    return starting(("high", "standard"), incomplete)
-
-
-def _complete_ends(incomplete: str) -> list[str]:
-    return starting(("closed", "open"), incomplete)
-
-
-def _complete_motions(incomplete: str) -> list[str]:
-    return starting(("free", "held"), incomplete)
-
-
-def _complete_views(incomplete: str) -> list[str]:
-    return starting(("side", "top"), incomplete)
-
-
-def _complete_directions(incomplete: str) -> list[str]:
-    return starting(("left", "right"), incomplete)
-
-
-def _complete_friction(incomplete: str) -> list[str]:
-    return starting(("body", "none", "paper", "rotor"), incomplete)
-
-
-def complete_answers(incomplete: str) -> list[str]:
-    """Motions of a robot in its tube that can be fitted."""
-    return starting(("held", "trial"), incomplete)
-
-
+complete_parts = choices("body", "both", "coupling", "robot", "rotor", "tail")
 COMPLETIONS: dict[str, Callable[[str], list[str]]] = {
-    "answer": complete_answers,
-    "accuracy": _complete_accuracies,
-    "ends": _complete_ends,
-    "friction": _complete_friction,
+    "answer": choices("held", "trial"),
+    "accuracy": choices("high", "standard"),
+    "ends": choices("closed", "open"),
+    "friction": choices("body", "none", "paper", "rotor"),
     "model": complete_auto_models,
     "models": complete_models,
-    "motion": _complete_motions,
+    "motion": choices("free", "held"),
     "part": complete_parts,
-    "view": _complete_views,
-    "direction": _complete_directions,
+    "view": choices("side", "top"),
+    "direction": choices("left", "right"),
 }
 """Completions of the shell, by argument or field of a table."""
-NAMES = {
-    "answer": "--as",
-    "calibrated": "--no-calibration",
-    "degradation.glare_moves": "--glare-fixed",
-    "field.pitch": "--field-pitch",
-    "feasibility.body_rate": "--expect-body-rate",
-    "feasibility.frames_per_second": "--fps",
-    "feasibility.picture_width": "--width",
-    "feasibility.speed": "--expect-speed",
-    "feasibility.tail_rate": "--expect-tail-rate",
-    "field.yaw": "--field-yaw",
-    "in_tube.continued": "--continue",
-    "models": "--model",
-    "overwrite": "--force",
-    "posterior_for": "--for",
-    "rates": "--rate",
-}
-"""Options that are not named after the argument or field."""
+
+
+def _rows(table: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(Path(__file__).with_name(table).read_text(encoding="utf-8").splitlines()))
+
+
+_ROWS = _rows("options.csv")
+
+
+def _column(name: str) -> dict[str, str]:
+    """A column of `options.csv` by argument or field, which the docstrings of the functions do not have."""
+    return {path: row[name] for row in _ROWS for path in row["paths"].split() if row[name]}
+
+
+NAMES = _column("option")  #: Options that are not named after the argument or field.
+METAVARS = _column("placeholder")  #: Placeholder of a value in the help, where its kind does not give one.
+EXAMPLES = _column("example")  #: Of quantities, by kind or argument.
+TEXTS = _column("help")  #: Helps of arguments that docstrings explain elsewhere.
+OWN = {(row["command"], row["parameter"]): row for row in _rows("own_options.csv")}
+"""Options and arguments that a command has beside those of its function."""
 PANELS = {
     **dict.fromkeys(("model", "friction", "calibrated", "calibration", "posterior", "posterior_for"), MODEL_PANEL),
     "resolution.": MODEL_PANEL,
@@ -156,44 +114,7 @@ PANELS = {
     "setup_errors.": "Errors of the setup file",
 }
 """Panels of the help by argument, or by table (with a point)."""
-LISTED = "NAME,..."
-"""Placeholder of names separated by commas."""
-METAVARS = {
-    "camera.size": "WIDTHxHEIGHT",
-    "free": LISTED,
-    "size": "WIDTHxHEIGHT",
-    "udp": "[HOST:]PORT",
-    "judged.statistic": "mean|quantile",
-    "maximise": "QUANTITY",
-    "minimise": "QUANTITY",
-    "posterior_for": "new|measured",
-    "subject_to": "CONDITION",
-}
-"""Placeholder of a value in the help, where its kind does not give one."""
-_FRICTION = (
-    "Friction model. none; rotor: in the joint, between body and tail; body: between body and "
-    "wall; paper: as eq. (19) is printed, on the tail from outside."
-)
-_TAIL_RATE = "Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive decides."
-TEXTS = {
-    "calibration": "Calibration file whose factors replace the robot's.",
-    "posterior": "Posterior of a calibration: its median replaces the robot's values, and the answer has intervals.",
-    "friction": _FRICTION,
-    "motion.friction": _FRICTION,
-    "degradation.glare_moves": "The glare stands still instead of moving with the body.",
-    "roughness": "Height of the asperities, such as 20um; else 1e-4 of the body's radius.",
-    "seed": "Seed of all random numbers.",
-    "tail_rate": _TAIL_RATE,
-    "motion.tail_rate": _TAIL_RATE,
-    "weight": "Do not let weight and buoyancy act, if the masses are known.",
-    "task.at": "stop-at: x of the body's mid-length at which to stop, such as 5mm.",
-    "task.law": "keep-axis: `position` (feedback of the position) or `aim` (at a point of the axis ahead).",
-    "task.rate": "keep-axis: rate of the field, such as 1Hz; else the robot's.",
-    "task.speed": "Tasks of speed: along the robot's path, such as 0.1mm/s.",
-    "task.tolerance": "Allowed distance from goal or course, such as 1mm.",
-    "tracking": "Use readings by hand alone; the video gives scale and times.",
-}
-"""Helps of arguments that docstrings explain elsewhere."""
+LISTED = "NAME,..."  #: Placeholder of names separated by commas.
 NO_FORM = {"resolution.form": "an option of the robot, model.tube.form"}
 """Fields of tables that are no options of commands, with the reason; so below."""
 NO_START = dict.fromkeys(("in_tube.wait", "in_tube.flow", "in_tube.continued"), "of a run over time: simulate")
@@ -211,10 +132,6 @@ Settings = Annotated[
 ]
 All = Annotated[bool, typer.Option("--all", help="Print all quantities.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
-Picture = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Also plot to this file: .png, .pdf or .svg.")
-]
 
 
 class NotedCommand(InterruptibleCommand):

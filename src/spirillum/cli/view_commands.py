@@ -9,7 +9,7 @@ import typer
 
 from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import refuse_conflicts
-from spirillum.cli.shared_options import NO_FORM, Json, complete_frames, complete_planes, optional_robot, starting
+from spirillum.cli.shared_options import NO_FORM, Json, choices, optional_robot, starting
 from spirillum.errors import InputError
 
 
@@ -27,30 +27,18 @@ def page(request: Request) -> None:
     request(tell=typer.echo)
 
 
-_VIEWS = ("front", "perspective", "rear", "side", "top")
+_VIEWS = choices("front", "perspective", "rear", "side", "top")
 
 
-def _complete_views(incomplete: str) -> list[str]:
-    return starting(_VIEWS, incomplete)
+_View = Annotated[str, typer.Option(autocompletion=_VIEWS, help="perspective, or to scale: side, top, front, rear.")]
 
 
-def _complete_cameras(incomplete: str) -> list[str]:
-    return starting(("auto", "fixed", "follow"), incomplete)
-
-
-_View = Annotated[
-    str, typer.Option(autocompletion=_complete_views, help="perspective, or to scale: side, top, front, rear.")
-]
-
-
-@from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _complete_views})
+@from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _VIEWS})
 def show(
     request: Request,
     *,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
-    ] = None,
-    window: Annotated[bool, typer.Option("--window", help="Open an interactive window.")] = False,
+    output: Path | None = None,
+    window: bool = False,
     json: Json = False,
 ) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
@@ -77,7 +65,10 @@ def film(
     ] = None,
     camera: Annotated[
         str,
-        typer.Option(autocompletion=_complete_cameras, help="fixed, follow, or auto (follow a robot that swims far)."),
+        typer.Option(
+            autocompletion=choices("auto", "fixed", "follow"),
+            help="fixed, follow, or auto (follow a robot that swims far).",
+        ),
     ] = "auto",
     json: Json = False,
 ) -> None:
@@ -111,37 +102,24 @@ def _complete_models(incomplete: str) -> list[str]:
         "resolution.phases": "an option of the robot, model.tube.phases",
         "calibrated": "factors represent walls that are not in the flow",
     },
-    complete={"model": _complete_models, "frame": complete_frames},
+    complete={"model": _complete_models, "frame": choices("body", "lab")},
     robot=optional_robot("A preset's name or a TOML file; none with --run."),
 )
 def flow(
     request: Request,
     *,
     context: typer.Context,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
-    ] = None,
-    volume: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A box around the robot: .vti for ParaView, or .nc.")
-    ] = None,
+    output: Path | None = None,
+    volume: Path | None = None,
     plane: Annotated[
-        str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
+        str, typer.Option(autocompletion=choices("xy", "xz", "yz"), help="xz (side), xy (from above) or yz (across).")
     ] = "xz",
-    offset: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Position of the plane on the axis normal to it, such as -50mm.")
-    ] = "0mm",
-    extent: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
-    ] = None,
-    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
-    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
-    run: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The flow at a moment of a free run in a tube instead, by `simulate`."),
-    ] = None,
-    time: Annotated[str | None, typer.Option(metavar="TIME", help="With --run: the moment, such as 0.5s.")] = None,
+    offset: str = "0mm",
+    extent: str | None = None,
+    resolution: int = 240,
+    volume_resolution: int = 80,
+    run: Path | None = None,
+    time: str | None = None,
     json: Json = False,
 ) -> None:
     """Compute velocity and pressure of the fluid around the swimming robot: a picture, or numbers on a grid.

@@ -5,8 +5,7 @@ from __future__ import annotations
 import shutil
 import textwrap
 
-NARROWEST = 80
-"""Least width, in characters: a narrower terminal folds lines itself."""
+NARROWEST = 80  #: Least width, in characters: a narrower terminal folds lines itself.
 _INDENT = "  "
 
 

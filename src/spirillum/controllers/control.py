@@ -54,8 +54,7 @@ if TYPE_CHECKING:
 
 
 _TASKS: tuple[type[Task], ...] = (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask, KeepAxisTask)
-TASKS = {task.kind: task for task in _TASKS}
-"""Tasks by their kinds."""
+TASKS = {task.kind: task for task in _TASKS}  #: Tasks by their kinds.
 
 
 def task_of(value: Task | Mapping[str, Any]) -> Task:
@@ -71,8 +70,7 @@ def task_of(value: Task | Mapping[str, Any]) -> Task:
     return TASKS[kind].of({name: item for name, item in value.items() if name != "kind"})
 
 
-_START = "released at its placement and controlled from time 0, without the waiting of a trial"
-"""How a run begins."""
+_START = "released at its placement and controlled from time 0, without the waiting of a trial"  # how a run begins
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
 _SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
 _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
@@ -122,8 +120,7 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
 
 
 _MOST_SEEDS = 10_000
-_EVENT = 3000.0
-"""Memory of an event of a run with what the robot did until then, bytes."""
+_EVENT = 3000.0  # memory of an event of a run with what the robot did until then, bytes
 _LAST_SEED = 2**31 - 1
 _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
 
@@ -134,28 +131,21 @@ class Control(DisplayMixin):
 
     robot: Robot
     model: str
-    model_reason: str
-    """Why the model was taken; empty where it was named."""
+    model_reason: str  #: Why the model was taken; empty where it was named.
     task: Task
     lab: Lab
     controller: str
     seed: int
-    speed: float
-    """Predicted while the drive is on, m/s, with its sign."""
-    drawn: SampledErrors
-    """What the robot and the flow of this run were, and the controller did not know."""
+    speed: float  #: Predicted while the drive is on, m/s, with its sign.
+    drawn: SampledErrors  #: What the robot and the flow of this run were, and the controller did not know.
     score: Score
     run: LoopRun
-    dataset: xr.Dataset
-    """The run, see `docs/control.md`."""
-    late: float | None
-    """Live: by how much the last decision was late against the clock on the wall, s."""
+    dataset: xr.Dataset  #: The run, see `docs/control.md`.
+    late: float | None  #: Live: by how much the last decision was late against the clock on the wall, s.
     learnt: RobotEstimate | None
     """Friction and gap as estimated by the end of the run; None without `learn` or with too few data."""
-    scores: Scores | None
-    """Over many seeds; None without `seeds`."""
-    interrupted: bool
-    """Whether run or scores were interrupted; what was done until then is here."""
+    scores: Scores | None  #: Over many seeds; None without `seeds`.
+    interrupted: bool  #: Whether run or scores were interrupted; what was done until then is here.
     warnings: tuple[Note, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -353,7 +343,6 @@ def _dataset(job: ControlJob, run: LoopRun, plant: Plant) -> xr.Dataset:
 
 
 def _check_memory(duration: float, lab: Lab) -> None:
-    """Refuse a run whose record does not fit into memory."""
     rate = lab.camera.fps + lab.meter.rate + 2.0 / lab.remote.period
     cause = f"task.duration = {show(duration, 's')} with {rate:.4g} frames, readings, decisions and commands a second"
     check_memory(cause, duration * rate, "events", _EVENT, "as with a shorter duration or a lower camera.fps")
@@ -375,7 +364,6 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
 
 
 def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
-    """What to be careful about in a run."""
     warnings = []
     end, latency = run.moments[-1].time, lab.camera.latency
     if latency >= end:
@@ -394,7 +382,6 @@ def _warnings_of(run: LoopRun, lab: Lab) -> list[Note]:
 
 
 def _fields(options: Any) -> dict[str, Any]:
-    """Fields of options as data."""
     return {
         item.path: item.value if item.unit is None or item.value is None else quantity(item.value, item.unit)
         for item in field_values(options)

@@ -36,15 +36,12 @@ from spirillum.robot.arguments import refusal
 from spirillum.robot.fields import Length, Velocity
 from spirillum.units import show
 
-_CATCH_UP = 3.0
-"""T, s."""
-LEASH = 0.3
-"""l / (T v) of a controller that holds a speed."""
+_CATCH_UP = 3.0  # T, s
+LEASH = 0.3  #: l / (T v) of a controller that holds a speed.
 _WALK, _DRIFT = 0.05, 3e-5
 """Of the follower. Where the duty changes little, s and w show in the same way: a w that may be large would take what
 belongs to s, and forget it."""
-_SLOWEST = 0.05
-"""The estimated speed at full duty counts as at least this share of the predicted one."""
+_SLOWEST = 0.05  # the estimated speed at full duty counts as at least this share of the predicted one
 _EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
 
 
@@ -150,20 +147,13 @@ class Steady(Controller):
         return self._duty if (news.time / self._cycle) % 1.0 < self._share else 0.0
 
 
-_DURATION = 40.0
-"""Of a run, s."""
-_FAR = 3.0
-"""Multiple of the speed of the held robot that no run reaches."""
-_STEP = 0.5
-"""Step of the runs by which the open loop is found, s."""
-_SPEED_OVER = 2.0
-"""Time over which a speed is taken, s."""
-_WITHIN = 0.05
-"""Relative error of a speed that is good."""
-_BAND = 5e-4
-"""Half the width of the band around the course: what is good in `ride-out`, m."""
-_RELAY = 0.4
-"""Half the width of the relay's band over the tolerance."""
+_DURATION = 40.0  # of a run, s
+_FAR = 3.0  # multiple of the speed of the held robot that no run reaches
+_STEP = 0.5  # step of the runs by which the open loop is found, s
+_SPEED_OVER = 2.0  # time over which a speed is taken, s
+_WITHIN = 0.05  # relative error of a speed that is good
+_BAND = 5e-4  # half the width of the band around the course: what is good in `ride-out`, m
+_RELAY = 0.4  # half the width of the relay's band over the tolerance
 
 
 def _check_forward(speed: float) -> float:

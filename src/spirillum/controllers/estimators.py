@@ -33,10 +33,8 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 
 _POINTS = 5
-_STEP = 0.1
-"""Between two moments that are kept, s."""
-_CHANGE = 0.02
-"""Relative change of voltage and of viscosity of the two more members."""
+_STEP = 0.1  # between two moments that are kept, s
+_CHANGE = 0.02  # relative change of voltage and of viscosity of the two more members
 
 
 def points(factor: float) -> Samples:
@@ -57,10 +55,8 @@ def interpolation(nodes: Samples, at: Samples) -> Samples:
 class Paths:
     """What the members did; SI."""
 
-    time: Samples
-    """s, (n,)."""
-    members: Samples
-    """Tail's phase and body's angle, rad, current, A, and voltage, V, (friction, gap, 4, n)."""
+    time: Samples  #: s, (n,).
+    members: Samples  #: Tail's phase and body's angle, rad, current, A, and voltage, V, (friction, gap, 4, n).
     sensitivity: Samples
     """Relative change of each quantity per relative one of voltage and viscosity, (friction, 2, 4, n)."""
 
@@ -136,14 +132,10 @@ def _quantities(moment: Snapshot) -> list[float]:
 
 _SPEED_WALK = 0.15
 """sigma_s over the predicted speed, 1/sqrt(s): the film under the robot thins within some ten seconds."""
-_DRIFT = 3e-4
-"""sigma_w, m/s: of the size of a pulse."""
-_DRIFT_MEMORY = 2.0
-"""tau, s."""
-_STRAY = 6.0
-"""Sights further away than so many standard deviations are left out..."""
-_STRAYS = 5
-"""...but not more than so many in a row."""
+_DRIFT = 3e-4  # sigma_w, m/s: of the size of a pulse
+_DRIFT_MEMORY = 2.0  # tau, s
+_STRAY = 6.0  # sights further away than so many standard deviations are left out...
+_STRAYS = 5  # ...but not more than so many in a row
 
 
 class PositionFilter:

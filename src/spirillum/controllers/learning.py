@@ -29,25 +29,19 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import Command, Controller, Detection, Message, MeterReading
 from spirillum.envelope import quantity
 
-BLOCK = 1.0
-"""Length of a block, s."""
-SETTLING = 0.3
-"""What is seen so soon after the drive was switched is left out, s."""
-_FEWEST = 4
-"""Frames of a block at least."""
+BLOCK = 1.0  #: Length of a block, s.
+SETTLING = 0.3  #: What is seen so soon after the drive was switched is left out, s.
+_FEWEST = 4  # frames of a block at least
 _BANK_ERROR = 1e-2
 """Relative standard deviation of the bank's rates of tail and body: interpolation, a pulse of flow, which lifts the
 robot a little, and voltage and viscosity, which change more than a factor once the robot's rear touches the wall.
 Chosen on 120 seeds, checked on others, see `docs/control-background.md`."""
-_BANK_MEMORY = 4.0
-"""Correlation time of the bank's errors, s."""
-_ANYWHERE = 1e2
-"""Standard deviation of where an angle began, rad."""
+_BANK_MEMORY = 4.0  # correlation time of the bank's errors, s
+_ANYWHERE = 1e2  # standard deviation of where an angle began, rad
 _COARSE, _FINE = 41, 61
 _NEGLIGIBLE = 15.0
 """Points whose log posterior is lower than the maximum by more than this are left out of the finer grid."""
-_UNINFORMED = 0.8
-"""A factor counts as not learnt where its 95 % interval is at least this share of the prior's."""
+_UNINFORMED = 0.8  # a factor counts as not learnt where its 95 % interval is at least this share of the prior's
 
 
 @dataclass(frozen=True)
@@ -65,8 +59,7 @@ class Factor:
     value: float
     low: float
     high: float
-    told: bool
-    """Whether the data are more informative than the prior."""
+    told: bool  #: Whether the data are more informative than the prior.
 
     def to_dict(self) -> dict[str, Any]:
         """The factor as data."""
@@ -92,12 +85,9 @@ class _Block:
     stretch: int
     start: float
     frames: int
-    seen: tuple[float, float]
-    """Tail's phase and body's angle, rad."""
-    predicted: Samples
-    """Tail's phase and body's angle of every member of the bank, rad, (friction, gap, 2)."""
-    sensitivity: Samples
-    """(friction, 2, 2): voltage and viscosity, by quantity."""
+    seen: tuple[float, float]  # tail's phase and body's angle, rad
+    predicted: Samples  # tail's phase and body's angle of every member of the bank, rad, (friction, gap, 2)
+    sensitivity: Samples  # (friction, 2, 2): voltage and viscosity, by quantity
 
 
 def learnt(
@@ -138,12 +128,9 @@ def learnt(
 class _Electric:
     """Current and voltage; one row, or none without a meter."""
 
-    predicted: Samples
-    """(friction, gap, rows, 2)."""
-    sensitivity: Samples
-    """(rows, friction, 2, 2)."""
-    noise: Samples
-    """Variances of the means, (rows, 2)."""
+    predicted: Samples  # (friction, gap, rows, 2)
+    sensitivity: Samples  # (rows, friction, 2, 2)
+    noise: Samples  # variances of the means, (rows, 2)
 
 
 def _blocks(paths: Paths, number: int, stretch: DriveInterval, sights: Sequence[Detection]) -> list[_Block]:

@@ -20,17 +20,13 @@ from spirillum.dynamics.integration import INTERRUPTED, Progress
 from spirillum.dynamics.plant import Plant, Snapshot
 from spirillum.errors import InputError
 
-SILENCE = 1.0
-"""The drive is off so long after the last frame has arrived, s."""
+SILENCE = 1.0  #: The drive is off so long after the last frame has arrived, s.
 _LEAST_PATIENCE = 0.5 * SILENCE
 """A remote that needs more than the rest of `SILENCE` switches the drive off later, by what it needs more, s."""
-_LONGEST_WAIT = 12.0
-"""So long the robot swims on without being seen while it is learnt how it looks, s."""
+_LONGEST_WAIT = 12.0  # so long the robot swims on without being seen while it is learnt how it looks, s
 _AT_ONCE = 1e-9
-_LEAST_OFF = 0.05
-"""Least time that a run continues after the last command, s."""
-_REPORTS = 200
-"""How often a run reports its progress."""
+_LEAST_OFF = 0.05  # least time that a run continues after the last command, s
+_REPORTS = 200  # how often a run reports its progress
 
 
 class _Kind(IntEnum):
@@ -49,12 +45,9 @@ class _Kind(IntEnum):
 class Decision:
     """What a controller decided."""
 
-    time: float
-    """s."""
-    duty: float
-    """Duty that was sent."""
-    estimate: dict[str, float]
-    """Its estimate of the robot."""
+    time: float  #: s.
+    duty: float  #: Duty that was sent.
+    estimate: dict[str, float]  #: Its estimate of the robot.
 
 
 @dataclass
@@ -63,20 +56,14 @@ class LoopRun:
 
     moments: list[Snapshot] = field(default_factory=list)
     """The robot after every event that moved it, in order of time."""
-    flows: list[float] = field(default_factory=list)
-    """Flow that is imposed up to each of them, m/s; 0: none."""
+    flows: list[float] = field(default_factory=list)  #: Flow that is imposed up to each of them, m/s; 0: none.
     frames: list[tuple[float, Detection | None]] = field(default_factory=list)
     """Times of the frames, and what was seen."""
-    readings: list[MeterReading] = field(default_factory=list)
-    """Readings of the meter."""
-    decisions: list[Decision] = field(default_factory=list)
-    """Decisions of the controller."""
-    lost: int = 0
-    """Commands that did not arrive."""
-    silent: float | None = None
-    """When the drive was first switched off because the camera was silent, s."""
-    ended: str = ""
-    """Why the run ended before its time; empty if it did not."""
+    readings: list[MeterReading] = field(default_factory=list)  #: Readings of the meter.
+    decisions: list[Decision] = field(default_factory=list)  #: Decisions of the controller.
+    lost: int = 0  #: Commands that did not arrive.
+    silent: float | None = None  #: When the drive was first switched off because the camera was silent, s.
+    ended: str = ""  #: Why the run ended before its time; empty if it did not.
 
     @property
     def interrupted(self) -> bool:
@@ -175,7 +162,11 @@ class _Loop:
     def handle(self, time: float, kind: _Kind, content: Any) -> bool:
         """Process one event; return whether the run continues."""
         if kind is _Kind.DELIVERY:
-            self._deliver(time, content)
+            if isinstance(content, Detection):
+                self._sights.append(content)
+                self._arrived = time
+            else:
+                self._readings.append(content)
             return True
         if kind is _Kind.ARRIVAL:
             return self.arrive(time, content)
@@ -198,14 +189,6 @@ class _Loop:
             case _:
                 return False
         return True
-
-    def _deliver(self, time: float, content: Detection | MeterReading) -> None:
-        """A frame or a reading reaches the controller."""
-        if isinstance(content, Detection):
-            self._sights.append(content)
-            self._arrived = time
-        else:
-            self._readings.append(content)
 
     def arrive(self, time: float, sent: Command) -> bool:
         """Deliver a command to the robot; return whether the port is still there and the run continues."""

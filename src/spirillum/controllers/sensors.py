@@ -27,52 +27,38 @@ from spirillum.robot.tube_pose import gap_of
 class Detection:
     """A detection of the robot on one frame of the camera; SI."""
 
-    time: float
-    """When the frame was taken, s."""
-    position: float
-    """x of the body's mid-length, m."""
-    heading: float
-    """Yaw, rad."""
-    body_angle: float
-    """Unwrapped, rad."""
-    tail_phase: float
-    """Of the tail against the body, unwrapped, rad."""
-    side: float = nan
-    """y of the body's mid-length, m."""
-    height: float = nan
-    """z of the body's mid-length, m; by a second camera, that looks from the side."""
+    time: float  #: When the frame was taken, s.
+    position: float  #: x of the body's mid-length, m.
+    heading: float  #: Yaw, rad.
+    body_angle: float  #: Unwrapped, rad.
+    tail_phase: float  #: Of the tail against the body, unwrapped, rad.
+    side: float = nan  #: y of the body's mid-length, m.
+    height: float = nan  #: z of the body's mid-length, m; by a second camera, that looks from the side.
 
 
 @dataclass(frozen=True)
 class Command:
     """A command to a robot."""
 
-    duty: float
-    """Of its drive, 0 (off) to 1; a field is on at any duty but 0."""
-    field: Field | None = None
-    """Changes of the field of a magnetic robot."""
+    duty: float  #: Of its drive, 0 (off) to 1; a field is on at any duty but 0.
+    field: Field | None = None  #: Changes of the field of a magnetic robot.
 
 
 @dataclass(frozen=True)
 class MeterReading:
     """A reading of the meter; SI."""
 
-    time: float
-    """When it was read, s."""
-    current: float
-    """A."""
-    voltage: float
-    """V."""
+    time: float  #: When it was read, s.
+    current: float  #: A.
+    voltage: float  #: V.
 
 
 @dataclass(frozen=True)
 class Message:
     """Information that a controller has when it decides."""
 
-    time: float
-    """Now, s."""
-    sights: tuple[Detection, ...] = ()
-    """Those that have arrived since the last decision, in the order of their frames."""
+    time: float  #: Now, s.
+    sights: tuple[Detection, ...] = ()  #: Those that have arrived since the last decision, in the order of their frames
     readings: tuple[MeterReading, ...] = ()
     """Readings of the meter that have arrived since the last decision, in the order of their times."""
     truth: Snapshot | None = field(default=None, compare=False)
@@ -84,8 +70,7 @@ class Controller(Protocol):
 
     blind: bool = False
     """Whether it continues without a camera; else the drive is switched off when the camera is silent."""
-    knowing: bool = False
-    """Whether it is given the truth."""
+    knowing: bool = False  #: Whether it is given the truth.
 
     def decide(self, news: Message) -> float | Command:
         """Duty from now on, 0 (off) to 1; for a magnetic robot a command with its field."""
@@ -98,22 +83,17 @@ class Controller(Protocol):
 
 _STREAMS = ("unknown", "pulse", "camera", "meter", "remote", "across")
 _SEEN = ("position", "heading", "body_angle", "tail_phase")
-_LATEST = 0.9
-"""Share of a run in which a pulse may begin."""
-_FARTHEST = 4.0
-"""Standard deviations at which samples are truncated."""
+_LATEST = 0.9  # share of a run in which a pulse may begin
+_FARTHEST = 4.0  # standard deviations at which samples are truncated
 
 
 @dataclass(frozen=True)
 class FlowPulse:
     """A pulse of flow at its time in the run; SI."""
 
-    start: float
-    """s."""
-    end: float
-    """s."""
-    velocity: float
-    """Mean flow, m/s."""
+    start: float  #: s.
+    end: float  #: s.
+    velocity: float  #: Mean flow, m/s.
 
     def passed_after(self, time: float) -> float:
         """Distance by which the mean flow still moves after a time, m."""
@@ -124,16 +104,11 @@ class FlowPulse:
 class SampledErrors:
     """Sampled parameters of a run that the controller does not know."""
 
-    friction: float
-    """Factor of the friction."""
-    gap: float
-    """Factor of the gap at the start."""
-    pulse: FlowPulse | None = None
-    """Flow; None: none."""
-    voltage: float = 1.0
-    """Factor of the battery's voltage."""
-    viscosity: float = 1.0
-    """Factor of the viscosity."""
+    friction: float  #: Factor of the friction.
+    gap: float  #: Factor of the gap at the start.
+    pulse: FlowPulse | None = None  #: Flow; None: none.
+    voltage: float = 1.0  #: Factor of the battery's voltage.
+    viscosity: float = 1.0  #: Factor of the viscosity.
 
 
 def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> SampledErrors:

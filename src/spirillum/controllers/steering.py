@@ -44,16 +44,11 @@ from spirillum.units import show
 
 Law = Literal["position", "aim"]
 
-_CLOSED = 5.0
-"""T, s."""
-_AHEAD = 2.0
-"""L over the body's length."""
-MOST_TILT = np.radians(3.0)
-"""Largest tilt, rad."""
-_OBSERVED_OVER = 0.7
-"""Time constant of the observer, s."""
-_TURNS_OVER = 2.0
-"""Time over which the body's turning is compared with the field's, s."""
+_CLOSED = 5.0  # T, s
+_AHEAD = 2.0  # L over the body's length
+MOST_TILT = np.radians(3.0)  #: Largest tilt, rad.
+_OBSERVED_OVER = 0.7  # time constant of the observer, s
+_TURNS_OVER = 2.0  # time over which the body's turning is compared with the field's, s
 _SLIPS, _SLOWER = 0.9, 0.8
 
 
@@ -66,14 +61,10 @@ def pushed_for(orbit: complex, time: float) -> complex:
 class Steering:
     """What is known of a robot beforehand; SI."""
 
-    orbit: complex
-    """m, 1/s."""
-    gain: complex
-    """g, m/s."""
-    rate: float
-    """Of the field, rad/s, with its sign."""
-    length: float
-    """Of the body, m."""
+    orbit: complex  #: m, 1/s.
+    gain: complex  #: g, m/s.
+    rate: float  #: Of the field, rad/s, with its sign.
+    length: float  #: Of the body, m.
 
     def moved(self, place: complex, tilt: complex, dt: float) -> complex:
         """Lateral position after a time, m."""
@@ -171,12 +162,9 @@ def _field(rate: float, tilt: complex) -> Field:
     return Field.model_construct(rotation_rate=rate, yaw=tilt.real, pitch=tilt.imag, strength=None)
 
 
-_DURATION = 60.0
-"""Of a run, s."""
-_SHARE = 0.9
-"""Largest rate of the field over the step-out rate."""
-_SETTLED = 2
-"""Turns of the field before orbit and gain are looked for."""
+_DURATION = 60.0  # of a run, s
+_SHARE = 0.9  # largest rate of the field over the step-out rate
+_SETTLED = 2  # turns of the field before orbit and gain are looked for
 
 
 @dataclass(frozen=True)
@@ -184,8 +172,7 @@ class SteeringBrief(Brief):
     """What is known of a magnetic robot beforehand."""
 
     steering: Steering
-    tilts: tuple[tuple[float, complex], ...]
-    """Of the open loop: times, s, and tilts, rad."""
+    tilts: tuple[tuple[float, complex], ...]  #: Of the open loop: times, s, and tilts, rad.
 
 
 class KeepAxisTask(Task):

@@ -30,10 +30,8 @@ from spirillum.errors import InputError
 from spirillum.robot.fields import Length, SignedLength
 from spirillum.units import show
 
-_SHORT = 0.5
-"""b over the tolerance."""
-_HYSTERESIS = 0.1
-"""h over the tolerance."""
+_SHORT = 0.5  # b over the tolerance
+_HYSTERESIS = 0.1  # h over the tolerance
 
 
 class StopController(Controller):
@@ -105,12 +103,10 @@ class KnowingStop(Controller):
         return self._duty if self._way * (self._goal - place) > 0.0 else 0.0
 
 
-_STEP = 0.2
-"""Step in which the open loop's time is looked for, s."""
+_STEP = 0.2  # step in which the open loop's time is looked for, s
 _PATIENCE = 10.0
 """Multiple of the time that the robot of the file needs at its steady speed, within which it has to arrive."""
-_SPARE, _SETTLING = 2.5, 5.0
-"""A run lasts so many times as long as the robot of the file needs, and s."""
+_SPARE, _SETTLING = 2.5, 5.0  # A run lasts so many times as long as the robot of the file needs, and s
 
 
 class StopAtTask(Task):

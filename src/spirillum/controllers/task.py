@@ -41,16 +41,11 @@ class Brief:
     """Values computed once for all runs of a task, from the robot of the file; SI."""
 
     lab: Lab
-    duration: float
-    """Of a run, s."""
-    speed: float
-    """Predicted at the robot's own duty, m/s, with its sign."""
-    duty: float
-    """The robot's own."""
-    schedule: tuple[float, float]
-    """Of the open loop: until when it is on, s, and at which duty."""
-    carried: float
-    """Displacement of the robot over that of the mean flow that carries it."""
+    duration: float  #: Of a run, s.
+    speed: float  #: Predicted at the robot's own duty, m/s, with its sign.
+    duty: float  #: The robot's own.
+    schedule: tuple[float, float]  #: Of the open loop: until when it is on, s, and at which duty.
+    carried: float  #: Displacement of the robot over that of the mean flow that carries it.
 
     @property
     def way(self) -> float:
@@ -62,12 +57,9 @@ class Brief:
 class Score:
     """How a run did; SI."""
 
-    error: float
-    """What the task judges by."""
-    good: bool
-    """Whether it is good enough."""
-    energy: float
-    """From the battery's terminals (without a motor: of the drive), J."""
+    error: float  #: What the task judges by.
+    good: bool  #: Whether it is good enough.
+    energy: float  #: From the battery's terminals (without a motor: of the drive), J.
 
 
 class Task(Options):
@@ -133,8 +125,7 @@ class ControlJob:
     """Complete input of a run; a separate process can compute it."""
 
     robot: Robot
-    plant: Mapping[str, Any]
-    """Further arguments of `spirillum.Plant`."""
+    plant: Mapping[str, Any]  #: Further arguments of `spirillum.Plant`.
     task: Task
     brief: Brief
     controller: str
@@ -149,8 +140,7 @@ class Outcome:
     seed: int
     score: Score
     drawn: SampledErrors
-    ended: str
-    """Why it ended before its time; empty if it did not."""
+    ended: str  #: Why it ended before its time; empty if it did not.
 
 
 def draw_plant(job: ControlJob) -> tuple[Plant, SampledErrors]:
@@ -206,12 +196,9 @@ class ControllerScore:
 
     name: str
     runs: int
-    good: tuple[float, float, float]
-    """Share of good runs."""
-    error: tuple[float, float, float]
-    """Mean size of the task's error, SI."""
-    energy: tuple[float, float, float]
-    """Mean energy, J."""
+    good: tuple[float, float, float]  #: Share of good runs.
+    error: tuple[float, float, float]  #: Mean size of the task's error, SI.
+    energy: tuple[float, float, float]  #: Mean energy, J.
     against: tuple[float, float, float]
     """Mean of this controller's size of the error less that of the task's own, run by run."""
 
@@ -222,8 +209,7 @@ class Scores:
 
     task: Task
     controllers: tuple[ControllerScore, ...]
-    outcomes: tuple[Outcome, ...]
-    """Every run, by controller and seed."""
+    outcomes: tuple[Outcome, ...]  #: Every run, by controller and seed.
 
     @property
     def failed(self) -> tuple[int, ...]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from spirillum.envelope import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.exports.meshes import MESH_SCALE, MeshFile
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
+from spirillum.formats.templates import numbers, rendered
 from spirillum.notes import Note
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -39,12 +39,9 @@ _TURNING = (
 class _Resistance(NamedTuple):
     """The resistance of both links in unbounded fluid."""
 
-    matrix: Samples
-    """(12, 12)."""
-    error: Any
-    """Stated error of the model."""
-    references: list[str]
-    """Sources of the model."""
+    matrix: Samples  # (12, 12)
+    error: Any  # stated error of the model
+    references: list[str]  # sources of the model
     warnings: list[Note]
 
 
@@ -61,7 +58,7 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
         "density": quantity(robot.fluid.density, "kg/m^3"),
         "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
         "joint": {
-            "type": "fixed" if _fixed(robot) else "revolute",
+            "type": "fixed" if robot.drive is not None and robot.drive.joint == "fixed" else "revolute",
             "origin": quantity([0.0, 0.0, 0.0], "m"),
             "axis": [1.0, 0.0, 0.0],
             "phase_at_zero": quantity(phase, "rad"),
@@ -95,10 +92,6 @@ def _resistance(robot: Robot, model: str) -> _Resistance:
     return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
 
 
-def _fixed(robot: Robot) -> bool:
-    return robot.drive is not None and robot.drive.joint == "fixed"
-
-
 def joint_friction(robot: Robot) -> float:
     """Friction inside the joint, N m s/rad; what acts on body or rotor from outside is not in it."""
     own = robot.motor.joint_rotor_friction if robot.motor is not None else 0.0
@@ -118,51 +111,29 @@ def _link_masses(link: Link) -> dict[str, Any]:
     }
 
 
+_PLACES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+_FULL_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+_FILTERS: dict[str, Callable[..., str]] = {
+    "rgba": lambda colour: numbers([*np.round(colour, 4), 1.0]),
+    "inertia": lambda link: numbers(link.inertia[_PLACES[name]] for name in _FULL_INERTIA),
+}
+
+
 def urdf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: float) -> str:
     """The description; lengths in m, the origin of both links on the motor axis at the body's mid-length."""
-    root = ET.Element("robot", name=robot.name)
-    root.append(
-        ET.Comment(
-            " Lengths in m, x forward, z up. A URDF holds no fluid: forces come from the resistance matrix beside it. "
-        )
+    return rendered(
+        "exports/robot.urdf.jinja",
+        filters=_FILTERS,
+        robot=robot,
+        links=list(zip(("body", "rotor"), links_of(robot), strict=True)),
+        meshes=list(meshes),
+        folder=folder,
+        places=_PLACES,
+        scale=numbers([MESH_SCALE] * 3),
+        fixed=robot.drive is not None and robot.drive.joint == "fixed",
+        phase=phase,
+        friction=joint_friction(robot),
     )
-    files = list(meshes)
-    for name, link in zip(("body", "rotor"), links_of(robot), strict=True):
-        own = [item for item in files if item.part == name]
-        root.append(_link(name, link, own, folder))
-    fixed = robot.drive is not None and robot.drive.joint == "fixed"
-    joint = ET.SubElement(root, "joint", name="motor", type="fixed" if fixed else "continuous")
-    ET.SubElement(joint, "parent", link="body")
-    ET.SubElement(joint, "child", link="rotor")
-    ET.SubElement(joint, "origin", xyz="0 0 0", rpy=numbers((phase, 0.0, 0.0)))
-    if not fixed:
-        ET.SubElement(joint, "axis", xyz="1 0 0")
-        ET.SubElement(joint, "dynamics", damping=numbers([joint_friction(robot)]), friction="0")
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _link(name: str, link: Link, meshes: Iterable[MeshFile], folder: str) -> ET.Element:
-    element = ET.Element("link", name=name)
-    inertial = ET.SubElement(element, "inertial")
-    ET.SubElement(inertial, "origin", xyz=numbers(link.centre), rpy="0 0 0")
-    ET.SubElement(inertial, "mass", value=numbers([link.mass]))
-    places = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(inertial, "inertia", {key: numbers([link.inertia[at]]) for key, at in places.items()})
-    for item in meshes:
-        shown = ET.SubElement(element, "collision" if item.colour is None else "visual", name=item.name)
-        ET.SubElement(shown, "origin", xyz="0 0 0", rpy="0 0 0")
-        geometry = ET.SubElement(shown, "geometry")
-        ET.SubElement(geometry, "mesh", filename=f"{folder}/{item.name}.stl", scale=numbers([MESH_SCALE] * 3))
-        if item.colour is not None:
-            material = ET.SubElement(shown, "material", name=f"{name} {item.name}")
-            ET.SubElement(material, "color", rgba=numbers([*np.round(item.colour, 4), 1.0]))
-    return element
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Numbers as XML has them, to the last digit."""
-    return " ".join(repr(float(value)) for value in values)
 
 
 FLUID_WARNING = Note(
@@ -170,8 +141,7 @@ FLUID_WARNING = Note(
     "MuJoCo's own fluid gives a helix no thrust and must stay off; apply the forces of the resistance matrix at "
     "each step",
 )
-_LEAST = 1e-15
-"""MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers."""
+_LEAST = 1e-15  # MuJoCo takes no smaller mass or moment of inertia, in its own unit-free numbers
 _MOST_TRIANGLES = 200_000
 _STEP = 1e-4
 
@@ -202,60 +172,17 @@ def mjcf_text(robot: Robot, meshes: Iterable[MeshFile], folder: str, phase: floa
     """The model; lengths in m, the origin of both bodies on the motor axis at the robot body's mid-length."""
     files = list(meshes)
     check_triangles(files)
-    root = ET.Element("mujoco", model=robot.name)
-    root.append(
-        ET.Comment(
-            "\n  WARNING: keep density and viscosity at 0. MuJoCo's own fluid gives a helix no thrust.\n"
-            "  The fluid's forces come from the resistance matrix in the JSON file beside this model; a program has\n"
-            "  to apply them, and buoyancy, at every step. Without it the robot falls as in a vacuum.\n"
-            "  Lengths in m, x forward, z up.\n  "
-        )
+    return rendered(
+        "exports/robot.mjcf.jinja",
+        filters=_FILTERS,
+        robot=robot,
+        links=links_of(robot),
+        meshes=files,
+        folder=folder,
+        scale=numbers([MESH_SCALE] * 3),
+        step=_STEP,
+        gravity=STANDARD_GRAVITY,
+        turns=robot.drive is None or robot.drive.joint == "revolute",
+        phase=phase,
+        friction=joint_friction(robot),
     )
-    ET.SubElement(root, "compiler", angle="radian", meshdir=folder, autolimits="true")
-    ET.SubElement(
-        root,
-        "option",
-        timestep=numbers([_STEP]),
-        integrator="implicitfast",
-        gravity=numbers([0.0, 0.0, -STANDARD_GRAVITY]),
-        density="0",
-        viscosity="0",
-    )
-    asset = ET.SubElement(root, "asset")
-    for item in files:
-        # A surface to look at need not be closed: `shell` lets it be one.
-        mesh = {"name": item.name, "file": f"{item.name}.stl", "scale": numbers([MESH_SCALE] * 3), "inertia": "shell"}
-        ET.SubElement(asset, "mesh", mesh)
-    world = ET.SubElement(root, "worldbody")
-    ET.SubElement(world, "light", pos="0 0 1", dir="0 0 -1", directional="true")
-    links = links_of(robot)
-    body = _body(world, "body", links.body, files)
-    body.insert(0, ET.Element("freejoint", name="body"))
-    rotor = _body(body, "rotor", links.rotor, files)
-    rotor.set("euler", numbers([phase, 0.0, 0.0]))
-    if robot.drive is None or robot.drive.joint == "revolute":
-        hinge = ET.Element(
-            "joint", name="motor", type="hinge", axis="1 0 0", pos="0 0 0", damping=numbers([joint_friction(robot)])
-        )
-        rotor.insert(0, hinge)
-        actuator = ET.SubElement(root, "actuator")
-        actuator.append(ET.Comment(" Control: torque in the joint before friction, N m. "))
-        ET.SubElement(actuator, "motor", name="motor", joint="motor")
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _body(parent: ET.Element, name: str, link: Link, files: list[MeshFile]) -> ET.Element:
-    element = ET.SubElement(parent, "body", name=name)
-    order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-    inertia = numbers(link.inertia[at] for at in order)
-    ET.SubElement(element, "inertial", pos=numbers(link.centre), mass=numbers([link.mass]), fullinertia=inertia)
-    for item in (item for item in files if item.part == name):
-        geom = {"name": item.name, "type": "mesh", "mesh": item.name}
-        if item.colour is None:
-            geom |= {"group": "3"}  # closed bodies collide and are hidden by default
-        else:
-            rgba = numbers([*np.round(item.colour, 4), 1.0])
-            geom |= {"group": "1", "contype": "0", "conaffinity": "0", "rgba": rgba}
-        ET.SubElement(element, "geom", geom)
-    return element

@@ -19,11 +19,9 @@ from spirillum.robot.surface import Faces, mass_properties
 
 
 def vtp_bytes(pieces: Sequence[RobotMesh], attributes: Mapping[str, Any]) -> bytes:
-    """All pieces as one surface; lengths in m.
-
-    Cell arrays: `part` (0 body, 1 rotor), `piece` and `region` (numbers, named in the comment at the head of the
-    file), `colour` (sRGB, 0 to 255).
-    """
+    """All pieces as one surface; lengths in m."""
+    # Cell arrays: `part` (0 body, 1 rotor), `piece` and `region` (numbers, named in the comment at the head of the
+    # file), `colour` (sRGB, 0 to 255).
     offset = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     points = np.concatenate([piece.vertices for piece in pieces])
     faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, offset[:-1], strict=True)])
@@ -76,8 +74,7 @@ def _write(
     file.save()
 
 
-_TRIANGLE = 900.0
-"""Memory of a triangle while pieces are united, bytes."""
+_TRIANGLE = 900.0  # memory of a triangle while pieces are united, bytes
 _MERGED = (1e-6, 1e-5, 1e-4)
 """Edges shorter than this fraction of the robot's length are collapsed, since single precision merges their ends. The
 first value that leaves a watertight body is used."""
@@ -85,19 +82,15 @@ first value that leaves a watertight body is used."""
 _READ_AS_ONE = 1e-8
 """Programs that read STL files merge vertices that are closer than this, in the unit of the file (trimesh does)."""
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
-_HEAD = 80
-"""Bytes of a binary STL file before the number of its triangles."""
+_HEAD = 80  # bytes of a binary STL file before the number of its triangles
 
 
 class UnitedBody(NamedTuple):
     """The union of pieces as one closed surface, m."""
 
-    vertices: Samples
-    """(n, 3), m."""
-    faces: Faces
-    """Outward oriented, (m, 3)."""
-    bodies: int
-    """Number of separate bodies; 1 where all pieces are connected."""
+    vertices: Samples  #: (n, 3), m.
+    faces: Faces  #: Outward oriented, (m, 3).
+    bodies: int  #: Number of separate bodies; 1 where all pieces are connected.
 
     @property
     def volume(self) -> float:
@@ -129,10 +122,8 @@ def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
 
 
 def is_watertight(vertices: Samples, faces: Faces) -> bool:
-    """Whether each edge belongs to two triangles that run along it in opposite directions.
-
-    Vertices at the same place in single precision count as one, as a reader of the file has to take them.
-    """
+    """Whether each edge belongs to two triangles that run along it in opposite directions."""
+    # Vertices at the same place in single precision count as one, as a reader of the file has to take them.
     return _is_closed(vertices.astype(np.float32), faces)
 
 
@@ -177,16 +168,11 @@ _SHARED = {"stub": "wire", "arm": "wire", "tail": "wire"}
 class MeshFile(NamedTuple):
     """One STL file beside a robot description."""
 
-    name: str
-    """Name without ending, such as `body-seal`."""
-    part: str
-    """`body` or `rotor`."""
-    colour: tuple[float, float, float] | None
-    """sRGB of a visual surface; None for the closed body of the whole part."""
-    triangles: int
-    """Number of triangles."""
-    data: bytes
-    """Contents."""
+    name: str  #: Name without ending, such as `body-seal`.
+    part: str  #: `body` or `rotor`.
+    colour: tuple[float, float, float] | None  #: sRGB of a visual surface; None for the closed body of the whole part.
+    triangles: int  #: Number of triangles.
+    data: bytes  #: Contents.
 
 
 def mesh_files(pieces: Sequence[RobotMesh]) -> list[MeshFile]:

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 
 Json = dict[str, Any]
-_LATEST = 1e9
-"""Latest time of a recording, s; seconds have 32 bits."""
+_LATEST = 1e9  # latest time of a recording, s; seconds have 32 bits
 
 
 def _object(**fields: Json) -> Json:
@@ -80,11 +79,6 @@ SCHEMAS: Mapping[str, Json] = {
     "foxglove.Log": _object(timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT, file=_TEXT, line=_WHOLE),
 }
 """JSON schemas by the names by which Foxglove knows them."""
-
-
-def numbers_schema(meanings: Mapping[str, str]) -> Json:
-    """Schema of a message of plain numbers."""
-    return _object(timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in meanings.items()})
 
 
 def nanoseconds(time: float) -> int:
@@ -167,8 +161,7 @@ def entity(name: str, frame: str, shapes: Sequence[Json], kind: str) -> Json:
     }
 
 
-RECORDINGS = {".mcap": "a recording for Foxglove"}
-"""Endings of the files that can be written."""
+RECORDINGS = {".mcap": "a recording for Foxglove"}  #: Endings of the files that can be written.
 _LAB, _BODY, _ROTOR = "lab", "body", "rotor"
 _TRANSFORM, _POSE_IN_FRAME, _SCENE, _IMAGE, _LOG = SCHEMAS
 _NUMBERS = "spirillum.Quantities"
@@ -176,25 +169,19 @@ _INFORMATION = 2
 _FINENESS = 0.5
 _QUALITY = 85
 _SLOWEST, _FASTEST = 1e-6, 1e6
-_LONGEST_TUBE = 2.0
-"""Length of a tube of unspecified length, over that of the robot's path and the robot together."""
+_LONGEST_TUBE = 2.0  # length of a tube of unspecified length, over that of the robot's path and the robot together
 
-Message = tuple[str, str, float, dict[str, Any]]
-"""Topic, name of the schema, time in s, content."""
+Message = tuple[str, str, float, dict[str, Any]]  #: Topic, name of the schema, time in s, content.
 
 
 @dataclass(frozen=True, repr=False)
 class Recording(DisplayMixin):
     """Summary of a recording file."""
 
-    path: Path
-    """The file."""
-    robot: Robot
-    """The robot of the run."""
-    duration: float
-    """Length of the run, s."""
-    topics: Mapping[str, int]
-    """Number of messages by topic."""
+    path: Path  #: The file.
+    robot: Robot  #: The robot of the run.
+    duration: float  #: Length of the run, s.
+    topics: Mapping[str, int]  #: Number of messages by topic.
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum export run.nc run.mcap --json`."""
@@ -252,7 +239,12 @@ class _Writer:
 
         self._writer = Writer(stream)
         self._writer.start(library=f"{MARK} {own_version()}")
-        self._schemas = {**SCHEMAS, _NUMBERS: numbers_schema(_meanings(dataset))}
+        self._schemas = {
+            **SCHEMAS,
+            _NUMBERS: _object(
+                timestamp=_TIME, **{name: {**_NUMBER, "description": text} for name, text in _meanings(dataset).items()}
+            ),
+        }
         self._channels: dict[str, int] = {}
         names = ("robot", "model", "settings", "versions", "title")
         self._writer.add_metadata(
@@ -311,7 +303,6 @@ def _motion(dataset: xr.Dataset, poses: Poses) -> Iterator[Message]:
 
 
 def _numbers_of(dataset: xr.Dataset) -> list[str]:
-    """Variables that are one number at each time."""
     return [
         str(name) for name, item in dataset.data_vars.items() if item.dims == ("time",) and item.dtype.kind in "fiu"
     ]
@@ -323,7 +314,6 @@ def _meanings(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
-    """Robot and tube; the parts move with their frames."""
     pieces = robot_mesh(robot, fineness=_FINENESS)
     entities = [
         entity(piece.name, piece.part, triangles(piece.vertices, piece.faces, piece.colours), "triangles")
@@ -368,7 +358,6 @@ def _events(dataset: xr.Dataset) -> Iterator[Message]:
 
 
 def _film(film: str | Path, speed: float, start: float, end: float) -> Iterator[Message]:
-    """Frames of a video during the run."""
     from spirillum.vision.video.frames import open_video
 
     pictures = import_optional("PIL.Image", "a video in a recording", "video")

@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """glTF's y points up, where ours is z."""
-_CREASE = np.deg2rad(40.0)
-"""Angle between triangles above which an edge stays sharp, rad."""
+_CREASE = np.deg2rad(40.0)  # angle between triangles above which an edge stays sharp, rad
 _METAL = {"shaft": 0.9, "coupling": 0.9, "stub": 0.9, "arm": 0.9, "tail": 0.9}
 
 
@@ -109,17 +108,14 @@ KINDS_OF_FILES = {
     ".fmu": "a co-simulation unit (FMI 3.0)",
 }
 """Endings of the files that can be written."""
-STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}
-"""Units of STL files, m."""
+STL_UNITS = {"mm": 1e-3, "um": 1e-6, "m": 1.0}  #: Units of STL files, m.
 
 
 class ExportFile(NamedTuple):
     """One file."""
 
-    data: bytes
-    """Its bytes."""
-    holds: str
-    """Description of the content."""
+    data: bytes  #: Its bytes.
+    holds: str  #: Description of the content.
 
 
 def check_masses(robot: Robot, target: Path) -> None:
@@ -197,32 +193,23 @@ _DESCRIPTIONS = (".urdf", ".mjcf", ".xml")
 class Written:
     """One file that was written."""
 
-    path: Path
-    """Path of the file."""
-    holds: str
-    """Description of the content."""
+    path: Path  #: Path of the file.
+    holds: str  #: Description of the content.
 
 
 @dataclass(frozen=True, repr=False)
 class Export(DisplayMixin):
     """Summary of the exported files and their geometry."""
 
-    robot: Robot
-    """The robot."""
-    phase: float
-    """Phase of the tail, rad."""
-    files: tuple[Written, ...]
-    """Files, the requested one first."""
-    pieces: tuple[RobotMesh, ...]
-    """Pieces of the robot, before they were joined or coloured."""
-    links: Links
-    """Mass, centre, inertia and displaced volume of body and rotor."""
+    robot: Robot  #: The robot.
+    phase: float  #: Phase of the tail, rad.
+    files: tuple[Written, ...]  #: Files, the requested one first.
+    pieces: tuple[RobotMesh, ...]  #: Pieces of the robot, before they were joined or coloured.
+    links: Links  #: Mass, centre, inertia and displaced volume of body and rotor.
     solid: Mapping[str, Any] | None
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
-    warnings: tuple[Note, ...]
-    """What to be careful about, a sentence each."""
-    unit: FmuModel | None = None
-    """Of an FMU: the equations in it."""
+    warnings: tuple[Note, ...]  #: What to be careful about, a sentence each.
+    unit: FmuModel | None = None  #: Of an FMU: the equations in it.
 
     def to_dict(self) -> dict[str, Any]:
         """Content of `spirillum export --json`."""
@@ -357,7 +344,6 @@ def _shape_of(
 
 
 def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    """The FMU of a robot in axial motion, written."""
     from spirillum.interfaces.fmu import axial_model
 
     axial = axial_robot(robot, **options)
@@ -366,7 +352,6 @@ def _axial_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **o
 
 
 def _released_unit(target: Path, robot: str | Path | Mapping[str, Any] | Robot, **options: Any) -> Export:
-    """The FMU of a robot that is released in its tube, written."""
     from spirillum.interfaces.fmu import free_model
 
     if options["model"] not in (AUTO, "tube"):

@@ -17,15 +17,13 @@ from spirillum.files.writing import output_folder, write_text
 
 @contextmanager
 def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) -> Iterator[Path]:
-    """A folder for results, made if it is not there and locked while the block runs.
-
-    It and its `figures` have to be open to writing. A folder that was made here and stays empty is removed again.
-    Leftovers of killed runs are removed.
-    """
+    """A folder for results, made if it is not there and locked while the block runs."""
+    # It and its `figures` have to be open to writing. A folder that was made here and stays empty is removed again.
+    # Leftovers of killed runs are removed.
     folder = checked_path(path, "a folder for the results (-o DIR)")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file, no folder for results; allowed: a folder for the results (-o DIR)")
-    missing = _missing(folder)
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         with locked(output_folder(folder)):
             if (folder / "figures").exists():
@@ -41,11 +39,6 @@ def results_folder(path: str | Path, *, claim: Mapping[str, Any] | None = None) 
         for made in missing:
             with suppress(OSError):
                 made.rmdir()  # only where it is empty
-
-
-def _missing(folder: Path) -> list[Path]:
-    """The folder and those above it that are not there, the innermost first."""
-    return [place for place in (folder, *folder.parents) if not place.exists()]
 
 
 def claim_folder(

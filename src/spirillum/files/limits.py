@@ -9,46 +9,29 @@ from pathlib import Path
 
 from spirillum.errors import InputError
 
-LARGEST_TEXT = 1 << 20
-"""Robot, study, setup and calibration files, and marks of folders, bytes."""
+LARGEST_TEXT = 1 << 20  #: Robot, study, setup and calibration files, and marks of folders, bytes.
 MOST_LEVELS = 24
 """Parts of a dotted key in a TOML file: tables within tables. The files of this program have at most five."""
-LARGEST_TABLE = 128 << 20
-"""Tables in CSV or Parquet, bytes."""
-MOST_ROWS = 1_000_000
-"""Rows of a table."""
-MOST_COLUMNS = 500
-"""Columns of a table."""
-MOST_CELLS = 5_000_000
-"""Cells of a table."""
-LONGEST_CELL = 10_000
-"""A text in a cell of a Parquet file, characters."""
-LARGEST_NETCDF = 512 << 20
-"""A run or a posterior, bytes: on disk, and as its arrays declare."""
-MOST_VARIABLES = 2000
-"""Groups and variables in a NetCDF file."""
-MOST_PIXELS = 50_000_000
-"""Pixels of a frame or an image."""
-SMALLEST_SIDE = 32
-"""Pixels of a frame's shorter side."""
-LARGEST_PICTURE = 512 << 20
-"""An image in a folder, bytes."""
-MOST_IMAGES = 1_000_000
-"""Images in a folder."""
-LONGEST_PATH = 4096
-"""A file's name with its folders, characters."""
-LONGEST_NAME = 255
-"""A file or folder by itself, bytes: what the usual file systems hold."""
-MOST_POINTS = 2000
-"""Points of a tail's centre line or of a body's outline."""
+LARGEST_TABLE = 128 << 20  #: Tables in CSV or Parquet, bytes.
+MOST_ROWS = 1_000_000  #: Rows of a table.
+MOST_COLUMNS = 500  #: Columns of a table.
+MOST_CELLS = 5_000_000  #: Cells of a table.
+LONGEST_CELL = 10_000  #: A text in a cell of a Parquet file, characters.
+LARGEST_NETCDF = 512 << 20  #: A run or a posterior, bytes: on disk, and as its arrays declare.
+MOST_VARIABLES = 2000  #: Groups and variables in a NetCDF file.
+MOST_PIXELS = 50_000_000  #: Pixels of a frame or an image.
+SMALLEST_SIDE = 32  #: Pixels of a frame's shorter side.
+LARGEST_PICTURE = 512 << 20  #: An image in a folder, bytes.
+MOST_IMAGES = 1_000_000  #: Images in a folder.
+LONGEST_PATH = 4096  #: A file's name with its folders, characters.
+LONGEST_NAME = 255  #: A file or folder by itself, bytes: what the usual file systems hold.
+MOST_POINTS = 2000  #: Points of a tail's centre line or of a body's outline.
 
 
 _LONGEST_NAME = 100
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
-_FORMULAS = ("=", "+", "-", "@")
-"""With what a cell begins that a spreadsheet takes for a formula."""
-_DEVICES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
-"""Names that are devices on Windows."""
+_FORMULAS = ("=", "+", "-", "@")  # with what a cell begins that a spreadsheet takes for a formula
+_DEVICES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # names that are devices on Windows
 
 
 def is_text(name: str) -> bool:
@@ -79,10 +62,8 @@ def checked_path(path: str | os.PathLike[str], what: str) -> Path:
 
 
 def file_name(name: str, taken: Collection[str] = ()) -> str:
-    """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count.
-
-    Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
-    """
+    """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count."""
+    # Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
     safe = _NOT_IN_NAMES.sub("-", name).lstrip(".-")[:_LONGEST_NAME].rstrip(".") or "unnamed"
     if _DEVICES.fullmatch(safe):
         safe = f"{safe}-"

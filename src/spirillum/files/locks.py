@@ -15,8 +15,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
-LEFTOVER = ".spirillum-part-"
-"""Prefix of the hidden folders in which files are made before they are renamed."""
+LEFTOVER = ".spirillum-part-"  #: Prefix of the hidden folders in which files are made before they are renamed.
 _TRIES = 20
 _held: set[int] = set()
 _swept: set[Path] = set()
@@ -99,11 +98,9 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def private_folder(parent: Path) -> Iterator[Path]:
-    """A new hidden folder that only this user can enter, removed when the block ends.
-
-    Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
-    that what was made in it takes its place at once.
-    """
+    """A new hidden folder that only this user can enter, removed when the block ends."""
+    # Nobody else can plant a link in it, its lock says that its process lives, and it lies on the disk of `parent`, so
+    # that what was made in it takes its place at once.
     sweep(parent)
     for _ in range(_TRIES):  # another run may take it for a leftover before it is locked
         folder = Path(tempfile.mkdtemp(prefix=LEFTOVER, dir=parent))

@@ -29,11 +29,9 @@ _LARGEST_CHUNK = 64 << 20
 
 @cache
 def _hdf5() -> type[h5py.File]:
-    """A file of HDF5 that opens each array of its root once, and where nothing is written those of its groups too.
-
-    h5netcdf asks for the arrays of a file's dimensions some dozen times for every variable, and each time HDF5 opens
-    one anew: half of the time that writing takes.
-    """
+    """A file of HDF5 that opens each array of its root once, and where nothing is written those of its groups too."""
+    # h5netcdf asks for the arrays of a file's dimensions some dozen times for every variable, and each time HDF5 opens
+    # one anew: half of the time that writing takes.
     import h5py
 
     class Hdf5(h5py.File):  # type: ignore[misc]
@@ -56,10 +54,8 @@ def _hdf5() -> type[h5py.File]:
 
 @contextmanager
 def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.File]:
-    """A new NetCDF-4 file, written whole or not at all when the block ends.
-
-    It is made in memory: HDF5 takes the whole process down where it finds no space on a disk.
-    """
+    """A new NetCDF-4 file, written whole or not at all when the block ends."""
+    # It is made in memory: HDF5 takes the whole process down where it finds no space on a disk.
     import h5netcdf
 
     content = BytesIO()
@@ -82,11 +78,9 @@ def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") 
 
 @contextmanager
 def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> Iterator[h5netcdf.File]:
-    """A NetCDF-4 file for reading, of which is known that all of it fits into memory.
-
-    Refused are pipes and folders, files or arrays that are too large, also those whose values were never stored, links
-    into other files, and compressed pieces that are larger than they declare.
-    """
+    """A NetCDF-4 file for reading, of which is known that all of it fits into memory."""
+    # Refused are pipes and folders, files or arrays that are too large, also those whose values were never stored,
+    # links into other files, and compressed pieces that are larger than they declare.
     with opened(path, what, largest) as stream:
         if stream.read(len(_BEGINS)) != _BEGINS:
             raise InputError(f"{path} is not a NetCDF-4 file; allowed: {what}")
@@ -175,7 +169,6 @@ def _declared(item: Any, path: Path, what: str) -> int:
 
 
 def _texts(item: Any, path: Path, what: str) -> int:
-    """Bytes of all texts of a variable."""
     count = prod(item.shape or ())
     if count * item.file.id.get_filesize() <= _LONGEST_TEXTS or item.ndim != 1:
         if item.ndim > 1 and count > MOST_VARIABLES:

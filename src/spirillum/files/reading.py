@@ -92,12 +92,9 @@ def _quoted(line: str) -> Iterator[str]:
 
 
 _QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
-_LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
-"""Where Python ends a line."""
-_AROUND = " \t\r\n\v\f\xa0\u2007\u2009\u202f\ufeff"
-"""Spaces and byte-order marks around a cell."""
-_SEPARATOR_LINE = re.compile(r"\s*\"?sep=([,;\t])\"?\s*", re.I)
-"""First line by which spreadsheets state the separator."""
+_LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # where Python ends a line
+_AROUND = " \t\r\n\v\f\xa0\u2007\u2009\u202f\ufeff"  # spaces and byte-order marks around a cell
+_SEPARATOR_LINE = re.compile(r"\s*\"?sep=([,;\t])\"?\s*", re.I)  # first line by which spreadsheets state the separator
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_LEVELS}}}")
 
 
@@ -210,12 +207,10 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
 
 
 def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
-    """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
-
-    Commas, semicolons or tabs separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines
-    that start with `#` are comments. They are left out, and so are rows of separators alone, the line `sep=` and empty
-    columns at the end, as spreadsheets write.
-    """
+    """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them."""
+    # Commas, semicolons or tabs separate columns; numbers come with a decimal point (`with_plain_numbers`). Lines that
+    # start with `#` are comments. They are left out, and so are rows of separators alone, the line `sep=` and empty
+    # columns at the end, as spreadsheets write.
     _check_extent(text, path, what)
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,;\t\ufeff")]
     lines = [(number, line) for number, line in lines if not line.lstrip(" \t\ufeff").startswith("#")]
@@ -277,11 +272,9 @@ def separator_of(lines: Sequence[str]) -> str:
 
 
 def with_plain_numbers(rows: Sequence[Sequence[str]], separator: str) -> list[list[str]]:
-    """Cells in which numbers have a decimal point and an ASCII minus sign; other texts stay as they are.
-
-    Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabs
-    separate, or some comma that cannot mark thousands. No number may have a point then. Else they stay.
-    """
+    """Cells in which numbers have a decimal point and an ASCII minus sign; other texts stay as they are."""
+    # Commas in numbers are decimal where the whole table leaves no other reading: columns that semicolons or tabs
+    # separate, or some comma that cannot mark thousands. No number may have a point then. Else they stay.
     found = [[cell if cell.isascii() else _with_plain_minus(cell) for cell in cells] for cells in rows]
     with_comma = [cell for cells in found for cell in cells if "," in cell and _WITH_COMMA.fullmatch(cell)]
     if not with_comma or (separator == "," and all(map(_THOUSANDS.fullmatch, with_comma))):

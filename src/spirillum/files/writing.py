@@ -230,8 +230,7 @@ def netcdf_target(path: str | Path) -> Path:
     return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
 
 
-_FEW = 4
-"""Suffixes up to which their meanings are listed in a sentence without them."""
+_FEW = 4  # suffixes up to which their meanings are listed in a sentence without them
 
 
 def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:

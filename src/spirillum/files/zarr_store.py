@@ -24,13 +24,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "async.concurrency": 1}
-_LEVEL = 1
-"""Of compression: faster than a disk, and floats gain nothing from more."""
-_CHECKSUM = 4
-"""Bytes of the checksum at the end of a chunk."""
+_LEVEL = 1  # of compression: faster than a disk, and floats gain nothing from more
+_CHECKSUM = 4  # bytes of the checksum at the end of a chunk
 
-Place = Sequence[tuple[int, int]]
-"""First index, and the one behind the last, along each dimension."""
+Place = Sequence[tuple[int, int]]  #: First index, and the one behind the last, along each dimension.
 
 
 class Stored(NamedTuple):
@@ -39,8 +36,7 @@ class Stored(NamedTuple):
     dimensions: tuple[str, ...]
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
-    dtype: str
-    """`float64`, `int8`, `int32` or `str`."""
+    dtype: str  #: `float64`, `int8`, `int32` or `str`.
     attributes: Mapping[str, Any]
 
 
@@ -86,7 +82,9 @@ def region_files(
         group = zarr.create_group(store=MemoryStore(found), zarr_format=3)
         for name, given in values.items():
             item, place = variables[name], places[name]
-            _check_whole_chunk(name, item, place)
+            for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
+                if start % part or stop != min(start + part, size):
+                    raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
             _created(group, name, item)[tuple(slice(*ends) for ends in place)] = given
     keys = [chunk_key(name, variables[name], places[name]) for name in values]
     return {key: found[key].to_bytes() for key in keys}
@@ -107,13 +105,6 @@ def is_whole(path: Path) -> bool:
             content[-_CHECKSUM:], "little"
         )
     return False
-
-
-def _check_whole_chunk(name: str, item: Stored, place: Place) -> None:
-    """Refuse a region that is not exactly one chunk, or the last one along a dimension."""
-    for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
-        if start % part or stop != min(start + part, size):
-            raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
 
 
 def _created(group: Any, name: str, item: Stored) -> Any:

@@ -16,17 +16,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Variable: TypeAlias = tuple[tuple[str, ...], Any, Mapping[str, Any]]
-"""Dimensions, values and attributes."""
+Variable: TypeAlias = tuple[tuple[str, ...], Any, Mapping[str, Any]]  #: Dimensions, values and attributes.
 
 
 class Labelled(NamedTuple):
     """What an `xarray.Dataset` is made of."""
 
-    data: Mapping[str, Variable]
-    """Variables."""
-    coordinates: Mapping[str, Variable]
-    """One for each dimension."""
+    data: Mapping[str, Variable]  #: Variables.
+    coordinates: Mapping[str, Variable]  #: One for each dimension.
     attributes: Mapping[str, Any]
 
     def dataset(self) -> xr.Dataset:
@@ -62,11 +59,9 @@ _AXES = ("x", "y", "z")
 
 
 def write_vti(dataset: xr.Dataset, path: Path) -> None:
-    """Write a flow in a box as VTK image data, whole or not at all.
-
-    Point arrays `velocity` (3 components, m/s), `pressure` (Pa), both NaN inside solids, and `inside` (0 or 1); lengths
-    in m. The dataset's attributes stand in a comment at the head of the file, as JSON.
-    """
+    """Write a flow in a box as VTK image data, whole or not at all."""
+    # Point arrays `velocity` (3 components, m/s), `pressure` (Pa), both NaN inside solids, and `inside` (0 or 1);
+    # lengths in m. The dataset's attributes stand in a comment at the head of the file, as JSON.
     import_optional("pyevtk", "a flow for ParaView")
     from pyevtk.hl import imageToVTK
 

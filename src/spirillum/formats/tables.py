@@ -65,7 +65,6 @@ def _checked_names(path: Path, metadata: Any) -> list[str]:
 
 
 def _values(path: Path, name: str, column: Any) -> list[Any]:
-    """Cells of a column."""
     texts = column.dictionary if hasattr(column, "dictionary") else column
     if texts.nbytes > LONGEST_CELL * max(len(texts), 1) + (1 << 16):
         raise InputError(f"{path}, column {name[:60]}: texts of {texts.nbytes} bytes; allowed: short ones")
@@ -84,10 +83,8 @@ def _cell(path: Path, number: int, name: str, value: object) -> str:
 
 _LARGEST_NUMBER = 1e12
 _WORD = re.compile(r"[^\W_]+")
-_ALIKE = 0.8
-"""Likeness of two words, from 0 to 1, from which on one may be a misspelling of the other."""
-_NOTES = ("note", "comment", "remark")
-"""Prefix of the columns that are the user's own."""
+_ALIKE = 0.8  # likeness of two words, from 0 to 1, from which on one may be a misspelling of the other
+_NOTES = ("note", "comment", "remark")  # prefix of the columns that are the user's own
 
 
 @dataclass(frozen=True)
@@ -140,10 +137,8 @@ class Table:
 
     path: Path
     headers: Sequence[Sequence[str]]
-    below: Sequence[tuple[int, Sequence[str]]]
-    """Cells of each row below the headers, with its line number."""
-    comments: Sequence[str] = ()
-    """Comment lines, each with its `#`."""
+    below: Sequence[tuple[int, Sequence[str]]]  #: Cells of each row below the headers, with its line number.
+    comments: Sequence[str] = ()  #: Comment lines, each with its `#`.
 
     @property
     def header(self) -> Sequence[str]:
@@ -220,25 +215,20 @@ def read_readings(path: str | Path, what: str, headers: int = 1, *, ragged: bool
 
 
 def check_known(table: Table, allowed: Sequence[str]) -> None:
-    """Refuse columns that may be meant as one of the allowed ones, and names that stand twice.
-
-    Other columns are free: those without a word that an allowed name has, or nearly has.
-    """
+    """Refuse columns that may be meant as one of the allowed ones, and names that stand twice."""
+    # Other columns are free: those without a word that an allowed name has, or nearly has.
     words = {word for name in allowed for word in _words(name)} - {"s"}
     for name in table.header:
         if name in allowed:
             if table.header.count(name) > 1:
                 raise InputError(f"{table.path}: column '{name}' is a duplicate; allowed: once")
-        elif not name.lower().startswith(_NOTES) and _resembles(name, words):
+        elif not name.lower().startswith(_NOTES) and any(
+            get_close_matches(word, words, n=1, cutoff=_ALIKE) for word in _words(name)
+        ):
             raise InputError(
                 f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, allowed)}; allowed: "
                 f"{', '.join(allowed)}, and notes, whose names begin with note"
             )
-
-
-def _resembles(name: str, words: Collection[str]) -> bool:
-    """Whether a word of a name is one of some words, but for a letter."""
-    return any(get_close_matches(word, words, n=1, cutoff=_ALIKE) for word in _words(name))
 
 
 def _words(name: str) -> list[str]:

@@ -17,14 +17,12 @@ from spirillum.interfaces.serial_remote import SerialRemote, VirtualRemote
 from spirillum.live.tracker import LiveTracker
 from spirillum.virtual.live_camera import VirtualCamera
 
-VIRTUAL = "virtual"
-"""Port of a remote that is made for the run, on a pseudo-terminal."""
+VIRTUAL = "virtual"  #: Port of a remote that is made for the run, on a pseudo-terminal.
 _TRIES = 3
 """How often a virtual remote is polled before it counts as gone: a busy machine may delay it, but not the robot, whose
 time stands still.
 """
-_LEARN = 3.0
-"""Time from which the tracker learns the robot's look, s."""
+_LEARN = 3.0  # time from which the tracker learns the robot's look, s
 
 
 class Bench(Senses):
@@ -63,7 +61,14 @@ class Bench(Senses):
         """The remote of the port `virtual`."""
         try:
             if tracked:
-                self._set_up_camera(plant, lab, seed, degradation)
+                pose = plant.observe().pose
+                options = {"fps": lab.camera.fps}
+                self._eye = VirtualCamera(plant.robot, pose, camera=options, degradation=degradation, seed=seed)
+                self._shift = self._eye.x_of(pose) - float(pose.position[0])
+                folder = self._left.enter_context(scratch_folder())
+                self._tracker = LiveTracker(
+                    self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera"
+                )
             if port is not None:
                 if port == VIRTUAL:
                     self.virtual = self._left.enter_context(VirtualRemote())
@@ -71,14 +76,6 @@ class Bench(Senses):
         except BaseException:
             self._left.close()
             raise
-
-    def _set_up_camera(self, plant: Plant, lab: Lab, seed: int, degradation: str | None) -> None:
-        pose = plant.observe().pose
-        options = {"fps": lab.camera.fps}
-        self._eye = VirtualCamera(plant.robot, pose, camera=options, degradation=degradation, seed=seed)
-        self._shift = self._eye.x_of(pose) - float(pose.position[0])
-        folder = self._left.enter_context(scratch_folder())
-        self._tracker = LiveTracker(self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera")
 
     def not_ready(self, time: float) -> str:  # noqa: ARG002 - it has learnt or not
         """Why nothing can be seen yet at a time, s; empty once the tracker knows the robot."""

@@ -18,10 +18,8 @@ from spirillum.errors import InputError, check_choice, check_range, clipped
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, TaskEnvironment
 from spirillum.scalars import is_whole
 
-_LEAD = 0.17
-"""Look-ahead of `lead`, s: the usual latency of camera and remote together."""
-_GAIN = 1.0
-"""Of `integral`: change of the duty per second for a relative error of 1."""
+_LEAD = 0.17  # look-ahead of `lead`, s: the usual latency of camera and remote together
+_GAIN = 1.0  # of `integral`: change of the duty per second for a relative error of 1
 
 Rule = Callable[[np.ndarray, TaskEnvironment], np.ndarray]
 
@@ -58,14 +56,10 @@ RULES: Mapping[type[TaskEnvironment], Mapping[str, Rule]] = {
 class Scored(NamedTuple):
     """Scores of many episodes."""
 
-    scores: np.ndarray
-    """At the end of each."""
-    mean: float
-    """Their mean."""
-    margin: float
-    """Half the width of its 95 % interval."""
-    reward: float
-    """Mean of the rewards of an episode, summed."""
+    scores: np.ndarray  #: At the end of each.
+    mean: float  #: Their mean.
+    margin: float  #: Half the width of its 95 % interval.
+    reward: float  #: Mean of the rewards of an episode, summed.
 
 
 def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **options: Any) -> Scored:
@@ -90,7 +84,6 @@ _BAR = 40
 
 
 def _spaces(task: TaskEnvironment) -> tuple[spaces.Box, spaces.Space[Any]]:
-    """Observation and actions of one robot."""
     low, high = (np.array([getattr(item, end) for item in task.observed], dtype=np.float32) for end in ("low", "high"))
     actions = spaces.Discrete(2) if task.on_off else spaces.Box(0.0, 1.0, (1,), dtype=np.float32)
     return spaces.Box(low, high, dtype=np.float32), actions

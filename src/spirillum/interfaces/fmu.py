@@ -12,12 +12,11 @@ import subprocess
 import sys
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.files import MARK, scratch_folder
+from spirillum.formats.templates import rendered
 from spirillum.kernels import rigid_links, stiff_steps
 from spirillum.kernels.motor import STATES as AXIAL_STATES
 from spirillum.quantities import QUANTITIES
@@ -63,8 +63,7 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: power for base, power in found.items() if power}
 
 
-_PLUMBING = ("fmi3.c", "model.h")
-"""C sources with the functions of FMI, around those of a model."""
+_PLUMBING = ("fmi3.c", "model.h")  # C sources with the functions of FMI, around those of a model
 _HEADERS = ("core.h", "drive.h")
 _MOTION = (
     "stiff_steps",
@@ -99,34 +98,23 @@ class FmuVariable(NamedTuple):
     name: str
     meaning: str
     unit: str
-    value: float | None = None
-    """Start of a parameter; None: an output, whose place is its value reference."""
+    value: float | None = None  #: Start of a parameter; None: an output, whose place is its value reference.
 
 
 @dataclass(frozen=True)
 class FmuModel:
     """What an FMU is made of: a robot, C sources with its equations, and its numbers."""
 
-    prediction: Prediction
-    """The robot with model and friction."""
-    motion: str
-    """How it moves, in half a sentence."""
-    duty: float
-    """Duty at first."""
-    flow: float | None
-    """Imposed mean flow at first, m/s; None: it is no input."""
-    source: str
-    """C source of the model, in this folder."""
-    equations: tuple[str, ...]
-    """Files of csrc/ with its equations, and headers."""
-    outputs: Mapping[int, FmuVariable]
-    """By their place in the C source."""
-    parameters: Mapping[int, FmuVariable]
-    """Numbers that an importer can set, by their place in the C source."""
-    defined: Mapping[str, str]
-    """Numbers of the C source by name."""
-    arrays: Mapping[str, Samples]
-    """Arrays of the C source by name."""
+    prediction: Prediction  #: The robot with model and friction.
+    motion: str  #: How it moves, in half a sentence.
+    duty: float  #: Duty at first.
+    flow: float | None  #: Imposed mean flow at first, m/s; None: it is no input.
+    source: str  #: C source of the model, in this folder.
+    equations: tuple[str, ...]  #: Files of csrc/ with its equations, and headers.
+    outputs: Mapping[int, FmuVariable]  #: By their place in the C source.
+    parameters: Mapping[int, FmuVariable]  #: Numbers that an importer can set, by their place in the C source.
+    defined: Mapping[str, str]  #: Numbers of the C source by name.
+    arrays: Mapping[str, Samples]  #: Arrays of the C source by name.
 
     @property
     def identifier(self) -> str:
@@ -244,14 +232,7 @@ def _sources(model: FmuModel) -> dict[str, bytes]:
     return found
 
 
-def _token(model: FmuModel, written: Mapping[str, bytes]) -> str:
-    """Token with which an importer instantiates the FMU: a checksum of its numbers and its sources."""
-    said = repr((model.prediction.robot.name, dict(model.defined), model.flow, model.duty)).encode()
-    return "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
-
-
 def _header(model: FmuModel, token: str) -> str:
-    """The robot for the C source: `robot.h`."""
     defined = {
         "TOKEN": f'"{token}"',
         "FLOW_INPUT": str(int(model.flow is not None)),
@@ -262,113 +243,46 @@ def _header(model: FmuModel, token: str) -> str:
     return "".join(f"#define {name} {value}\n" for name, value in defined.items())
 
 
-def _build_text(model: FmuModel, names: Iterable[str]) -> str:
-    """How the source is compiled: `sources/buildDescription.xml`."""
-    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
-    compiled = ET.SubElement(configuration, "SourceFileSet", language="C11")
-    for name in names:
-        if name.endswith(".c"):
-            ET.SubElement(compiled, "SourceFile", name=name)
-    ET.SubElement(compiled, "PreprocessorDefinition", name=_INSIDE)
-    return _text(root)
-
-
 def description_text(model: FmuModel, token: str) -> str:
     """`modelDescription.xml` of FMI 3.0."""
-    prediction = model.prediction
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=prediction.robot.name,
-        instantiationToken=token,
+    prediction, variables = model.prediction, list(_variables(model))
+    return rendered(
+        "interfaces/modelDescription.xml.jinja",
+        robot=prediction.robot,
+        identifier=model.identifier,
+        token=token,
         description=(
             f"{prediction.robot.name}, {model.motion}: model {prediction.model.name}, friction "
             f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
-        generationTool=f"spirillum {own_version()}",
-        variableNamingConvention="structured",
+        tool=f"spirillum {own_version()}",
+        units={item.unit: base_units(item.unit) for *_, item in variables if item.unit},
+        variables=variables,
     )
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=model.identifier,
-        canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-    )
-    variables = _variables(model)
-    units = ET.SubElement(root, "UnitDefinitions")
-    for unit in dict.fromkeys(item["unit"] for _, item in variables if "unit" in item):
-        exponents = {base: str(power) for base, power in base_units(unit).items()}
-        ET.SubElement(ET.SubElement(units, "Unit", name=unit), "BaseUnit", exponents)
-    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="1.0", stepSize="0.01")
-    found = ET.SubElement(root, "ModelVariables")
-    for kind, item in variables:
-        ET.SubElement(found, kind, item)
-    structure = ET.SubElement(root, "ModelStructure")
-    for kind in ("Output", "InitialUnknown"):
-        for _, item in variables:
-            if item["causality"] == "output":
-                ET.SubElement(structure, kind, valueReference=item["valueReference"])
-    return _text(root)
 
 
-def _variables(model: FmuModel) -> list[tuple[str, dict[str, str]]]:
-    """Kind and attributes of all variables."""
-
-    def variable(reference: int, causality: str, variability: str, item: FmuVariable) -> tuple[str, dict[str, str]]:
-        found = {
-            "name": item.name,
-            "valueReference": str(reference),
-            "causality": causality,
-            "variability": variability,
-            "description": item.meaning,
-            "unit": item.unit,
-        }
-        return "Float64", found | ({} if item.value is None else {"start": repr(item.value)})
-
+def _variables(model: FmuModel) -> Iterator[tuple[int, str, str, FmuVariable]]:
+    """Value reference, causality and variability of all variables; the remote is no number."""
     duty, flow = QUANTITIES["duty"], QUANTITIES["mean_flow"]
-    found = [
-        variable(0, "independent", "continuous", FmuVariable("time", "time", "s")),
-        (
-            "Boolean",
-            {
-                "name": "remote",
-                "valueReference": str(_REMOTE),
-                "causality": "input",
-                "variability": "discrete",
-                "description": "remote: the drive is on",
-                "start": "true",
-            },
-        ),
-        variable(_DUTY, "input", "continuous", FmuVariable("duty", f"{duty.meaning}, 0 to 1", "1", model.duty)),
-    ]
+    yield 0, "independent", "continuous", FmuVariable("time", "time", "s")
+    yield _REMOTE, "remote", "discrete", FmuVariable("remote", "the drive is on", "")
+    yield _DUTY, "input", "continuous", FmuVariable("duty", f"{duty.meaning}, 0 to 1", "1", model.duty)
     if model.flow is not None:
-        imposed = FmuVariable(flow.name, flow.meaning, flow.unit, model.flow)
-        found.append(variable(_FLOW, "input", "continuous", imposed))
+        yield _FLOW, "input", "continuous", FmuVariable(flow.name, flow.meaning, flow.unit, model.flow)
     for place, item in model.outputs.items():
         if not (item.name == flow.name and model.flow is not None):
-            found.append(variable(_FIRST_OUTPUT + place, "output", "continuous", item))
+            yield _FIRST_OUTPUT + place, "output", "continuous", item
     for place, item in model.parameters.items():
-        found.append(variable(_FIRST_PARAMETER + place, "parameter", "fixed", item))
-    return found
-
-
-def _text(root: ET.Element) -> str:
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+        yield _FIRST_PARAMETER + place, "parameter", "fixed", item
 
 
 _COMPILERS = ("cc", "gcc", "clang")
 _INSIDE = "SPIRILLUM_INSIDE"
 _OPTIONS = ("-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", f"-D{_INSIDE}")
-_LONGEST = 120.0
-"""Time after which a compiler is given up, s."""
+_LONGEST = 120.0  # time after which a compiler is given up, s
 _LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
-_NEVER = (1980, 1, 1, 0, 0, 0)
-"""Date of the files in the archive, so that the same robot gives the same bytes."""
+_NEVER = (1980, 1, 1, 0, 0, 0)  # date of the files in the archive, so that the same robot gives the same bytes
 
 
 def compiler() -> str:
@@ -385,13 +299,19 @@ def compiler() -> str:
 def fmu_bytes(model: FmuModel) -> bytes:
     """The FMU of a robot: a zip archive with description, source and library."""
     written, name = _sources(model), model.identifier
-    token = _token(model, written)
+    said = repr((model.prediction.robot.name, dict(model.defined), model.flow, model.duty)).encode()
+    token = "{" + hashlib.sha256(said + b"".join(written.values())).hexdigest()[:32] + "}"
     written["robot.h"] = _header(model, token).encode()
     system, ending = _LIBRARIES.get(sys.platform, ("linux", ".so"))
     machine = platform.machine().lower()
     contents = {
         "modelDescription.xml": description_text(model, token).encode(),
-        "sources/buildDescription.xml": _build_text(model, written).encode(),
+        "sources/buildDescription.xml": rendered(
+            "interfaces/buildDescription.xml.jinja",
+            identifier=name,
+            names=[file for file in written if file.endswith(".c")],
+            inside=_INSIDE,
+        ).encode(),
         **{f"sources/{file}": text for file, text in written.items()},
         f"binaries/{_PROCESSORS.get(machine, machine)}-{system}/{name}{ending}": _compiled(written),
     }

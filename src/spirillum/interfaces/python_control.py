@@ -32,16 +32,12 @@ if TYPE_CHECKING:
 class LinearSystem(DisplayMixin):
     """A robot's equations linearised, and where."""
 
-    system: control.StateSpace
-    """Of deviations from the point below; signals as in `control_system`."""
-    inputs: dict[str, float]
-    """The point: inputs by name, SI."""
+    system: control.StateSpace  #: Of deviations from the point below; signals as in `control_system`.
+    inputs: dict[str, float]  #: The point: inputs by name, SI.
     outputs: dict[str, float]
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
-    time_constant: float
-    """Of the motor's current there, s; path, angles and charge only add up."""
-    warnings: tuple[Note, ...] = ()
-    """What to be careful about, a sentence each."""
+    time_constant: float  #: Of the motor's current there, s; path, angles and charge only add up.
+    warnings: tuple[Note, ...] = ()  #: What to be careful about, a sentence each.
 
     def to_dict(self) -> dict[str, Any]:
         """The point, and the time constant there, as data; the matrices are those of `system`."""
@@ -187,7 +183,6 @@ def _inputs(axial: AxialRobot) -> list[str]:
 
 
 def _inputs_of(u: Samples) -> tuple[float, float]:
-    """Duty and flow from a system's inputs."""
     if not np.all(np.isfinite(u)):
         name = INPUTS[int(np.flatnonzero(~np.isfinite(u))[0])]
         raise InputError(f"{name} = {float(u[~np.isfinite(u)][0])}; allowed: a number")

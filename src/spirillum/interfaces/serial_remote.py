@@ -26,10 +26,8 @@ from spirillum.errors import InputError, check_range, clipped
 from spirillum.optional_dependencies import import_optional
 from spirillum.units import KINDS, as_given, parse_option
 
-LONGEST_LINE = 80
-"""Bytes of a line, its end included; what is longer is thrown away."""
-WATCHDOG = 0.5
-"""Without a valid command for so long the receiver switches the motor off, s."""
+LONGEST_LINE = 80  #: Bytes of a line, its end included; what is longer is thrown away.
+WATCHDOG = 0.5  #: Without a valid command for so long the receiver switches the motor off, s.
 
 
 def framed(body: str) -> bytes:
@@ -98,11 +96,9 @@ def _duty_of(word: str) -> float | None:
 
 _BAUD = 115_200
 _FASTEST = 100_000_000
-_PATIENCE = 0.15
-"""Time in which an answer has to come, s: three tries end before the far end's watchdog does."""
+_PATIENCE = 0.15  # time in which an answer has to come, s: three tries end before the far end's watchdog does
 _TRIES = 3
-_REPEAT = 0.1
-"""Time after which a duty that is held is sent again, s."""
+_REPEAT = 0.1  # time after which a duty that is held is sent again, s
 _LONGEST_HOLD = 86_400.0
 
 
@@ -278,16 +274,11 @@ def _ports() -> str:
 class RemoteRun(DisplayMixin):
     """A motor that was on for a time, through a remote."""
 
-    port: str
-    """The port."""
-    name: str
-    """What the far end calls itself."""
-    duty: float
-    """Duty of the motor, in steps of 0.001."""
-    duration: float
-    """How long it was on, s."""
-    watchdog: float
-    """Time after which the far end switches off by itself, s."""
+    port: str  #: The port.
+    name: str  #: What the far end calls itself.
+    duty: float  #: Duty of the motor, in steps of 0.001.
+    duration: float  #: How long it was on, s.
+    watchdog: float  #: Time after which the far end switches off by itself, s.
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum remote --json`."""

@@ -26,12 +26,9 @@ from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.units import KINDS, parse_option
 
 _MM = 1e3
-_LARGEST_GOAL = 1e3
-"""In m, and as a share of a speed."""
-_SEEN_OVER = 0.5
-"""Time over which the observed speed is an average, s."""
-_LATEST_PULSE = 0.9
-"""Share of an episode in which a pulse of flow may begin."""
+_LARGEST_GOAL = 1e3  # in m, and as a share of a speed
+_SEEN_OVER = 0.5  # time over which the observed speed is an average, s
+_LATEST_PULSE = 0.9  # share of an episode in which a pulse of flow may begin
 
 
 class ObservedNumber(NamedTuple):
@@ -67,12 +64,9 @@ class _Past:
 class TaskEnvironment(ABC):
     """Robots with camera, remote and flow; a task adds goal, actions, observation and score."""
 
-    observed: ClassVar[tuple[ObservedNumber, ...]]
-    """The numbers of an observation."""
-    goals: ClassVar[tuple[float, float]]
-    """Least and largest goal, unless others are given."""
-    on_off: ClassVar[bool]
-    """Whether an action is 0 (off) or 1 (on); else it is a duty from 0 to 1."""
+    observed: ClassVar[tuple[ObservedNumber, ...]]  #: The numbers of an observation.
+    goals: ClassVar[tuple[float, float]]  #: Least and largest goal, unless others are given.
+    on_off: ClassVar[bool]  #: Whether an action is 0 (off) or 1 (on); else it is a duty from 0 to 1.
 
     def __init__(
         self,
@@ -203,7 +197,6 @@ class TaskEnvironment(ABC):
         """The numbers of `observed`, each (count,), before they are cut off at their bounds."""
 
     def _duty(self, actions: Any) -> Samples:
-        """The commanded duties."""
         try:
             values = np.asarray(actions, dtype=np.float64).reshape(-1)
         except (TypeError, ValueError, OverflowError):

@@ -44,18 +44,15 @@ from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
-_BETWEEN = 1.0
-"""Time between two pictures that are kept, s."""
-_TOGETHER = 5
-"""Pictures from which a background is made."""
+_BETWEEN = 1.0  # time between two pictures that are kept, s
+_TOGETHER = 5  # pictures from which a background is made
 
 
 @dataclass
 class RecentDetections:
     """What was read in the last seconds: on each frame time, x, continuous angles, and both angles as read."""
 
-    length: float
-    """Time that is kept, s."""
+    length: float  #: Time that is kept, s.
     rows: deque[tuple[float, ...]] = field(default_factory=deque)
     """Time, x, body angle, tail phase; body angle modulo its period with its error, tail phase modulo 2 pi with its."""
 
@@ -109,7 +106,6 @@ class CameraWatch:
         return flags
 
     def _compared(self, pictures: list[np.ndarray]) -> tuple[Flag, ...]:
-        """Flags on some pictures, against the first ones."""
         now = view_of(pictures, self._start, ruled=self._ruled)
         if self._first is None:
             self._first = now
@@ -124,12 +120,9 @@ class CameraWatch:
         return (Flag("camera-moved", sentence, EVERYTHING),)
 
 
-_CHECKED = 1.0
-"""Time between two looks at the last seconds for what is odd, s."""
-_LOOKED_BACK = 10.0
-"""Time over which that looks back, s."""
-_MOST_FRAMES = 36_000
-"""Frames that the summary keeps: twenty minutes at 30 a second."""
+_CHECKED = 1.0  # time between two looks at the last seconds for what is odd, s
+_LOOKED_BACK = 10.0  # time over which that looks back, s
+_MOST_FRAMES = 36_000  # frames that the summary keeps: twenty minutes at 30 a second
 _VELOCITY, _BODY, _TAIL, _MOTOR = RATE_NAMES
 _NOT_SEEN = "the robot is not seen where it should be"
 _NOT_WHOLE = "the robot is partly out of view"
@@ -261,7 +254,6 @@ class Following:
         return (Flag("uneven-stripes", sentence, (_BODY,)),)
 
     def _rates(self, body_error: float, tail_error: float) -> dict[str, Measured]:
-        """Speed and rates over the window."""
         slopes = {name: window.slope(LEVEL) for name, window in self.windows.items()}
         pixel, scale = self.scale.length_per_pixel, self.scale.relative_uncertainty
         known = {name: slope[0] if math.isfinite(slope[0]) else 0.0 for name, slope in slopes.items()}
@@ -297,7 +289,6 @@ class Following:
         return found
 
     def _forget(self, count: int) -> None:
-        """Forget the first frames."""
         record = self.follower.record
         columns = (record.time, record.index, record.placed, record.roll, record.edges, record.tail, record.change)
         for column in columns:

@@ -21,8 +21,7 @@ from spirillum.notes import Note
 from spirillum.robot.load import load
 from spirillum.vision.setup import load_setup
 
-_WAITING = 2
-"""Pictures that may wait: more would only make them old."""
+_WAITING = 2  # pictures that may wait: more would only make them old
 
 
 def at_own_pace(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:

@@ -32,37 +32,27 @@ _PROTOCOLS = {"rtsp": "rtsp,rtp,udp,tcp", "http": "http,tcp", "https": "https,tl
 """What a stream may use: its own protocol, no files and no playlists."""
 _FORMATS = "rtsp,mpegts,mpjpeg,mjpeg,matroska,webm,mov,mp4,h264,hevc,flv"
 _FASTEST = 1e4
-_SILENT = 5.0
-"""Time without a picture after which a camera or stream has stopped, s."""
+_SILENT = 5.0  # time without a picture after which a camera or stream has stopped, s
 
 
 class Arrived(NamedTuple):
     """A picture that has come."""
 
-    number: int
-    """Its number, from 0."""
-    time: float
-    """When it was taken, by the source's own clock, s from the first one."""
-    image: np.ndarray
-    """8-bit RGB, (height, width, 3)."""
-    clock: float
-    """When it came, by this computer's clock, s."""
+    number: int  #: Its number, from 0.
+    time: float  #: When it was taken, by the source's own clock, s from the first one.
+    image: np.ndarray  #: 8-bit RGB, (height, width, 3).
+    clock: float  #: When it came, by this computer's clock, s.
 
 
 @dataclass(frozen=True)
 class Source:
     """A source of pictures that was opened once, to see that it is there."""
 
-    name: str
-    """For sentences."""
-    kind: Kind
-    """`film`, `camera` or `stream`."""
-    options: Mapping[str, Any] = field(repr=False)
-    """How it is opened: see `source_of`."""
-    words: str = ""
-    """Metadata of a video, such as that it is synthetic."""
-    flags: list[Flag] = field(default_factory=list, repr=False)
-    """What was odd about its pictures while they were read."""
+    name: str  #: For sentences.
+    kind: Kind  #: `film`, `camera` or `stream`.
+    options: Mapping[str, Any] = field(repr=False)  #: How it is opened: see `source_of`.
+    words: str = ""  #: Metadata of a video, such as that it is synthetic.
+    flags: list[Flag] = field(default_factory=list, repr=False)  #: What was odd about its pictures while they were read
 
     def frames(self) -> Generator[Arrived, None, None]:
         """Its pictures until it ends."""
@@ -108,14 +98,9 @@ def source_of(
         wanted = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
         address = scheme + word[len(scheme) :]
         options = {"file": address, "format": None, "options": wanted, "size": None, "aspect": aspect}
-        return Source(_without_secrets(word), "stream", options)
+        return Source(re.sub(r"//[^/]*@", "//", word)[:120], "stream", options)
     video = open_video(word, pace, aspect)  # raises for a bad video
     return Source(video.name, "film", {"video": video, "between": between}, video.words, video.flags)
-
-
-def _without_secrets(word: str) -> str:
-    """An address without name and password."""
-    return re.sub(r"//[^/]*@", "//", word)[:120]
 
 
 def _pictures(source: Source) -> Generator[Arrived, None, None]:
@@ -166,7 +151,6 @@ def _shown(source: Source, stream: Any, frame: Any) -> Callable[[Any], np.ndarra
 
 
 def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | None) -> tuple[int, int]:
-    """The size of the pictures."""
     if size == expected:
         return size
     if expected is not None:

@@ -25,10 +25,8 @@ from spirillum.vision.track.lone_outline import OutlineCheck, check_outline
 from spirillum.vision.track.visibility import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
 
-_SAMPLES = 24
-"""Frames from which the robot is learnt, as for a video."""
-_GOLDEN = 0.618034
-"""Step of the low-discrepancy sequence that spreads them."""
+_SAMPLES = 24  # frames from which the robot is learnt, as for a video
+_GOLDEN = 0.618034  # step of the low-discrepancy sequence that spreads them
 
 
 class LiveTracker:

@@ -17,12 +17,9 @@ from spirillum.measurement.statistics import student_t_quantile
 from spirillum.vision.track.constants import UNWRAPPING
 from spirillum.vision.track.unwrapping import likeliest_rate
 
-_FEWEST = 8
-"""Fewest readings of a rate."""
-_LEAST_SPAN = 0.5
-"""Least share of the window that readings have to span."""
-_LARGEST = 0.95
-"""Largest autocorrelation from frame to frame that a window resolves."""
+_FEWEST = 8  # fewest readings of a rate
+_LEAST_SPAN = 0.5  # least share of the window that readings have to span
+_LARGEST = 0.95  # largest autocorrelation from frame to frame that a window resolves
 
 
 class Window:
@@ -55,17 +52,10 @@ class Window:
 
 
 def slope_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float, float]:
-    """Slope of a least-squares line, and the half width of its interval.
-
-    The errors are taken as a first-order autoregression: with the residuals' correlation r from frame to frame, which
-    is first freed of its bias (1 + 3 r)/n, n readings tell as much as n (1 - r)/(1 + r) independent ones (Bartlett
-    1946); Student's t has that many less two degrees of freedom.
-
-    Args:
-        time: of the readings, s, (n,), four or more, rising.
-        values: (n,).
-        level: confidence level.
-    """
+    """Slope of a least-squares line, and the half width of its interval."""
+    # The errors are taken as a first-order autoregression: with the residuals' correlation r from frame to frame, which
+    # is first freed of its bias (1 + 3 r)/n, n readings tell as much as n (1 - r)/(1 + r) independent ones (Bartlett
+    # 1946); Student's t has that many less two degrees of freedom.
     count = time.size
     spans = time - time.mean()
     squares = float(spans @ spans)
@@ -82,16 +72,9 @@ def slope_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float
 
 
 def periodic_error(amplitude: float, rates: Sequence[float], span: float) -> float:
-    """Standard error of a slope by errors that come back with angles, their phases unknown.
-
-    A line through A sin(w t + p) over a time T has a slope of up to 6 A/T |j1(w T/2)|, with the spherical Bessel
-    function j1(u) = sin(u)/u^2 - cos(u)/u; over all phases, 1/sqrt 2 of it in the root mean square.
-
-    Args:
-        amplitude: A.
-        rates: w of each angle, rad/s.
-        span: T, s.
-    """
+    """Standard error of a slope by errors that come back with angles, their phases unknown."""
+    # A line through A sin(w t + p) over a time T has a slope of up to 6 A/T |j1(w T/2)|, with the spherical Bessel
+    # function j1(u) = sin(u)/u^2 - cos(u)/u; over all phases, 1/sqrt 2 of it in the root mean square.
     total = 0.0
     for rate in rates:
         u = abs(0.5 * rate * span)
@@ -100,8 +83,7 @@ def periodic_error(amplitude: float, rates: Sequence[float], span: float) -> flo
     return math.sqrt(0.5 * total)
 
 
-_GAP = 10.0
-"""Time between two readings over the usual one from which on whole periods may be missing."""
+_GAP = 10.0  # time between two readings over the usual one from which on whole periods may be missing
 
 
 class CausalAngle:

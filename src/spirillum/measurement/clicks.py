@@ -15,24 +15,18 @@ from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.setup import INDICES
 from spirillum.vision.track.colours import colours_named
 
-_SURE = 0.25
-"""Largest distance of the number of spacings between two clicks from a whole number."""
-_FEWEST = 4
-"""Fewest spacings between two clicks: a pixel beside the mark then matters little."""
-_SHORTEST = 20.0
-"""Shortest distance of two clicks that give a length per pixel, pixels."""
-_AROUND = 2
-"""Pixels on each side of a click over which a colour is averaged."""
+_SURE = 0.25  # largest distance of the number of spacings between two clicks from a whole number
+_FEWEST = 4  # fewest spacings between two clicks: a pixel beside the mark then matters little
+_SHORTEST = 20.0  # shortest distance of two clicks that give a length per pixel, pixels
+_AROUND = 2  # pixels on each side of a click over which a colour is averaged
 
 _RIGHT = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}
 """Direction, in (u, v), of a robot's right-hand side, given that of its nose."""
 
 
 def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, float], length: float) -> float:
-    """Spacing of a ruler's lines, m, from two of its marks and the length between them.
-
-    The detected lines between the clicks are counted, so that a click need not be exact.
-    """
+    """Spacing of a ruler's lines, m, from two of its marks and the length between them."""
+    # The detected lines between the clicks are counted, so that a click need not be exact.
     labels = np.unique(lines.strip)
     away = [
         min(float(np.hypot(*(lines.pixels[lines.strip == k] - click).T).min()) for click in (one, other))
@@ -68,17 +62,7 @@ def length_per_pixel_between(
     surface: float | None,
     index: float,
 ) -> float:
-    """Length that a pixel shows at the height of the robot's axis, m, from two marks where no ruler is detected.
-
-    Args:
-        one: pixel (u, v) of a mark.
-        other: pixel of another one.
-        length: length between the marks, m.
-        heights: of the marks and of the robot's axis, m.
-        camera: height of the lens, m.
-        surface: height of the oil's surface, m; None: nothing refracts.
-        index: refractive index below it, within `INDICES`.
-    """
+    """Length that a pixel shows at the height of the robot's axis, m, from two marks where no ruler is detected."""
     pixels = float(np.hypot(other[0] - one[0], other[1] - one[1]))
     if pixels < _SHORTEST:
         raise InputError(f"the clicks are {pixels:.0f} pixels apart; allowed: at least {_SHORTEST:.0f}")

@@ -28,26 +28,17 @@ if TYPE_CHECKING:
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
 _DURATION, _LONGEST = 20.0, 86400.0
-_POSITION_ERROR = 0.05
-"""Standard error of the position on a frame, pixels."""
-_EDGE_ERROR = 0.25
-"""Standard error of a stripe's edge on a frame, pixels along the circumference."""
-_WAVE_ERROR = 0.1
-"""Standard error of the wire's lateral position on a frame, pixels."""
-_STRIPE_ERROR = math.radians(0.2)
-"""Expected amplitude of errors that repeat with every stripe, rad."""
-_CORRELATION = 4.0
-"""Correlation time of errors of position and wire, frames."""
-_EDGE_CORRELATION = 20.0
-"""Correlation time of errors of the stripes' edges, frames."""
-_FEWEST = 4
-"""Fewest frames that give a rate."""
-_FOREVER = 1e9
-"""Represents the infinite time in view of a robot at rest, s."""
+_POSITION_ERROR = 0.05  # standard error of the position on a frame, pixels
+_EDGE_ERROR = 0.25  # standard error of a stripe's edge on a frame, pixels along the circumference
+_WAVE_ERROR = 0.1  # standard error of the wire's lateral position on a frame, pixels
+_STRIPE_ERROR = math.radians(0.2)  # expected amplitude of errors that repeat with every stripe, rad
+_CORRELATION = 4.0  # correlation time of errors of position and wire, frames
+_EDGE_CORRELATION = 20.0  # correlation time of errors of the stripes' edges, frames
+_FEWEST = 4  # fewest frames that give a rate
+_FOREVER = 1e9  # represents the infinite time in view of a robot at rest, s
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Sizes at which the tracker passes its tests with a margin, pixels."""
-_NEEDED = {"robot": 20.0, "spacing": 3.0}
-"""Sizes below which ruler or robot are not detected, pixels."""
+_NEEDED = {"robot": 20.0, "spacing": 3.0}  # sizes below which ruler or robot are not detected, pixels
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
     f"{_WAVE_ERROR:g} pixels of the wire across; {_CORRELATION:g} neighbouring frames err alike, "
@@ -64,8 +55,7 @@ class Check:
     limit: float
     unit: str
     passed: bool
-    decides: bool
-    """Whether its failure makes the experiment infeasible; otherwise it is a warning."""
+    decides: bool  #: Whether its failure makes the experiment infeasible; otherwise it is a warning.
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:
@@ -86,18 +76,15 @@ class Feasibility(DisplayMixin):
 
     robot: Robot
     setup: str
-    expected: Mapping[str, tuple[float, str]]
-    """Expected values, SI, and their sources."""
+    expected: Mapping[str, tuple[float, str]]  #: Expected values, SI, and their sources.
     checks: tuple[Check, ...]
     intervals: Mapping[str, tuple[float, float]]
     """Expected half width of the 95 % interval of one trial, absolute and relative.
 
     Empty where the scale is unknown, robot or ruler are too small to be detected, or the robot exceeds the view.
     """
-    measured: float
-    """Time for which the whole robot is in view, s."""
-    shares: Mapping[str, float]
-    """Relative standard uncertainty of lengths by source."""
+    measured: float  #: Time for which the whole robot is in view, s.
+    shares: Mapping[str, float]  #: Relative standard uncertainty of lengths by source.
     warnings: tuple[Note, ...]
 
     @property
@@ -165,7 +152,9 @@ def feasibility(
     Raises:
         InputError: if a field is wrong, or the robot's motion cannot be predicted and is not given.
     """
-    _check_video(video, view_width, picture_width)
+    for name, value in (("view-width", view_width), ("width", picture_width)):
+        if video is not None and value is not None:
+            raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
     chosen, robot = load_setup(setup)
     if overrides:
         beside = Path(setup).parent / chosen.robot.file
@@ -215,17 +204,9 @@ def _first(*values: tuple[float | None, str]) -> tuple[float, str]:
     return next((value, source) for value, source in values if value is not None)
 
 
-def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
-    """Refuse what a video states itself."""
-    for name, value in (("view-width", view_width), ("width", picture_width)):
-        if video is not None and value is not None:
-            raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
-
-
 def _warnings(
     checks: Sequence[Check], expected: Mapping[str, tuple[float, str]], pixel: float, shares: Mapping[str, float]
 ) -> list[Note]:
-    """What to be careful about in the checks."""
     warnings = [Note("cannot-resolve", check.sentence, (check.name,)) for check in checks if not check.passed]
     if not math.isfinite(pixel):
         words = "the size of a pixel is unknown: sizes in the picture and intervals are not given; state --view-width"

@@ -30,20 +30,15 @@ tilt it is below 0.1."""
 class Elongation(NamedTuple):
     """Change of the distance between nose and rear from the first frame to the last."""
 
-    change: float
-    """Positive where they drift apart, m; 0 where it is not known."""
-    half_width: float
-    """Of its 95 % interval, m."""
-    pixel: float
-    """Length per pixel, m; NaN without a scale, and so without a known change."""
+    change: float  #: Positive where they drift apart, m; 0 where it is not known.
+    half_width: float  #: Of its 95 % interval, m.
+    pixel: float  #: Length per pixel, m; NaN without a scale, and so without a known change.
 
     def error(self) -> float:
-        """Standard error of the robot's displacement by it, m.
-
-        Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
-        variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
-        goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
-        """
+        """Standard error of the robot's displacement by it, m."""
+        # Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
+        # variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
+        # goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
         share = 1.0 if self.clear else 0.5
         return share * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
 
@@ -79,16 +74,12 @@ def elongation_of(track: Track) -> Elongation:
 
 SEEN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
 """Rates measured directly; that of the motor follows from them."""
-BY_HAND = "by-hand"
-"""Name of the flag of a track of manual readings alone."""
-IMPORTED = "imported"
-"""Name of the flag of a track from another program."""
-SYNTHETIC = "synthetic"
-"""Word in the metadata of computed videos, and name of the flag."""
+BY_HAND = "by-hand"  #: Name of the flag of a track of manual readings alone.
+IMPORTED = "imported"  #: Name of the flag of a track from another program.
+SYNTHETIC = "synthetic"  #: Word in the metadata of computed videos, and name of the flag.
 _MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
 """Share and number of outliers above which a flag is raised: a good video may show one or two."""
-_FEWEST_FRAMES = 4
-"""Fewest measured frames of a video that give a rate."""
+_FEWEST_FRAMES = 4  # fewest measured frames of a video that give a rate
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
 _IMPLIED = {
@@ -127,8 +118,7 @@ _IMPLIED = {
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}
 """Flags that are redundant where the robot does not move in one direction throughout."""
-_ONCE = {"stripes-unreadable", "tail-unreadable"}
-"""Flags of which only the first is kept."""
+_ONCE = {"stripes-unreadable", "tail-unreadable"}  # flags of which only the first is kept
 
 
 def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: Elongation) -> tuple[Flag, ...]:

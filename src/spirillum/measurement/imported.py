@@ -27,19 +27,14 @@ from spirillum.vision.track.track import Track
 
 _WHAT = "a track of trackpy, DeepLabCut or Tracker in pixels (CSV)"
 _NEEDED = "x, y and frame (trackpy) or t (Tracker), or DeepLabCut's table"
-_TIMES = ("t", "time", "time_s")
-"""Columns of times in s, in place of `frame`."""
-_OWNERS = "individuals"
-"""First cell of DeepLabCut's header row that is there in projects of several animals."""
-_ALONE = "single"
-"""DeepLabCut's individual of points that belong to none."""
-_LIKELY = 0.6
-"""A point that DeepLabCut calls less likely than this is left out."""
+_TIMES = ("t", "time", "time_s")  # columns of times in s, in place of `frame`
+_OWNERS = "individuals"  # first cell of DeepLabCut's header row that is there in projects of several animals
+_ALONE = "single"  # DeepLabCut's individual of points that belong to none
+_LIKELY = 0.6  # a point that DeepLabCut calls less likely than this is left out
 _MIDDLES = ("centre", "center", "body", "middle")
 _FRONTS = ("nose", "front")
 _REARS = ("rear", "tail_base", "back")
-_POINT_ERROR = 0.5
-"""Standard error that is taken for a point, pixels."""
+_POINT_ERROR = 0.5  # standard error that is taken for a point, pixels
 
 
 def read_track(
@@ -50,12 +45,10 @@ def read_track(
     time_of: Callable[[Samples], Samples],
     frame_of: Callable[[Samples], Samples] | None = None,
 ) -> Track:
-    """A track from another program's table, in pixels of the stored picture from its upper left corner.
-
-    trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a line
-    with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts, coords) and
-    the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
-    """
+    """A track from another program's table, in pixels of the stored picture from its upper left corner."""
+    # trackpy: columns `x`, `y`, `frame` and, with one particle, `particle`. Tracker: columns `t`, `x`, `y`, below a
+    # line with the track's name. DeepLabCut: header rows (scorer, individuals of which one has points, bodyparts,
+    # coords) and the points `nose` and `rear`, or `centre`. Body and tail angles are not in them.
     path = Path(path)
     first = re.split(r"[,;\t]", read_text(path, _WHAT, LARGEST_TABLE).lstrip(), maxsplit=1)[0].strip().lower()
     size = ruled.stored_size
@@ -86,7 +79,6 @@ def read_track(
 
 
 def _check_inside(rows: Sequence[TableRow], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
-    """Refuse points from outside the picture."""
     for name, values, pixels in zip(names, points.T, size, strict=True):
         for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
             raise rows[int(place)].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")
@@ -206,12 +198,9 @@ def _frames(rows: Sequence[TableRow], coordinates: Sequence[str]) -> Samples:
     return np.array(found)
 
 
-_BESIDE = 0.5
-"""Distance from the robot's axis from which on a track is not the robot's, body lengths."""
-_OTHERWISE = 0.25
-"""Relative difference of two velocities in the picture from which on they are not of one robot."""
-_SMALL = 5.0
-"""Way of the robot below which velocities are not compared, pixels."""
+_BESIDE = 0.5  # distance from the robot's axis from which on a track is not the robot's, body lengths
+_OTHERWISE = 0.25  # relative difference of two velocities in the picture from which on they are not of one robot
+_SMALL = 5.0  # way of the robot below which velocities are not compared, pixels
 _PIXELS = "pixels of the stored picture from its upper left corner, y downwards, of the robot"
 
 

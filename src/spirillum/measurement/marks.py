@@ -23,31 +23,23 @@ _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
 MARK_COLUMNS = ("video", "frame", "time_s", *_READINGS)
 """Columns of a table of manual readings; required are `frame` or `time_s`, and one reading."""
-_NEAR = 0.51
-"""Largest time between a reading and its frame, over the time between frames."""
-_CLICK_ERROR = 1.0
-"""Assumed standard error of a mouse click, pixels."""
+_NEAR = 0.51  # largest time between a reading and its frame, over the time between frames
+_CLICK_ERROR = 1.0  # assumed standard error of a mouse click, pixels
 _LENGTH_ERROR = 0.5e-3
 """Assumed standard error of a length read by eye where the scale is unknown, m: a quarter of the 2 mm marker spacing of
 the paper's ruler."""
-_APART = 0.75
-"""Largest difference between the time of a row and that of its frame, s: times may be rounded to seconds."""
-_ANGLE_ERROR = math.radians(5.0)
-"""Assumed standard error of an angle read by eye, rad."""
-EDGE = 0.5
-"""Distance of the border from the centres of the outermost pixels, pixels; centres have integer coordinates."""
-_LATER = 1.02
-"""Latest time of a reading over the duration of the video, which is known to about a frame."""
+_APART = 0.75  # largest difference between the time of a row and that of its frame, s: times may be rounded to seconds
+_ANGLE_ERROR = math.radians(5.0)  # assumed standard error of an angle read by eye, rad
+EDGE = 0.5  #: Distance of the border from the centres of the outermost pixels, pixels; centres have integer coordinates
+_LATER = 1.02  # latest time of a reading over the duration of the video, which is known to about a frame
 
 
 @dataclass(frozen=True)
 class Ruled:
     """The map from pixels to lengths."""
 
-    scale: Scale
-    """Scale of lengths."""
-    size: tuple[int, int]
-    """Width and height of the picture, pixels."""
+    scale: Scale  #: Scale of lengths.
+    size: tuple[int, int]  #: Width and height of the picture, pixels.
     points: Callable[[Samples], Samples] = field(repr=False)
     """Maps pixels (k, 2) to (x, y) at the height of the axis, m, (k, 2)."""
     stretch: tuple[float, float] = (1.0, 1.0)
@@ -79,41 +71,29 @@ class Marks:
     """Manual readings of one video, in SI units and pixels; NaN where nothing was read."""
 
     path: Path
-    frame: Samples
-    """Frame numbers, (k,)."""
-    time: Samples
-    """Time in the video, s, (k,)."""
-    pixels: Samples
-    """Pixel of the body's mid-length, (k, 2)."""
-    position: Samples
-    """Position (x, y) where it was read as a length, m, (k, 2)."""
-    body_angle: Samples
-    """rad, (k,)."""
-    tail_phase: Samples
-    """rad, (k,)."""
-    lines: tuple[int, ...] = ()
-    """Line number of each reading in the file."""
-    counted: tuple[str, ...] = ()
-    """Columns whose angles were read modulo 2 pi and have been unwrapped."""
+    frame: Samples  #: Frame numbers, (k,).
+    time: Samples  #: Time in the video, s, (k,).
+    pixels: Samples  #: Pixel of the body's mid-length, (k, 2).
+    position: Samples  #: Position (x, y) where it was read as a length, m, (k, 2).
+    body_angle: Samples  #: rad, (k,).
+    tail_phase: Samples  #: rad, (k,).
+    lines: tuple[int, ...] = ()  #: Line number of each reading in the file.
+    counted: tuple[str, ...] = ()  #: Columns whose angles were read modulo 2 pi and have been unwrapped.
 
 
 def read_marks(path: str | Path) -> dict[str, Marks]:
     """Read a CSV table of manual readings by video; angles within one turn are unwrapped."""
     table = read_readings(path, _WHAT)
-    _check_columns(table)
-    rows: dict[str, list[TableRow]] = {}
-    place = table.column("video")
-    for row in table.rows():
-        rows.setdefault("" if place is None else row.text(place), []).append(row)
-    return {video: _marks(table, chosen) for video, chosen in rows.items()}
-
-
-def _check_columns(table: Table) -> None:
     check_known(table, MARK_COLUMNS)
     if not {"frame", "time_s"} & set(table.header):
         raise InputError(f"{table.path}: neither column 'frame' nor 'time_s' is there; allowed: at least one of them")
     if not set(_READINGS) & set(table.header):
         raise InputError(f"{table.path} holds no readings; allowed: at least one column of {', '.join(_READINGS)}")
+    rows: dict[str, list[TableRow]] = {}
+    place = table.column("video")
+    for row in table.rows():
+        rows.setdefault("" if place is None else row.text(place), []).append(row)
+    return {video: _marks(table, chosen) for video, chosen in rows.items()}
 
 
 def _marks(table: Table, rows: list[TableRow]) -> Marks:
@@ -269,10 +249,8 @@ def _unwrapped_flag(marks: Marks) -> tuple[Flag, ...]:
 
 
 def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
-    """A track in which manual readings replace the automatic ones.
-
-    To angles the multiple of 2 pi is added that brings them nearest to the track.
-    """
+    """A track in which manual readings replace the automatic ones."""
+    # To angles the multiple of 2 pi is added that brings them nearest to the track.
     index = _frames_of(track, marks)
     frames = "1 frame carries a reading" if index.size == 1 else f"{index.size} frames carry readings"
     position, body, tail = track.position.copy(), track.body_angle.copy(), track.tail_phase.copy()
@@ -302,7 +280,6 @@ def frames_read(track: Track, marks: Marks) -> np.ndarray:
 
 
 def _frames_of(track: Track, marks: Marks) -> np.ndarray:
-    """Index into the track of each reading."""
     step = float(np.median(np.diff(track.time))) if track.time.size > 1 else np.inf
     found = np.empty(marks.frame.size, dtype=np.int64)
     for number, (frame, time) in enumerate(zip(marks.frame, marks.time, strict=True)):
@@ -330,20 +307,15 @@ def _nearest_turn(time: Samples, angle: Samples, index: np.ndarray, by_hand: Sam
 class Untracked:
     """Scale and times of a video without tracking."""
 
-    ruled: Ruled | None
-    """Turns pixels into lengths; None where nothing gives a scale."""
+    ruled: Ruled | None  #: Turns pixels into lengths; None where nothing gives a scale.
     time_of: Callable[[Samples], Samples] | None = field(repr=False)
     """Maps frame numbers to times, s; None where no times are known."""
-    words: str = ""
-    """Metadata of the video."""
-    duration: float | None = None
-    """Length of the video, s; None where it is not known."""
-    seen: bool = True
-    """Whether there was a video to open."""
+    words: str = ""  #: Metadata of the video.
+    duration: float | None = None  #: Length of the video, s; None where it is not known.
+    seen: bool = True  #: Whether there was a video to open.
     frame_of: Callable[[Samples], Samples] | None = field(default=None, repr=False)
     """Takes times, s, to numbers of frames; NaN where none was taken."""
-    flags: Sequence[Flag] = ()
-    """What was odd about the video while it was read."""
+    flags: Sequence[Flag] = ()  #: What was odd about the video while it was read.
 
 
 def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Untracked:

@@ -47,14 +47,10 @@ _LENGTHS = ("forward_velocity", "lateral_position")
 class Summary:
     """Means over trials."""
 
-    quantities: Mapping[str, Measured]
-    """Means by the names of `MEASURED`."""
-    counts: Mapping[str, int]
-    """Number of trials that entered each mean."""
-    trials: int
-    """Number of all trials."""
-    scale_uncertainty: float
-    """Relative standard uncertainty of lengths, common to all trials."""
+    quantities: Mapping[str, Measured]  #: Means by the names of `MEASURED`.
+    counts: Mapping[str, int]  #: Number of trials that entered each mean.
+    trials: int  #: Number of all trials.
+    scale_uncertainty: float  #: Relative standard uncertainty of lengths, common to all trials.
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -63,10 +59,8 @@ class Summary:
 
 
 def summary_of(trials: Sequence[Trial]) -> Summary:
-    """Means over trials with Student's t intervals; that of a single trial is its own.
-
-    The uncertainty of the scale is common to all trials: averaging does not reduce it.
-    """
+    """Means over trials with Student's t intervals; that of a single trial is its own."""
+    # The uncertainty of the scale is common to all trials: averaging does not reduce it.
     shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
     quantities, counts = {}, {}
     for name in MEASURED:
@@ -122,30 +116,21 @@ def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
 
 
 Progress = Callable[[str, int, int], None]
-TABLE = "observations.csv"
-"""Name of the table that a measurement writes."""
+TABLE = "observations.csv"  #: Name of the table that a measurement writes.
 
 
 @dataclass(frozen=True, repr=False)
 class Measurement(DisplayMixin):
     """What was measured of a robot in one or several trials."""
 
-    trials: tuple[Trial, ...]
-    """The trials, in the order of the videos."""
-    summary: Summary
-    """Means over trials."""
-    robot: Robot = field(repr=False)
-    """The robot."""
-    setup: str
-    """The setup file."""
-    failures: tuple[tuple[str, str], ...] = ()
-    """Videos that could not be measured, each with a sentence."""
-    files: tuple[str, ...] = ()
-    """Files that were written."""
-    interrupted: bool = False
-    """Whether it was interrupted before the last video."""
-    left: tuple[str, ...] = ()
-    """Datasets of other measurements in the same folder."""
+    trials: tuple[Trial, ...]  #: The trials, in the order of the videos.
+    summary: Summary  #: Means over trials.
+    robot: Robot = field(repr=False)  #: The robot.
+    setup: str  #: The setup file.
+    failures: tuple[tuple[str, str], ...] = ()  #: Videos that could not be measured, each with a sentence.
+    files: tuple[str, ...] = ()  #: Files that were written.
+    interrupted: bool = False  #: Whether it was interrupted before the last video.
+    left: tuple[str, ...] = ()  #: Datasets of other measurements in the same folder.
 
     @property
     def warnings(self) -> tuple[Note, ...]:
@@ -210,22 +195,14 @@ def _notes(trial: Trial) -> list[Note]:
 class MeasurementRequest(NamedTuple):
     """Videos of one robot with one setup, checked: one trial each."""
 
-    videos: tuple[Path, ...]
-    """Videos or folders of images."""
-    names: tuple[str, ...]
-    """Names of the trials."""
-    readings: tuple[Marks | None, ...]
-    """Readings by hand of each video."""
-    setup: Setup
-    """The setup, with the requested times."""
-    setup_file: str
-    """The setup file."""
-    robot: Robot
-    """The robot."""
-    track: Path | None
-    """Table of positions that another program has found."""
-    tracking: bool
-    """Whether the robot is looked for in the videos."""
+    videos: tuple[Path, ...]  #: Videos or folders of images.
+    names: tuple[str, ...]  #: Names of the trials.
+    readings: tuple[Marks | None, ...]  #: Readings by hand of each video.
+    setup: Setup  #: The setup, with the requested times.
+    setup_file: str  #: The setup file.
+    robot: Robot  #: The robot.
+    track: Path | None  #: Table of positions that another program has found.
+    tracking: bool  #: Whether the robot is looked for in the videos.
 
     @property
     def folder(self) -> Path:
@@ -376,7 +353,6 @@ def _clash(one: str, other: str) -> bool:
 def _readings(
     paths: Sequence[Path], marks: str | Path | None, track: str | Path | None, *, tracking: bool
 ) -> list[Marks | None]:
-    """The readings by hand of each video."""
     if track is not None and len(paths) != 1:
         raise InputError(f"track = {track} with {len(paths)} videos; allowed: one video")
     if marks is None:

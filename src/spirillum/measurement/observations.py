@@ -51,26 +51,20 @@ _SMALLEST_RATE = 1e-6 * Hz
 class ObservationRow:
     """One row: a trial, or a mean over trials, SI."""
 
-    row: int
-    """Line number in the file."""
+    row: int  #: Line number in the file.
     robot: str
     channel_diameter: float
     wavelength: float
     amplitude: float
-    forward_velocity: float
-    """m/s; NaN where not measured, as all that follow."""
+    forward_velocity: float  #: m/s; NaN where not measured, as all that follow.
     tail_rate: float
     body_rate: float
-    motor_rate: float
-    """Observed, else tail less body rate."""
-    trials: int
-    """1 for a trial, more for a mean."""
+    motor_rate: float  #: Observed, else tail less body rate.
+    trials: int  #: 1 for a trial, more for a mean.
     intervals: tuple[float, float, float, float]
     """Half widths of 95 % intervals in the same order: of a trial, or of a mean over trials."""
-    trial: str = ""
-    """Number or name of the trial, where the file gives one."""
-    motor_derived: bool = False
-    """Whether the motor's rate was not observed itself."""
+    trial: str = ""  #: Number or name of the trial, where the file gives one.
+    motor_derived: bool = False  #: Whether the motor's rate was not observed itself.
 
     @property
     def tail(self) -> tuple[float, float, float]:
@@ -144,7 +138,9 @@ def _observation(row: TableRow) -> ObservationRow:
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
-    _check_trial(row)
+    number = number_in(row.text("trial"))
+    if not math.isnan(number) and not number.is_integer():
+        raise row.error("trial", row.text("trial"), "a whole number, or a name")
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
     if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
@@ -164,13 +160,6 @@ def _observation(row: TableRow) -> ObservationRow:
         trial=row.text("trial"),
         motor_derived=motor_derived,
     )
-
-
-def _check_trial(row: TableRow) -> None:
-    """A trial has a name or a whole number: a fraction has slipped in from another column."""
-    number = number_in(row.text("trial"))
-    if not math.isnan(number) and not number.is_integer():
-        raise row.error("trial", row.text("trial"), "a whole number, or a name")
 
 
 def _number(row: TableRow, name: str, factor: float, least: float | None = None) -> float:

@@ -26,36 +26,26 @@ from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.video.frames import Video, open_video
 
 Confidence = Literal["clear", "doubtful", "not found"]
-_OUTER = 1.1
-"""Outer over inner diameter of a glass tube, about; assumed."""
-_USUAL_RATE = 30.0
-"""Frames a second at which a folder of images is looked at until its rate is known."""
+_OUTER = 1.1  # outer over inner diameter of a glass tube, about; assumed
+_USUAL_RATE = 30.0  # frames a second at which a folder of images is looked at until its rate is known
 _SPACING = (0.8, 1.4)
 """A ruler's spacing over that from the robot's size at the robot's own depth, where nothing is wrong: the ruler may be
 farther away, or a little nearer. Assumed.
 """
-_AT_REST = 0.2
-"""Speed below which a robot counts as resting, pixels a second."""
+_AT_REST = 0.2  # speed below which a robot counts as resting, pixels a second
 
 
 @dataclass(frozen=True)
 class Finding:
     """One finding from a video."""
 
-    name: str
-    """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `appearance`, `stripes` or `walls`."""
-    value: Any
-    """What it is; None where it was not found."""
-    unit: str
-    """Its unit; `1` for what has none, empty for words."""
-    confidence: Confidence
-    """`clear`, `doubtful` or `not found`."""
-    sentence: str
-    """What was seen, and what that rests on."""
-    field: str = ""
-    """Field of the setup that it fills in; empty where there is none."""
-    pixels: tuple[tuple[tuple[float, float], ...], ...] = ()
-    """For drawing: lines through pixels (u, v)."""
+    name: str  #: `frame_rate`, `ruler`, `robot`, `direction`, `travel`, `appearance`, `stripes` or `walls`.
+    value: Any  #: What it is; None where it was not found.
+    unit: str  #: Its unit; `1` for what has none, empty for words.
+    confidence: Confidence  #: `clear`, `doubtful` or `not found`.
+    sentence: str  #: What was seen, and what that rests on.
+    field: str = ""  #: Field of the setup that it fills in; empty where there is none.
+    pixels: tuple[tuple[tuple[float, float], ...], ...] = ()  #: For drawing: lines through pixels (u, v).
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -70,20 +60,13 @@ class Finding:
 class Proposal(DisplayMixin):
     """A setup as far as a video determines it."""
 
-    film: str
-    """Name of the video."""
-    size: tuple[int, int]
-    """Width and height of its pictures, pixels."""
-    robot: str
-    """The robot that was looked for: a preset's name or a file."""
-    findings: tuple[Finding, ...]
-    """What was found."""
-    to_fill: tuple[tuple[str, str], ...]
-    """Fields that only the experimenter knows, each with what it means."""
-    text: str
-    """The setup file."""
-    file: str | None = None
-    """Where it was written; None: nowhere."""
+    film: str  #: Name of the video.
+    size: tuple[int, int]  #: Width and height of its pictures, pixels.
+    robot: str  #: The robot that was looked for: a preset's name or a file.
+    findings: tuple[Finding, ...]  #: What was found.
+    to_fill: tuple[tuple[str, str], ...]  #: Fields that only the experimenter knows, each with what it means.
+    text: str  #: The setup file.
+    file: str | None = None  #: Where it was written; None: nowhere.
     warnings: tuple[Note, ...] = ()
 
     def found(self, name: str) -> Finding:

@@ -15,18 +15,13 @@ from spirillum.notes import Note
 from spirillum.robust import mad_scale
 from spirillum.units import Hz
 
-_TYPICAL = 0.03
-"""Typical error of a motor's rate against tail less body rate where no row states one, relative."""
+_TYPICAL = 0.03  # typical error of a motor's rate against tail less body rate where no row states one, relative
 _ASSUMED_WIDTH, _STATED_WIDTH = 1.0, 0.5
 """Standard deviation of the logarithm of the true error over the typical one, and over the stated one."""
-_GAIN = 0.01
-"""Standard deviation of an error that all motor rates of a file share, as of two clocks, relative."""
-_DECISIVE = 1e3
-"""Likelihood ratio from which on the convention of a file is wrong."""
-_DOUBTFUL = 10.0
-"""Likelihood ratio from which on the convention is doubted."""
-_BEYOND = 6.0
-"""Standard errors beyond which a single value is not noise."""
+_GAIN = 0.01  # standard deviation of an error that all motor rates of a file share, as of two clocks, relative
+_DECISIVE = 1e3  # likelihood ratio from which on the convention of a file is wrong
+_DOUBTFUL = 10.0  # likelihood ratio from which on the convention is doubted
+_BEYOND = 6.0  # standard errors beyond which a single value is not noise
 _PRIOR_ERROR, _PRIOR_ROWS = 0.07, 4
 """Error that a row is taken to have before the scatter of the file is known, relative, and its weight in rows."""
 _AGREE, _CONTRADICT = 0.2, 0.8
@@ -37,13 +32,11 @@ _MOST_NAMED = 6
 class RateTriples(NamedTuple):
     """Rows of a file that hold all three rates, rad/s, each (n,)."""
 
-    rows: Sequence[int]
-    """Line numbers."""
+    rows: Sequence[int]  #: Line numbers.
     tail: Samples
     body: Samples
     motor: Samples
-    error: Samples
-    """Stated standard error of motor less tail plus body rate; NaN where none is stated."""
+    error: Samples  #: Stated standard error of motor less tail plus body rate; NaN where none is stated.
 
 
 def rows_in_words(rows: Iterable[int]) -> str:
@@ -86,11 +79,9 @@ def convention_doubt(rates: RateTriples) -> tuple[Note, ...]:
 
 
 def convention_evidence(rates: RateTriples) -> float:
-    """Logarithm of the likelihood ratio of tail plus body rate to tail less body rate as the motor's.
-
-    Errors are normal, relative to the motor's rate. Their standard deviation is the stated one, or `_TYPICAL`, times a
-    factor common to all rows, with a log-normal prior; a small error of gain is common to all rows, too.
-    """
+    """Logarithm of the likelihood ratio of tail plus body rate to tail less body rate as the motor's."""
+    # Errors are normal, relative to the motor's rate. Their standard deviation is the stated one, or `_TYPICAL`, times
+    # a factor common to all rows, with a log-normal prior; a small error of gain is common to all rows, too.
     size = 0.5 * (np.abs(rates.motor) + np.abs(rates.tail))
     stated = rates.error / size
     known = np.isfinite(stated) & (stated > 0)
@@ -128,16 +119,8 @@ def _check_contradictions(path: str | Path, rates: RateTriples) -> None:
 
 
 def wrong_signs(values: Samples, expected: float, stated: Samples, groups: Sequence[Hashable]) -> np.ndarray:
-    """Indices of values whose sign differs from the expected one by more than their error.
-
-    The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
-
-    Args:
-        values: (n,); NaN where nothing was measured.
-        expected: sign that they should have.
-        stated: standard errors, (n,); NaN where not stated.
-        groups: what distinguishes repeated trials from others, n of them.
-    """
+    """Indices of values whose sign differs from the expected one by more than their error."""
+    # The error is the stated one, or the scatter of magnitudes within groups; a value without either is exact.
     opposite = np.sign(values) * expected < 0
     error = np.where(np.isfinite(stated), stated, _scatter_of_magnitudes(values, groups))
     return np.flatnonzero(opposite & ~(np.abs(values) <= _BEYOND * error))

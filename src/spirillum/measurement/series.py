@@ -95,10 +95,8 @@ def series_of(trial: Trial, robot: Robot) -> Labelled:
 
 
 def movement_of(trial: Trial, robot: Robot) -> Labelled:
-    """The track as a poses data set of the `movement` project: one individual with two keypoints, in pixels.
-
-    Dimensions are time, space, keypoints and individuals; variables `position` and `confidence`; x is u, y is v.
-    """
+    """The track as a poses data set of the `movement` project: one individual with two keypoints, in pixels."""
+    # Dimensions are time, space, keypoints and individuals; variables `position` and `confidence`; x is u, y is v.
     track = trial.track
     points = track.picture.reshape(-1, 2, 2)  # frame, point, coordinate
     position = np.swapaxes(points, 1, 2)[..., None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
@@ -25,14 +26,7 @@ _STEP = 1e-3
 
 
 def apparent_distance(height: float, camera: float, surface: float | None, index: float) -> float:
-    """Distance in air at which a point would look as large: (H - S) + (S - z)/n below a surface at S.
-
-    Args:
-        height: height z of the point, m.
-        camera: height H of the lens, m.
-        surface: height S of the surface, m; None: nothing refracts.
-        index: refractive index n below it.
-    """
+    """Distance in air at which a point would look as large: (H - S) + (S - z)/n below a surface at S."""
     if surface is None or height >= surface:
         return camera - height
     return camera - surface + (surface - height) / index
@@ -75,60 +69,12 @@ def depth_shares(setup: Setup) -> dict[str, float]:
     return found
 
 
-_HEAD = """\
-# A setup: what is known of camera, tank, ruler and robot. Heights count from the reference plane: the tank's floor
-# (view "side": its far wall). Every *_uncertainty is a standard uncertainty; 0 claims that the number is exact.
-"""
-OPEN = "FILL IN"
-"""Placeholder of a number that only the experimenter knows: no file with it is valid."""
+OPEN = "FILL IN"  #: Placeholder of a number that only the experimenter knows: no file with it is valid.
 _YOURS = "CHECK: a usual standard uncertainty, not yours"
-_SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
-    "": (
-        ("# start", '"2 s"', "time in the video from which on to measure, as when the robot has started up"),
-        ("# end", '"20 s"', ""),
-    ),
-    "camera": (
-        ("view", '"top"', '"top": from above; "side": level, at right angles to the channel'),
-        ("height", '"210 mm"', "of the lens above the reference plane"),
-        ("height_uncertainty", '"2 mm"', ""),
-        ("# frames_per_second", "30.0", "for a folder of images, or instead of a video's own time stamps"),
-        ("# pixel_aspect_ratio", "1.0", "width of a stored pixel over its height, if the video states it wrongly"),
-    ),
-    "# camera.checkerboard": (
-        ("# images", '"checkerboard"', "pictures of a checkerboard in air, a folder beside this file"),
-        ("# columns", "9", "inner corners"),
-        ("# rows", "6", ""),
-        ("# square", '"5 mm"', ""),
-    ),
-    "tank": (
-        ("surface", '"60 mm"', "height of the flat surface between air and oil; without one delete all of [tank]"),
-        ("surface_uncertainty", '"1 mm"', ""),
-        ("index", "1.40", "refractive index of the oil"),
-        ("index_uncertainty", "0.005", ""),
-    ),
-    "markers": (
-        ("spacing", '"2 mm"', "from each line of the ruler to the next"),
-        ("height", '"0 mm"', "of the ruler"),
-        ("height_uncertainty", '"0.5 mm"', ""),
-        ("# length_per_pixel", '"0.25 mm"', "instead of a ruler: at the height of the robot's axis"),
-        ("# length_per_pixel_uncertainty", '"0.002 mm"', ""),
-    ),
-    "robot": (
-        ("file", '"biorob2012-wide"', "a preset, or a robot file beside this one"),
-        ("axis_height", '"13 mm"', "of the robot's axis"),
-        ("axis_height_uncertainty", '"1 mm"', ""),
-        ("direction", '"right"', 'where in the picture the nose points: "right", "left", "up" or "down"'),
-        ("# appearance", '"glass"', 'of the cover: "opaque", "glass" or "unknown"'),
-        ("# stripes", '["red", "yellow"]', "colours in their order, if not those of the robot file"),
-    ),
-    "# region": (
-        ("# left", "0", "part of the picture to look at, pixels"),
-        ("# top", "100", ""),
-        ("# width", "640", ""),
-        ("# height", "280", ""),
-    ),
-}
-"""Sections of a setup file; each field with an example and a comment. What starts with # is left out until needed."""
+_TEMPLATE = Path(__file__).with_name("setup_template.toml")
+"""A setup file whose fields have an example and a comment. What is commented out is left out until needed."""
+_SECTION = re.compile(r"(?P<off># )?\[(?P<name>[\w.]+)\]")
+_FIELD = re.compile(r"(?P<off># )?(?P<name>\w+) = (?P<value>.*?)(?:\s+# (?P<comment>.*))?")
 KNOWN = {
     "camera.view": "from above, or level from the side",
     "camera.height": "height of the lens above the reference plane",
@@ -148,31 +94,29 @@ def toml_value(value: str | float | list[str]) -> str:
 
 
 def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: Collection[str] = ()) -> str:
-    """Text of a setup file.
-
-    Args:
-        found: fields by their dotted names, each with its value as it stands in TOML and a comment; others are left
-            out. None: every field has an example.
-        open_fields: fields that are left to be filled in: the file is not valid until they are. Their uncertainties
-            are those of the example.
-    """
-    lines = [_HEAD.rstrip()]
-    for section, fields in _SECTIONS.items():
-        if section:
-            lines += ["", f"# [{section[2:]}]" if section.startswith("#") else f"[{section}]"]
-        for field, example, words in fields:
-            name, value, comment = field, example, words
-            dotted = f"{section.lstrip('# ')}.{field.lstrip('# ')}".lstrip(".")
-            if found is not None and not section.startswith("#"):
-                if dotted in found:
-                    name, (value, comment) = field.lstrip("# "), found[dotted]
-                elif dotted in open_fields:
-                    value, comment = f'"{OPEN}"', words
-                elif dotted.removesuffix("_uncertainty") in open_fields:
-                    comment = _YOURS
-                elif section and not field.startswith("#"):
-                    name = f"# {field}"
-            lines.append(f"{f'{name} = {value}':<38}{f'# {comment}' if comment else ''}".rstrip())
+    """The example, or a setup file with fields found (value in TOML, comment) and others left to be filled in."""
+    text = _TEMPLATE.read_text(encoding="utf-8")
+    if found is None:
+        return text
+    lines, section, off = [], "", False
+    for line in text.splitlines():
+        if head := _SECTION.fullmatch(line):
+            section, off = f"{head['name']}.", head["off"] is not None
+        field = _FIELD.fullmatch(line)
+        if field is None or off:
+            lines.append(line)
+            continue
+        name, value, comment = f"{field['off'] or ''}{field['name']}", field["value"], field["comment"]
+        dotted = section + field["name"]
+        if dotted in found:
+            name, (value, comment) = field["name"], found[dotted]
+        elif dotted in open_fields:
+            value = f'"{OPEN}"'
+        elif dotted.removesuffix("_uncertainty") in open_fields:
+            comment = _YOURS
+        elif section and not field["off"]:
+            name = f"# {name}"
+        lines.append(f"{f'{name} = {value}':<38}{f'# {comment}' if comment else ''}".rstrip())
     return "\n".join(lines) + "\n"
 
 
@@ -243,10 +187,8 @@ def setup_remarks(setup: Setup, *, confirmed: bool = False) -> list[Note]:
 
 
 def _as_in_example(setup: Setup) -> list[str]:
-    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names.
-
-    A value without an uncertainty, such as the spacing of a ruler, may well be the one of the example.
-    """
+    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names."""
+    # A value without an uncertainty, such as the spacing of a ruler, may well be the one of the example.
     example, fields = Setup.model_validate(tomllib.loads(setup_text())), [name.split(".") for name in KNOWN]
 
     def held(one: Setup, part: str, key: str) -> tuple[float | None, float]:
@@ -284,8 +226,7 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     return seen, (*video.flags, *learnt.sight.flags, *size_flags, *learnt.flags, *moved)
 
 
-Fields = Mapping[str, Any]
-"""Texts with their unit, numbers and lists of names by dotted field."""
+Fields = Mapping[str, Any]  #: Texts with their unit, numbers and lists of names by dotted field.
 
 
 def setup_file(fields: Fields) -> str:

@@ -15,19 +15,15 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.units import for_people, shown_in
 
-NORMAL = 1.959964
-"""Half width of a 95 % interval over its standard deviation, of a normal distribution."""
+NORMAL = 1.959964  #: Half width of a 95 % interval over its standard deviation, of a normal distribution.
 
 
 class Mean(NamedTuple):
     """Mean of a few trials with its confidence interval."""
 
-    value: float
-    """Arithmetic mean; NaN without trials."""
-    half_width: float
-    """Half width of the interval; NaN with fewer than two trials."""
-    trials: int
-    """Number of trials."""
+    value: float  #: Arithmetic mean; NaN without trials.
+    half_width: float  #: Half width of the interval; NaN with fewer than two trials.
+    trials: int  #: Number of trials.
 
 
 def student_t_quantile(share: float, free: float) -> float:
@@ -67,47 +63,31 @@ STRIPE_ERROR = math.radians(0.2)
 """Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
 PHASE_ERROR = math.radians(1.0)
 """Least expected amplitude of errors of the tail's phase that repeat once or twice a turn, rad."""
-DRIFT_PIXELS = 0.01
-"""Drift of the position error from end to end, by light and perspective, pixels."""
-DRIFT_BARE = 0.1
-"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos."""
+DRIFT_PIXELS = 0.01  #: Drift of the position error from end to end, by light and perspective, pixels.
+DRIFT_BARE = 0.1  #: Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos.
 DRIFT_ANGLE = math.radians(0.1)
 """Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
 POSITION_ERROR = 0.25
 """Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
-HEADING_ERROR = math.radians(0.2)
-"""Systematic standard error of the heading of a body that is `LONG` pixels long, rad."""
-LONG = 100.0
-"""Length of a body whose heading has that error, pixels."""
+HEADING_ERROR = math.radians(0.2)  #: Systematic standard error of the heading of a body that is `LONG` pixels long, rad
+LONG = 100.0  #: Length of a body whose heading has that error, pixels.
 
 
-_MOST_DIGITS = 7
-"""Digits of a value at most, however narrow its interval is."""
+_MOST_DIGITS = 7  # digits of a value at most, however narrow its interval is
 _MOST_DECIMALS = 9
 
 
 class ShownNumber(NamedTuple):
     """A number with its interval as texts; ``-`` for what is not there."""
 
-    value: str
-    """The value."""
-    low: str
-    """Lower end of its interval."""
-    high: str
-    """Upper end."""
-    unit: str
-    """Unit of all three; empty where there is no value."""
+    value: str  #: The value.
+    low: str  #: Lower end of its interval.
+    high: str  #: Upper end.
+    unit: str  #: Unit of all three; empty where there is no value.
 
 
 def shown(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:
-    """A number down to the second digit of its interval's half width, and the interval's ends likewise.
-
-    Args:
-        value: in SI; None or NaN where there is none. Without an interval it has four digits.
-        low: lower end of the interval; None or NaN where there is none.
-        high: upper end.
-        unit: SI unit.
-    """
+    """A number, SI, down to the second digit of its interval's half width, or in four digits, and the ends likewise."""
     if value is None or not math.isfinite(value):
         return ShownNumber("-", "-", "-", "")
     read = for_people(unit)

@@ -33,10 +33,8 @@ from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.track import Track
 
-LEVEL = 0.95
-"""Confidence level of all intervals."""
-RATE_NAMES = (*SEEN, "motor_rotation_rate")
-"""Quantities that are slopes of a series."""
+LEVEL = 0.95  #: Confidence level of all intervals.
+RATE_NAMES = (*SEEN, "motor_rotation_rate")  #: Quantities that are slopes of a series.
 WOBBLES = (
     "lateral_wobble_at_tail_rate",
     "lateral_wobble_at_body_rate",
@@ -46,16 +44,11 @@ WOBBLES = (
 """Amplitudes of lateral motion and heading at the rotation rates of tail and body."""
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
 """All quantities of a trial, and of a summary over trials."""
-_FEW_TURNS = 2.0
-"""Fewest turns over which a wobble is fitted."""
-_DEGREE = 5
-"""Degree of the polynomial that smooths an angle."""
-_FEWEST = 12
-"""Fewest frames for that polynomial."""
-_UNSTEADY = 0.5
-"""Largest root mean square residual of that polynomial, rad."""
-_TENTHS = 10
-"""Parts of a track whose mean residuals estimate slow errors."""
+_FEW_TURNS = 2.0  # fewest turns over which a wobble is fitted
+_DEGREE = 5  # degree of the polynomial that smooths an angle
+_FEWEST = 12  # fewest frames for that polynomial
+_UNSTEADY = 0.5  # largest root mean square residual of that polynomial, rad
+_TENTHS = 10  # parts of a track whose mean residuals estimate slow errors
 _TOO_FEW = "it was read on too few frames"
 
 
@@ -91,16 +84,12 @@ class Measured:
 class Trial:
     """The measurement of one video."""
 
-    track: Track = field(repr=False)
-    """Pose, body angle and tail phase on every frame."""
-    quantities: Mapping[str, Measured]
-    """Measured quantities by the names of `MEASURED`."""
+    track: Track = field(repr=False)  #: Pose, body angle and tail phase on every frame.
+    quantities: Mapping[str, Measured]  #: Measured quantities by the names of `MEASURED`.
     fits: Mapping[str, Rate] = field(repr=False)
     """Fitted lines by the names of `RATE_NAMES`, including those that a flag invalidates."""
-    flags: tuple[Flag, ...]
-    """Warnings about the trial."""
-    name: str = ""
-    """Name of the trial and of its files."""
+    flags: tuple[Flag, ...]  #: Warnings about the trial.
+    name: str = ""  #: Name of the trial and of its files.
 
     @property
     def synthetic(self) -> bool:
@@ -238,10 +227,8 @@ def _motor_rate(track: Track, body: Rate, tail: Rate, periodic: list[PeriodicErr
 
 
 def _smooth(time: Samples, angle: Samples) -> Samples:
-    """A smoothed angle: a regressor with its own noise would explain that noise.
-
-    A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
-    """
+    """A smoothed angle: a regressor with its own noise would explain that noise."""
+    # A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
     known = np.isfinite(angle) & ~outlying_frames(time, angle)
     if known.sum() < _FEWEST:
         return np.zeros(angle.shape)

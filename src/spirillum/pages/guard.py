@@ -20,10 +20,8 @@ from typing import Any
 
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-_MOST = 64
-"""Connections without a key; for another one the oldest is closed."""
-_PATIENCE = 10.0
-"""Time after which a connection without a key is closed, s."""
+_MOST = 64  # connections without a key; for another one the oldest is closed
+_PATIENCE = 10.0  # time after which a connection without a key is closed, s
 _Address = tuple[str, int]
 
 
@@ -83,8 +81,7 @@ HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
 }
 """Headers of every response."""
-LARGEST_MESSAGE = 4096
-"""Bytes of a message from a client."""
+LARGEST_MESSAGE = 4096  #: Bytes of a message from a client.
 _KEY_BYTES = 24
 
 

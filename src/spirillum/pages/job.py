@@ -48,8 +48,7 @@ async def run_in_background(work: Callable[..., _Answer], *arguments: Any) -> _A
     return await future
 
 
-Tell = Callable[..., None]
-"""Callback of progress messages, by name."""
+Tell = Callable[..., None]  #: Callback of progress messages, by name.
 
 
 class BackgroundJob:
@@ -99,10 +98,8 @@ class BackgroundJob:
 
 
 def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
-    """Run the task of standard input and report its progress.
-
-    The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
-    """
+    """Run the task of standard input and report its progress."""
+    # The process ends with 2 where the input was wrong or asks for too much, and with 1 after a fault of the program.
 
     def announce(**said: Any) -> None:
         try:

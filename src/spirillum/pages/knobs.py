@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError, check_choice, clipped
@@ -55,84 +57,37 @@ def refusal_of(command: Mapping[str, Any], sentence: str) -> str:
     return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})
 
 
-_LONGEST = 80
-"""Characters of a value that is typed."""
+_LONGEST = 80  # characters of a value that is typed
 
 
 @dataclass(frozen=True)
 class Knob:
     """One control of a field."""
 
-    field: str
-    """Dotted field of the robot file, or of the run (`run.gap`)."""
-    label: str
-    """Text of the value."""
-    group: str
-    """Heading of its group."""
-    unit: str = ""
-    """Unit in which it is shown; empty for a choice."""
-    low: float = 0.0
-    """Ends of its slider, in that unit; a value outside them can be typed."""
+    field: str  #: Dotted field of the robot file, or of the run (`run.gap`).
+    label: str  #: Text of the value.
+    group: str  #: Heading of its group.
+    unit: str = ""  #: Unit in which it is shown; empty for a choice.
+    low: float = 0.0  #: Ends of its slider, in that unit; a value outside them can be typed.
     high: float = 1.0
-    choices: tuple[str, ...] = ()
-    """Options of a choice."""
-    note: str = ""
-    """Description, a sentence."""
-    logarithmic: bool = False
-    """Whether its slider has equal steps of ratio."""
-    unset: str = ""
-    """Meaning of an empty field; empty: a value is required."""
-    needs: str = ""
-    """Table of the robot without which it is not shown."""
+    choices: tuple[str, ...] = ()  #: Options of a choice.
+    note: str = ""  #: Description, a sentence.
+    logarithmic: bool = False  #: Whether its slider has equal steps of ratio.
+    unset: str = ""  #: Meaning of an empty field; empty: a value is required.
+    needs: str = ""  #: Table of the robot without which it is not shown.
 
 
-KNOBS: tuple[Knob, ...] = (
-    Knob("tail.wavelength", "Wavelength", "Tail", "mm", 5.0, 60.0, note="Axial length of one turn of the helix."),
-    Knob("tail.amplitude", "Amplitude", "Tail", "mm", 0.5, 6.0, note="Radius of the helix about its axis."),
-    Knob("tail.length", "Length", "Tail", "mm", 10.0, 120.0, note="Axial length of the tail."),
-    Knob("tail.wire_diameter", "Wire", "Tail", "mm", 0.2, 2.5, note="Diameter of the wire."),
-    Knob(
-        "tail.handedness",
-        "Handedness",
-        "Tail",
-        choices=("left", "right"),
-        note="A right-handed tail is a common corkscrew.",
-    ),
-    Knob(
-        "channel.diameter",
-        "Tube",
-        "Surroundings",
-        "mm",
-        20.0,
-        60.0,
-        note="Inner diameter of the tube.",
-        needs="channel",
-    ),
-    Knob(
-        "fluid.viscosity",
-        "Viscosity",
-        "Surroundings",
-        "Pa s",
-        0.05,
-        20.0,
-        note="Of the fluid; silicone oil here.",
-        logarithmic=True,
-    ),
-    Knob("run.flow", "Flow", "Surroundings", "mm/s", -3.0, 3.0, unset="none", needs="channel",
-         note="Mean flow imposed through the tube, along +x. Changes while the robot swims."),
-    Knob("run.gap", "Gap", "Start", "mm", 0.05, 5.0, unset="reference", logarithmic=True, needs="channel",
-         note="Initial gap between body and wall."),
-    Knob("run.pitch", "Pitch", "Start", "deg", -3.0, 3.0, unset="level",
-         note="Initial angle by which the nose is raised."),
-    Knob("magnetic.field", "Field", "Drive", "mT", 0.1, 10.0, needs="magnetic", logarithmic=True,
-         note="Flux density of the rotating field."),
-    Knob("magnetic.rotation_rate", "Field rate", "Drive", "Hz", 0.1, 10.0, needs="magnetic", logarithmic=True,
-         note="Rate at which the field turns."),
-)  # fmt: skip
-"""All knobs, in their order, without the model, the remote and the duty."""
+def _knobs() -> Iterator[Knob]:
+    """The rows of `knobs.csv`; a choice has no range."""
+    for row in csv.DictReader(Path(__file__).with_name("knobs.csv").read_text(encoding="utf-8").splitlines()):
+        words: Any = {name: row[name] for name in ("field", "label", "group", "unit", "note", "unset", "needs")}
+        ends: Any = {end: float(row[end]) for end in ("low", "high") if row[end]}
+        yield Knob(**words, **ends, choices=tuple(row["choices"].split()), logarithmic=row["logarithmic"] != "")
 
-MODELS = ("auto", "tube", "slender", "rft")
-"""Models that can move a free robot."""
+
+KNOBS = tuple(_knobs())  #: All knobs, in their order, without the model, the remote and the duty.
+
+MODELS = ("auto", "tube", "slender", "rft")  #: Models that can move a free robot.
 _BY_FIELD = {knob.field: knob for knob in KNOBS}
 _RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 
@@ -141,14 +96,11 @@ _RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
 class Settings:
     """Settings of one robot of the page; frozen, so that undo is a list of them."""
 
-    source: Any
-    """Preset's name, file or checked robot that it starts from."""
+    source: Any  #: Preset's name, file or checked robot that it starts from.
     overrides: Mapping[str, str] = field(default_factory=dict)
     """Fields of the robot that were changed, with their unit."""
-    run: Mapping[str, str] = field(default_factory=dict)
-    """`gap`, `pitch`, `flow` where they are set, with their unit."""
-    model: str = "auto"
-    """Requested model."""
+    run: Mapping[str, str] = field(default_factory=dict)  #: `gap`, `pitch`, `flow` where they are set, with their unit.
+    model: str = "auto"  #: Requested model.
 
     def robot(self) -> Robot:
         """The robot, checked; a size that varies along the tail is scaled as a whole."""

@@ -102,11 +102,9 @@ def page(
 
 
 def _is_host(host: str) -> bool:
-    """Whether it is an address as it is usually written, or can be the name of a host.
-
-    What the system alone reads as an address is neither: an empty text, ``0`` and ``<broadcast>`` would let the whole
-    network in.
-    """
+    """Whether it is an address as it is usually written, or can be the name of a host."""
+    # What the system alone reads as an address is neither: an empty text, ``0`` and ``<broadcast>`` would let the whole
+    # network in.
     with suppress(ValueError):
         ipaddress.ip_address(host)
         return True
@@ -117,7 +115,6 @@ def _is_host(host: str) -> bool:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """A socket that listens."""
     found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -133,7 +130,6 @@ def _listening(host: str, port: int) -> socket.socket:
 
 
 def _replay(run: xr.Dataset | str | Path) -> tuple[Robot, dict[str, Any]]:
-    """The robot of a run, and the run to replay."""
     from spirillum.dynamics.run_file import open_run, robot_of
     from spirillum.pages.replay import replay_of_run
 

@@ -22,10 +22,8 @@ from spirillum.pages.simulation_thread import SimulationThread
 from spirillum.pages.video_store import Uploads, stated_size
 
 _MOST_POINTS = 40
-_FARTHEST = 1e6
-"""Largest pixel, or time in s, that is pointed at."""
-_SHOWN = {"mp4": "video/mp4", "png": "image/png"}
-"""Kinds of results that the page shows; the others are taken away."""
+_FARTHEST = 1e6  # largest pixel, or time in s, that is pointed at
+_SHOWN = {"mp4": "video/mp4", "png": "image/png"}  # kinds of results that the page shows; the others are taken away
 _Handler = Callable[[Request], Awaitable[Response]]
 
 

@@ -127,16 +127,7 @@ class SetupEditor:
         return path
 
     def click(self, what: str, name: str, time: float, points: list[tuple[float, float]], length: str = "") -> str:
-        """Fill in a field by pointing at the picture; what came of it, in a sentence.
-
-        Args:
-            what: `ruler` (two marks, and the length between them), `body` (nose and rear end), or `stripes` (across
-                the body).
-            name: the film.
-            time: of the frame, s.
-            points: pixels (u, v).
-            length: with its unit, for the ruler.
-        """
+        """Fill in `ruler`, `body` or `stripes` by pointing at pixels of the picture; what came of it, in a sentence."""
         from spirillum.measurement.clicks import across, nose_side, stripe_names, stripes_in_order
 
         if what == "stripes":

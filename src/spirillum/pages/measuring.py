@@ -39,19 +39,6 @@ def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def calibration_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """A calibration as the page shows it."""
-    return {
-        "model": answer["model"],
-        "method": answer["method"],
-        "rows": [_row(name, name, item) for name, item in answer["parameters"].items()],
-        "warnings": list(answer.get("warnings", [])),
-        "statement": answer.get("effective_friction_statement", ""),
-        "files": [name for name in answer["files"] if "/" not in name],
-        "figures": sorted(name for name in answer["files"] if name.endswith(".png")),
-    }
-
-
 def _row(label: str, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
     from spirillum.measurement.statistics import shown
 
@@ -81,7 +68,18 @@ def _work(request: dict[str, Any], progress: _Tell) -> dict[str, Any]:
             method=request["method"],
             progress=progress,
         )
-        return {"shown": calibration_shown(found.to_dict())}
+        answer = found.to_dict()
+        return {
+            "shown": {
+                "model": answer["model"],
+                "method": answer["method"],
+                "rows": [_row(name, name, item) for name, item in answer["parameters"].items()],
+                "warnings": list(answer.get("warnings", [])),
+                "statement": answer.get("effective_friction_statement", ""),
+                "files": [name for name in answer["files"] if "/" not in name],
+                "figures": sorted(name for name in answer["files"] if name.endswith(".png")),
+            }
+        }
     from spirillum.results.measurement import measure
 
     return {

@@ -27,12 +27,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_RESOLUTION = 96
-"""Points along the plane."""
-_COARSE: Mapping[str, Any] = {"tolerance": 0.05}
-"""Of the tube's flow: the plane is a picture."""
-_FASTEST = 0.98
-"""Share of the points that are slower than what has the fullest colour."""
+_RESOLUTION = 96  # points along the plane
+_COARSE: Mapping[str, Any] = {"tolerance": 0.05}  # of the tube's flow: the plane is a picture
+_FASTEST = 0.98  # share of the points that are slower than what has the fullest colour
 
 
 class Flowing(BackgroundJob):
@@ -41,15 +38,7 @@ class Flowing(BackgroundJob):
     def __init__(
         self, robot: Robot, model: str, run: Mapping[str, str], phase: float, announce: Callable[[], None]
     ) -> None:
-        """Begin.
-
-        Args:
-            robot: the robot that swims.
-            model: model by which it swims.
-            run: `gap`, `pitch`, `flow` where they are set.
-            phase: of the tail, rad.
-            announce: called from a thread when there is progress.
-        """
+        """Begin with `gap`, `pitch`, `flow` of the run where they are set; `announce` is called from a thread."""
         requested = {"robot": robot_text(robot), "model": model, "run": dict(run), "phase": phase}
         super().__init__(__name__, requested, announce)
 
@@ -98,13 +87,11 @@ if __name__ == "__main__":
     worker(_flowing)
 
 
-_ONE_TURN = 1.0
-"""Changes of one control within this time are one step of undo, s."""
+_ONE_TURN = 1.0  # changes of one control within this time are one step of undo, s
 _MOST_UNDO = 200
 
 
-_Shape = tuple[Any, dict[str, Any]]
-"""Parameters of a shape, and the shape."""
+_Shape = tuple[Any, dict[str, Any]]  # parameters of a shape, and the shape
 
 
 def _shaped(robot: Robot, before: _Shape | None) -> _Shape:
@@ -121,8 +108,7 @@ class Built:
     model: str
     reason: str
     caution: str
-    provisional: bool
-    """Whether it swims without walls only until the table of its tube is made."""
+    provisional: bool  #: Whether it swims without walls only until the table of its tube is made.
 
 
 def build(settings: Settings, robot: Robot) -> Built:
@@ -157,21 +143,14 @@ class PageRobot:
     duty: float = 1.0
     built: Built | None = None
     moment: Snapshot | None = None
-    numbers: dict[str, Any] | None = None
-    """The prediction, as the page shows it."""
-    failure: str = ""
-    """Why it does not swim, in a sentence."""
-    generation: int = 0
-    """Counts what was set; what is built for an older one is dropped."""
-    revision: int = 0
-    """Counts what changes the prediction, which duty and imposed flow do while the robot swims on."""
+    numbers: dict[str, Any] | None = None  #: The prediction, as the page shows it.
+    failure: str = ""  #: Why it does not swim, in a sentence.
+    generation: int = 0  #: Counts what was set; what is built for an older one is dropped.
+    revision: int = 0  #: Counts what changes the prediction, which duty and imposed flow do while the robot swims on.
     recording: SampleRecording = field(default_factory=SampleRecording)
-    preparing: dict[str, Any] | None = None
-    """Progress of a table that is being made."""
-    since: float = 0.0
-    """When it was released, by the clock of `time.monotonic`, s."""
-    flowing: Flowing | None = None
-    """Displayed or pending flow."""
+    preparing: dict[str, Any] | None = None  #: Progress of a table that is being made.
+    since: float = 0.0  #: When it was released, by the clock of `time.monotonic`, s.
+    flowing: Flowing | None = None  #: Displayed or pending flow.
     _undo: list[Settings] = field(default_factory=list)
     _redo: list[Settings] = field(default_factory=list)
     _last: tuple[str, float] = ("", 0.0)

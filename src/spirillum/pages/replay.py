@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-LARGEST_RUN = 64 << 20
-"""Bytes of a run that is dropped on the page."""
-_MOST = 6_000
-"""Samples of a replay; longer runs are thinned, which the replay states."""
+LARGEST_RUN = 64 << 20  #: Bytes of a run that is dropped on the page.
+_MOST = 6_000  # samples of a replay; longer runs are thinned, which the replay states
 
 
 def replay_of_run(dataset: xr.Dataset) -> dict[str, Any]:
@@ -83,20 +81,16 @@ def _series(dataset: xr.Dataset, name: str, chosen: np.ndarray[tuple[int], np.dt
     return [finite(float(value)) for value in np.asarray(dataset[name].values, dtype=float)[chosen]]
 
 
-_MOST_OF_CURVE = 3_000
-"""Samples of a curve."""
-_LONGEST = 120.0
-"""Length of a run that is simulated beside a trial, s."""
+_MOST_OF_CURVE = 3_000  # samples of a curve
+_LONGEST = 120.0  # length of a run that is simulated beside a trial, s
 _TURN = 2.0 * np.pi
 _FROM_START = (("distance", "mm", 1e3), ("tail turns", "", 1.0 / _TURN), ("body turns", "", 1.0 / _TURN))
 """Compared curves, relative to the first frame: label, unit, and factor from SI."""
 
 
 def trial_beside_its_run(trial: xr.Dataset, film: str) -> dict[str, Any]:
-    """Replay of the trial's simulated robot, with the trial's video and curves.
-
-    The simulated robot starts from rest with the first measured frame, with the tail as its file says.
-    """
+    """Replay of the trial's simulated robot, with the trial's video and curves."""
+    # The simulated robot starts from rest with the first measured frame, with the tail as its file says.
     from spirillum.dynamics.simulation import simulate
 
     robot = robot_of(trial)

@@ -26,22 +26,17 @@ if TYPE_CHECKING:
     from spirillum.swimming.released_motion import ReleasedMotion
 
 
-_CREASE = np.radians(40.0)
-"""Edges sharper than this stay sharp."""
+_CREASE = np.radians(40.0)  # edges sharper than this stay sharp
 _FINENESS = 0.75
-_ALONG = np.linspace(0.0, 1.0, 7)
-"""Positions along each piece of the body's outline."""
-_ALONG_POINTS = np.linspace(0.0, 1.0, 33)
-"""Along a piece through points."""
+_ALONG = np.linspace(0.0, 1.0, 7)  # positions along each piece of the body's outline
+_ALONG_POINTS = np.linspace(0.0, 1.0, 33)  # along a piece through points
 _METALS = ("shaft", "coupling", "stub", "arm", "tail")
 
 
 def shape_of(robot: Robot) -> dict[str, Any]:
-    """Meshes of body and rotor, and the tube; lengths in m.
-
-    `body` and `rotor` hold `vertices` (base64 of float32: place, normal, linear colour, metal; ten numbers each) and
-    `triangles` (base64 of uint32). The rotor is at phase 0 and turns about the body's x axis.
-    """
+    """Meshes of body and rotor, and the tube; lengths in m."""
+    # `body` and `rotor` hold `vertices` (base64 of float32: place, normal, linear colour, metal; ten numbers each) and
+    # `triangles` (base64 of uint32). The rotor is at phase 0 and turns about the body's x axis.
     robot.check_body("the page")
     pieces = robot_mesh(robot, fineness=_FINENESS)
     channel, tail = robot.channel, robot.tail
@@ -168,6 +163,10 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         if isinstance(answer.get(name), dict)
     }
     error = answer["error_estimate"]
+    found = axial_forces_of(prediction)
+    weight = prediction.robot.derived().get("submerged_weight")
+    if weight is not None:
+        found.append({"name": "weight less buoyancy", "at": "body", "axis": "z", "value": -weight.value})
     return {
         "model": answer["model"],
         "form": answer.get("form", ""),
@@ -176,7 +175,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "calibrated": answer["calibrated"],
         "rows": rows,
         "columns": dict.fromkeys(("trial", "steady")) if answer["model"] == WALLED else {},
-        "forces": forces_of(prediction),
+        "forces": found,
         "band": "band" in answer,
         "error": _finite(error.get("value")),
         "against": error.get("against", ""),
@@ -191,18 +190,6 @@ def released_answer(motion: ReleasedMotion) -> dict[str, Any]:
     state = motion.basis.get("state", "")
     title = motion.reason or f"{state}; {motion.basis['assumption']}"
     return {"title": title, "rows": {name: _finite(motion.values.get(name)) for name in TABLE}}
-
-
-def forces_of(prediction: Prediction) -> list[dict[str, Any]]:
-    """Forces on a robot in steady swimming, N, each with its point of attack on the robot.
-
-    Weight less buoyancy is vertical, where masses are known.
-    """
-    found = axial_forces_of(prediction)
-    weight = prediction.robot.derived().get("submerged_weight")
-    if weight is not None:
-        found.append({"name": "weight less buoyancy", "at": "body", "axis": "z", "value": -weight.value})
-    return found
 
 
 def axial_forces_of(prediction: Prediction) -> list[dict[str, Any]]:
@@ -224,10 +211,8 @@ def _finite(value: Any) -> float | None:
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
-MOST = 12_000
-"""Samples that are kept; beyond it every other one is dropped."""
-_DRAWN = 900
-"""Samples of a plot's past, at most."""
+MOST = 12_000  #: Samples that are kept; beyond it every other one is dropped.
+_DRAWN = 900  # samples of a plot's past, at most
 
 
 class SampleRecording:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError, clipped
 
-_LONGEST = 200
-"""Characters of a field."""
+_LONGEST = 200  # characters of a field
 
 
 @dataclass(frozen=True)
@@ -21,103 +22,23 @@ class Entry:
     field: str
     label: str
     group: str
-    example: str
-    """Placeholder of an empty field: its meaning, or an example."""
+    example: str  #: Placeholder of an empty field: its meaning, or an example.
     note: str
     choices: tuple[str, ...] = ()
-    number: bool = False
-    """Whether it is a bare number, without a unit."""
-    uncertain: bool = False
-    """Whether it has a standard uncertainty in a field of its own."""
+    number: bool = False  #: Whether it is a bare number, without a unit.
+    uncertain: bool = False  #: Whether it has a standard uncertainty in a field of its own.
 
 
-FORM: tuple[Entry, ...] = (
-    Entry(
-        "robot.direction",
-        "Nose points",
-        "Picture",
-        "",
-        "Where in the picture the nose points.",
-        ("right", "left", "up", "down"),
-    ),
-    Entry(
-        "robot.appearance",
-        "Body's cover",
-        "Picture",
-        "",
-        "Opaque, or glass through which its contents and the background show.",
-        ("unknown", "opaque", "glass"),
-    ),
-    Entry(
-        "robot.stripes",
-        "Stripes",
-        "Picture",
-        "as in the robot file",
-        "Colours in their order, if not those of the robot file; with commas.",
-    ),
-    Entry(
-        "markers.spacing",
-        "Ruler spacing",
-        "Picture",
-        "such as 2 mm",
-        "From each line of the ruler to the next.",
-        uncertain=True,
-    ),
-    Entry(
-        "markers.length_per_pixel",
-        "Or per pixel",
-        "Picture",
-        "instead of a ruler",
-        "Length that one pixel shows at the height of the robot's axis.",
-        uncertain=True,
-    ),
-    Entry(
-        "camera.view",
-        "View",
-        "Heights",
-        "",
-        "top: from above; side: level, at right angles to the channel.",
-        ("top", "side"),
-    ),
-    Entry(
-        "camera.height",
-        "Lens",
-        "Heights",
-        "such as 210 mm",
-        "Of the lens above the reference plane: the tank's floor, or its far wall in a side view.",
-        uncertain=True,
-    ),
-    Entry("tank.surface", "Oil surface", "Heights", "none", "Of the flat surface between air and oil.", uncertain=True),
-    Entry("tank.index", "Index of oil", "Heights", "1.4", "Refractive index of the oil.", number=True, uncertain=True),
-    Entry(
-        "markers.height", "Ruler", "Heights", "such as 0 mm", "Of the ruler above the reference plane.", uncertain=True
-    ),
-    Entry(
-        "robot.axis_height",
-        "Robot's axis",
-        "Heights",
-        "such as 13 mm",
-        "Of the robot's axis above the reference plane.",
-        uncertain=True,
-    ),
-    Entry(
-        "start",
-        "From",
-        "Time",
-        "the beginning",
-        "Start of the measurement in the video, such as the end of the start-up.",
-    ),
-    Entry("end", "Until", "Time", "the end", "Time until which to measure."),
-    Entry(
-        "camera.frames_per_second",
-        "Frame rate",
-        "Time",
-        "the film's own",
-        "Frames per second, instead of the video's time stamps, for slow motion.",
-        number=True,
-    ),
-)
-"""Fields of the form, without the robot's file."""
+def _entries() -> Iterator[Entry]:
+    """The rows of `setup_form.csv`."""
+    for row in csv.DictReader(Path(__file__).with_name("setup_form.csv").read_text(encoding="utf-8").splitlines()):
+        words: Any = {name: row[name] for name in ("field", "label", "group", "example", "note")}
+        yield Entry(
+            **words, choices=tuple(row["choices"].split()), number=row["number"] != "", uncertain=row["uncertain"] != ""
+        )
+
+
+FORM = tuple(_entries())  #: Fields of the form, without the robot's file.
 
 _NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
 _KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}

@@ -41,22 +41,16 @@ if __name__ == "__main__":
     worker(_prepared)
 
 
-RATE = 30.0
-"""Frames a second."""
-_LATE = 1.0
-"""Time by which the run may fall behind before it no longer tries to catch up, s."""
+RATE = 30.0  #: Frames a second.
+_LATE = 1.0  # time by which the run may fall behind before it no longer tries to catch up, s
 SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
 _MOST_WAITING = 2_000
-_UNTOUCHED = 2.0
-"""Time for which a robot is left as it is before its table is made, s."""
-_PAUSE = 0.2
-"""Rest of the thread of the simulation after a fault, s."""
+_UNTOUCHED = 2.0  # time for which a robot is left as it is before its table is made, s
+_PAUSE = 0.2  # rest of the thread of the simulation after a fault, s
 
-_COLUMNS_AFTER = 1.0
-"""Time for which a robot is left as it is before its trial and steady motion are computed, s."""
+_COLUMNS_AFTER = 1.0  # time for which a robot is left as it is before its trial and steady motion are computed, s
 
-Command = tuple[Mapping[str, Any], Callable[[str], None]]
-"""Command of a client, and the callback for its refusal."""
+Command = tuple[Mapping[str, Any], Callable[[str], None]]  #: Command of a client, and the callback for its refusal.
 
 
 class _OutdatedError(Exception):

@@ -17,8 +17,7 @@ from spirillum.robot.robot import Robot
 if TYPE_CHECKING:
     import xarray as xr
 
-LARGEST_STUDY_SENT = 64 << 20
-"""Bytes of a study that is dropped on the page."""
+LARGEST_STUDY_SENT = 64 << 20  #: Bytes of a study that is dropped on the page.
 _MOST_TAILS = 400
 _WHAT = "a study's dataset.nc over wavelength and amplitude, by `spirillum study`"
 _READINGS = ("rotor", "none")

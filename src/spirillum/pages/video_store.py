@@ -77,13 +77,10 @@ class Uploads:
             self._left += size
 
 
-_LARGEST_FILM = 4 << 30
-"""Bytes of one video."""
-_LARGEST_ALL = 16 << 30
-"""Bytes of all videos."""
+_LARGEST_FILM = 4 << 30  # bytes of one video
+_LARGEST_ALL = 16 << 30  # bytes of all videos
 _MOST_FILMS = 50
-_SPARE = 512 << 20
-"""Bytes that stay free on the disk."""
+_SPARE = 512 << 20  # bytes that stay free on the disk
 _QUALITY = 92
 
 

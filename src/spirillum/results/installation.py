@@ -14,8 +14,7 @@ from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope
 from spirillum.version import own_version
 
-_NOT_FOR_USERS = ("test", "lint", "docs")
-"""Extras of those who work on the package."""
+_NOT_FOR_USERS = ("test", "lint", "docs")  # extras of those who work on the package
 _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+).*?(?:;.*\bextra == ['\"](?P<extra>[\w-]+)['\"])?$")
 
 
@@ -23,16 +22,11 @@ _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+).*?(?:;.*\bextra == ['\"](?P<extra>
 class InstallationReport(DisplayMixin):
     """Versions and platform of an installation."""
 
-    spirillum: str
-    """Version of the package."""
-    python: str
-    """Implementation and version."""
-    platform: str
-    """System, release and kind of processor."""
-    processors: int
-    """Number of logical processors of this machine."""
-    packages: Mapping[str, str]
-    """Name to version of every dependency that is installed, optional ones included."""
+    spirillum: str  #: Version of the package.
+    python: str  #: Implementation and version.
+    platform: str  #: System, release and kind of processor.
+    processors: int  #: Number of logical processors of this machine.
+    packages: Mapping[str, str]  #: Name to version of every dependency that is installed, optional ones included.
     missing: Mapping[str, tuple[str, ...]]
     """Extra to the dependencies of it that are not installed; empty where the extra is complete."""
 

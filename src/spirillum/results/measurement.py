@@ -16,6 +16,7 @@ import numpy as np
 from spirillum.display import percent
 from spirillum.errors import InputError
 from spirillum.files import atomic_write, check_replaceable, guard_inputs, results_folder, write_text
+from spirillum.formats.templates import rendered
 from spirillum.measurement.flags import BY_HAND, says_synthetic
 from spirillum.measurement.measure import (
     TABLE,
@@ -29,7 +30,7 @@ from spirillum.measurement.measure import (
 from spirillum.measurement.series import movement_of, observation_rows, series_of
 from spirillum.measurement.statistics import shown
 from spirillum.measurement.trials import MEASURED, Measured, Trial
-from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
+from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures
 from spirillum.version import versions
 from spirillum.view.annotate import annotated_film, frame_of_film
 from spirillum.vision.camera.camera import opened
@@ -62,8 +63,9 @@ def write_measurement_report(
 def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails: Mapping[str, bytes]) -> str:
     scale = max((trial.track.scale for trial in measurement.trials), key=lambda scale: scale.relative_uncertainty)
     sources = sorted(scale.sources.items(), key=lambda item: -item[1])
-    return page(
-        "measurement.html.jinja",
+    return rendered(
+        "results/measurement.html.jinja",
+        escaped=True,
         title=f"{measurement.robot.name}: measured from video",
         setup=Path(measurement.setup).name,
         trials=[_trial_content(trial, pictures, thumbnails) for trial in measurement.trials],
@@ -208,10 +210,8 @@ class _Folder:
     path: Path
     annotated: bool
     figures: bool
-    files: list[str] = field(default_factory=list)
-    """Names of the files that were written."""
-    thumbnails: dict[str, bytes] = field(default_factory=dict)
-    """JPEG of an annotated frame by the trial's name."""
+    files: list[str] = field(default_factory=list)  # names of the files that were written
+    thumbnails: dict[str, bytes] = field(default_factory=dict)  # JPEG of an annotated frame by the trial's name
 
     def check(self, asked: MeasurementRequest) -> None:
         """Look at all that will be written, before any video is measured."""

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from spirillum.files import output_folder
 
@@ -22,8 +22,7 @@ class EmbeddedPicture:
     title: str
     caption: str
     alternative: str
-    source: str
-    """The picture itself as a data URI."""
+    source: str  #: The picture itself as a data URI.
 
     @property
     def files(self) -> tuple[str, str]:
@@ -53,17 +52,3 @@ def draw_pictures(
 def data_uri(picture: bytes, kind: str) -> str:
     """A picture as the source of an image in a page; `kind` as in `image/kind`."""
     return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
-
-
-def page(template: str, **names: Any) -> str:
-    """A page from a template of this package; text is escaped, and every name of the template has to be given."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("spirillum.results", ""),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(template).render(**names)

@@ -16,10 +16,11 @@ import numpy as np
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
 from spirillum.files import check_replaceable, guard_inputs, output_folder, results_folder, write_dataset, write_text
+from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.papers.studies import study_of
-from spirillum.results.page import draw_pictures, page
+from spirillum.results.page import draw_pictures
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_store import stored_study
 from spirillum.robot.geometry import Body, Channel, Coupling, Fluid, Tail
@@ -75,13 +76,17 @@ def _rebuilt(table: Mapping[str, Any]) -> Robot:
     )
 
 
-_LARGEST_SVG = 2_000_000
-"""A larger vector picture is embedded as pixels, bytes."""
+_LARGEST_SVG = 2_000_000  # a larger vector picture is embedded as pixels, bytes
 
 
 def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, int, int], None]) -> None:
     """Write `figures/` (PNG and SVG), a self-contained `report.html`, and the files of `write_tables`."""
-    pictures = _pictures(dataset)
+    ranking = ranking_of(dataset)
+    robot = robot_picture(dataset, ranking)
+    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
+    laid_down = release_picture(dataset, ranking)
+    drawn = {"robot": robot, "laid-down": laid_down}
+    pictures = {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
     steps = len(pictures) + 1
     embedded = draw_pictures(
         pictures, folder, lambda name, done: on_progress(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
@@ -95,7 +100,7 @@ def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, 
         "predictions": predictions,
         **content(dataset),
     }
-    write_text(folder / "report.html", page("report.html.jinja", **names))
+    write_text(folder / "report.html", rendered("results/report.html.jinja", escaped=True, **names))
     on_progress("report", steps, steps)
 
 
@@ -108,18 +113,7 @@ def write_tables(dataset: xr.Dataset, folder: Path) -> tuple[list[dict[str, Any]
     return claims, predictions
 
 
-def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
-    """The ranking first, then the robot and the figures of the study."""
-    ranking = ranking_of(dataset)
-    robot = robot_picture(dataset, ranking)
-    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
-    laid_down = release_picture(dataset, ranking)
-    drawn = {"robot": robot, "laid-down": laid_down}
-    return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
-
-
 def _ranking_rows(ranking: StudyRanking) -> str:
-    """The ranking as CSV, all of its robots; SI."""
     names = ranking.quantities
     header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of_ranked(name)]}" for name in names for end in _ENDS)]
     table = io.StringIO()
@@ -137,8 +131,7 @@ _COLUMN = {"m/s": "m_s", "1": "", "A": "A", "W": "W"}
 
 _BEGIN = {"report.html": "", "claims.json": "[", "ranking.csv": "rank,robot,"}
 """Files of a study that are only replaced where they are its own, and how those begin that carry no mark."""
-_KEY = 16
-"""Characters of `claims.json` that name its first key."""
+_KEY = 16  # characters of `claims.json` that name its first key
 _RESULTS = ("dataset.nc", "figures", *_BEGIN)
 """What a folder without the mark of a study may not hold, for it would be replaced."""
 

@@ -147,7 +147,6 @@ def _options(table: Mapping[str, Any]) -> ModelOptions:
 
 
 def _calibrations(robots: list[Mapping[str, Any]], models: list[str]) -> Iterator[dict[str, str]]:
-    """A line for each robot and model."""
     for robot in robots:
         for model in models:
             entry = (robot.get("calibration") or {}).get(model)
@@ -169,8 +168,7 @@ def _code(model: str, reading: str) -> str:
     )
 
 
-_SIZES = ("channel_diameter", "wavelength", "amplitude")
-"""Sizes that identify the robots of a study."""
+_SIZES = ("channel_diameter", "wavelength", "amplitude")  # sizes that identify the robots of a study
 
 
 # xarray leaves __init_subclass__ without types.
@@ -185,10 +183,8 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
         return cls(dataset.data_vars, dataset.coords, dataset.attrs)
 
     def unstacked(self) -> xr.Dataset:
-        """The study over `wavelength` and `amplitude`, and `channel_diameter` if it varies, in place of `robot`.
-
-        A study of a grid has these dimensions already. The robots' names become the variable `robot_name`.
-        """
+        """The study over `wavelength` and `amplitude`, and `channel_diameter` if it varies, in place of `robot`."""
+        # A study of a grid has these dimensions already. The robots' names become the variable `robot_name`.
         if "robot" not in self.dims:
             return self
         sizes = {name: np.unique(self[name].values) for name in _SIZES}

@@ -101,10 +101,8 @@ _NOTE = TypeAdapter(_Note)
 class _Outcome(NamedTuple):
     """What is known once all regions are there."""
 
-    warnings: str
-    """Sentences, one a line."""
-    notes: str
-    """Notes with their codes, as JSON."""
+    warnings: str  # sentences, one a line
+    notes: str  # notes with their codes, as JSON
     unanswered: int
 
 
@@ -127,7 +125,6 @@ def _has_note(path: Path) -> bool:
 
 
 def _note_of(path: Path) -> _Note:
-    """Notes of a region."""
     what = "a note of a study"
     found = read_json(path, what)
     try:
@@ -194,7 +191,6 @@ def _spread(regions: Sequence[RobotBlock]) -> list[RobotBlock]:
 
 
 def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
-    """The merged notes of all regions."""
     warnings = warnings_of(loaded)
     warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
     warnings += warnings_of_calibrations(loaded)

@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from spirillum.files import check_replaceable, results_folder, write_text
+from spirillum.formats.templates import rendered
 from spirillum.papers.case import case_names, load_case
 from spirillum.papers.validation import CaseResult, Validation, compute_case
 from spirillum.papers.validation_figure import case_picture
-from spirillum.results.page import draw_pictures, page
+from spirillum.results.page import draw_pictures
 
 _RESULTS = ("validation.json", "figures", "report.html")
 """What a folder without the mark of a validation may not hold, for it would be replaced."""
@@ -52,19 +53,16 @@ def validate(
         for result in ("validation.json", "report.html"):
             check_replaceable(folder / result)
         found = Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen), str(output))
-        _write_report(found, folder)
+        pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
+        embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
+        text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+        write_text(folder / "validation.json", text + "\n")
+        cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
+        text = rendered(
+            "results/validation.html.jinja", escaped=True, cases=cases, header=HEADER, left=len(found.outside)
+        )
+        write_text(folder / "report.html", text)
     return found
-
-
-def _write_report(found: Validation, folder: Path) -> None:
-    """Write `figures/`, `validation.json` and a self-contained `report.html`."""
-    pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
-    embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
-    text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(folder / "validation.json", text + "\n")
-    cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
-    text = page("validation.html.jinja", cases=cases, header=HEADER, left=len(found.outside))
-    write_text(folder / "report.html", text)
 
 
 HEADER = ("Row", "Quantity", "Published", "Ours", "Difference", "Stated error", "Ours under assumptions", "Covered by")

@@ -25,18 +25,13 @@ if TYPE_CHECKING:
 
 _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
-_TEXT, _SMALLEST_TEXT = 0.45, 0.4
-"""Scale of the font in a picture 480 pixels high, and the least one that can be read."""
-_DIAL = 16.0
-"""Radius of a dial in a picture 480 pixels high, pixels."""
-_MOST_OF_HEIGHT = 0.25
-"""Largest share of a picture's height that text covers."""
-_SHIFT = 4
-"""Subpixel resolution of lines: sixteenths."""
+_TEXT, _SMALLEST_TEXT = 0.45, 0.4  # scale of the font in a picture 480 pixels high, and the least one that can be read
+_DIAL = 16.0  # radius of a dial in a picture 480 pixels high, pixels
+_MOST_OF_HEIGHT = 0.25  # largest share of a picture's height that text covers
+_SHIFT = 4  # subpixel resolution of lines: sixteenths
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
-_LARGEST = 1920
-"""Longest side of an annotated frame, pixels: a larger one is reduced by a whole number."""
+_LARGEST = 1920  # longest side of an annotated frame, pixels: a larger one is reduced by a whole number
 
 
 class AnnotatedFrame(Protocol):
@@ -74,7 +69,9 @@ class Annotator:
         body = robot.body
         self._period = period
         self._half, self._radius = 0.5 * body.length, 0.5 * body.diameter
-        self._outline = _outline_of(robot)
+        x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 24))
+        edge = np.column_stack([x, radius, np.zeros_like(x)])
+        self._outline = np.concatenate([edge, edge[::-1] * [1.0, -1.0, 1.0]])
         self._wire = np.asarray(tail_line(robot, fineness=0.6).points)
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
@@ -121,10 +118,8 @@ class Annotator:
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
     def _dials(self, picture: np.ndarray, seen: AnnotatedFrame) -> None:
-        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root.
-
-        Where stripes repeat, the body has a hand for each that may be stripe 1.
-        """
+        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
+        # Where stripes repeat, the body has a hand for each that may be stripe 1.
         radius = _DIAL * _unit(picture)
         around = np.linspace(0.0, 2.0 * np.pi, 33)
         for position, angle, colour, period in (
@@ -202,13 +197,6 @@ def _lines_of(words: tuple[str, ...], width: Callable[[str], int], room: float) 
     return lines
 
 
-def _outline_of(robot: Robot) -> Samples:
-    """The body's outline in the plane of its axis across the line of sight, (k, 3)."""
-    x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 24))
-    edge = np.column_stack([x, radius, np.zeros_like(x)])
-    return np.concatenate([edge, edge[::-1] * [1.0, -1.0, 1.0]])
-
-
 def _turned(points: Samples, angle: float) -> Samples:
     cos, sin = math.cos(angle), math.sin(angle)
     y, z = points[:, 1], points[:, 2]
@@ -273,8 +261,7 @@ def _jpeg(picture: np.ndarray) -> bytes:
     return bytes(data) if good else b""
 
 
-_Frame = tuple[int, np.ndarray, AnnotatedFrame]
-"""A frame's number, its picture and its observation."""
+_Frame = tuple[int, np.ndarray, AnnotatedFrame]  # a frame's number, its picture and its observation
 
 
 class _Writer:

@@ -18,12 +18,9 @@ from spirillum.robot.fields import Angle, Time
 from spirillum.robot.robot import Robot
 
 _LOST, _SHAKE, _PAINT, _CABLES, _MIRRORED = range(30, 35)
-_WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2
-"""Waves of a hand's sway, and their frequencies, Hz; assumed."""
-_JITTER = 1.0 / 3.0
-"""Standard deviation of the jitter from frame to frame over the sway; assumed."""
-_TURN = 2e-4
-"""Roll of a hand-held camera over its sway, rad per pixel; assumed."""
+_WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2  # waves of a hand's sway, and their frequencies, Hz; assumed
+_JITTER = 1.0 / 3.0  # standard deviation of the jitter from frame to frame over the sway; assumed
+_TURN = 2e-4  # roll of a hand-held camera over its sway, rad per pixel; assumed
 
 
 class Degradation(Options):
@@ -141,8 +138,7 @@ _DISTURBANCES: dict[str, dict[str, Any]] = {
     "hand": {"hand": True},
 }
 """Artifacts that are disturbances of the picture (`Degradation`), and their typical size."""
-NAMES = (*_USUAL, *_DISTURBANCES)
-"""All artifacts that a rendered video may have."""
+NAMES = (*_USUAL, *_DISTURBANCES)  #: All artifacts that a rendered video may have.
 
 
 def with_troubles(
@@ -234,10 +230,8 @@ class Shake:
         return np.ascontiguousarray(np.maximum(moved, 0.0), dtype=light.dtype)
 
 
-_CABLE = 1.0 / 80.0
-"""Width of a cable over that of the picture; assumed."""
-_CABLE_LIGHT = 0.02
-"""Linear light of a cable: black rubber; assumed."""
+_CABLE = 1.0 / 80.0  # width of a cable over that of the picture; assumed
+_CABLE_LIGHT = 0.02  # linear light of a cable: black rubber; assumed
 
 
 class ViewArtifacts:
@@ -264,8 +258,7 @@ class ViewArtifacts:
 
 _LAMP_LIGHT = 0.22
 """Linear light of a lamp in the oil's surface, where white paper has 0.8; a surface of oil mirrors 3 %; assumed."""
-_LEAST_LAMP, _LARGEST_LAMP = (0.12, 0.20), (0.27, 0.31)
-"""Sides of a lamp over the picture's width and height; assumed."""
+_LEAST_LAMP, _LARGEST_LAMP = (0.12, 0.20), (0.27, 0.31)  # sides of a lamp over the picture's width and height; assumed
 
 
 def _mirrored_lamps(count: int, seed: int, size: tuple[int, int]) -> np.ndarray:

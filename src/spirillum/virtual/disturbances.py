@@ -14,10 +14,8 @@ from spirillum.virtual.optics import Tank, VirtualLens
 _LAMP, _LOST, _TILT, _GLARE, _BUBBLES, _HAND, _GRAIN = range(10, 17)
 _GRAINS = 1 << 21
 _GLARE_LIGHT, _BUBBLE_LIGHT = 1.3, 0.9
-_HAND_SHADE, _HAND_TIME = 0.45, 4.0
-"""Share of light that a hand blocks, and the time in which it passes, s; assumed."""
-_MIN_DRIFT, _MAX_DRIFT = 0.05e-3, 0.4e-3
-"""Speed of bubbles, m/s; assumed."""
+_HAND_SHADE, _HAND_TIME = 0.45, 4.0  # share of light that a hand blocks, and the time in which it passes, s; assumed
+_MIN_DRIFT, _MAX_DRIFT = 0.05e-3, 0.4e-3  # speed of bubbles, m/s; assumed
 
 
 def tilt_of(degradation: Degradation, seed: int) -> tuple[float, float]:

@@ -71,8 +71,7 @@ class Planned:
     folder: str
     robot: Robot
     number: int
-    rates: Mapping[str, float]
-    """The steady rates times the trial's random factor, SI."""
+    rates: Mapping[str, float]  #: The steady rates times the trial's random factor, SI.
     trial: TrialOptions
     seed: int
 
@@ -92,18 +91,12 @@ class VirtualExperiment(DisplayMixin):
     """A virtual experiment that was written."""
 
     folder: Path
-    robots: tuple[str, ...]
-    """Folder of each robot."""
-    trials: int
-    """Trials of each robot."""
-    kept: int
-    """Trials that were there already."""
-    spread: float
-    """Planted standard deviation of the motor's rate from trial to trial, relative."""
-    observations: Path
-    """The true rates of all trials as an observations file."""
-    rates: Mapping[str, Mapping[str, float]]
-    """Rates of each robot without the planted differences, SI."""
+    robots: tuple[str, ...]  #: Folder of each robot.
+    trials: int  #: Trials of each robot.
+    kept: int  #: Trials that were there already.
+    spread: float  #: Planted standard deviation of the motor's rate from trial to trial, relative.
+    observations: Path  #: The true rates of all trials as an observations file.
+    rates: Mapping[str, Mapping[str, float]]  #: Rates of each robot without the planted differences, SI.
     models: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """Of each robot, what its rates are from, and why that model was taken."""
     warnings: tuple[Note, ...] = ()
@@ -229,16 +222,12 @@ def _answered_by(source: str, reason: str) -> dict[str, str]:
 class _Filmed(NamedTuple):
     """Content of an experiment: robots and trials."""
 
-    robots: dict[str, Robot]
-    """By the names of their folders."""
-    model: str
-    """The study's first."""
-    placement: Placement | None
-    """Poses of the robots in the study."""
+    robots: dict[str, Robot]  # by the names of their folders
+    model: str  # the study's first
+    placement: Placement | None  # poses of the robots in the study
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None) -> _Filmed:
-    """Robots of a study; None: the paper's robots."""
     if study is None:
         return _Filmed({name: load(name) for name in PAPER_ROBOTS}, AUTO, None)
     from spirillum.studies.study_loader import load_study
@@ -275,7 +264,6 @@ def _planned(
     index: int,
     gap: float | None = None,
 ) -> list[Planned]:
-    """The trials of the robot at an index of the study."""
     planned = []
     low, high = swimming_range(robot, camera)
     for number in range(1, plan.trials + 1):

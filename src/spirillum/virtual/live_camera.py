@@ -24,19 +24,15 @@ from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
 from spirillum.virtual.trial_options import CameraOptions, Seeded
 from spirillum.virtual.truth import setup_text
 
-_LAMP_TIME = 20.0
-"""Time over which the lamp drifts once, s, as in a trial's usual length."""
-_SHARE = 0.1
-"""Initial position of the robot, as a share of the path on which it is fully visible."""
+_LAMP_TIME = 20.0  # time over which the lamp drifts once, s, as in a trial's usual length
+_SHARE = 0.1  # initial position of the robot, as a share of the path on which it is fully visible
 
 
 class Shot(NamedTuple):
     """A picture."""
 
-    time: float
-    """The middle of its exposure, s; the exposure ends at the moment that was shown."""
-    image: np.ndarray
-    """8-bit RGB, (height, width, 3), synthetic, and marked so."""
+    time: float  #: The middle of its exposure, s; the exposure ends at the moment that was shown.
+    image: np.ndarray  #: 8-bit RGB, (height, width, 3), synthetic, and marked so.
 
 
 class VirtualCamera:

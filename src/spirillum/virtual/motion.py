@@ -25,8 +25,7 @@ from spirillum.virtual.trial_options import CameraOptions, MotionOptions, TrialO
 if TYPE_CHECKING:
     import xarray as xr
 
-_USUAL = 20.0
-"""Length of a video of steady swimming, s."""
+_USUAL = 20.0  # length of a video of steady swimming, s
 _LARGEST_STEP = 0.5 * np.pi
 """Largest turn of the tail between two samples of a run above which a video states that it interpolates, rad."""
 
@@ -36,13 +35,10 @@ class TrialMotion:
     """A trajectory and its source."""
 
     trajectory: TrialTrajectory
-    model: str
-    """Model, `prescribed`, or both; of a run `run` and its model."""
+    model: str  #: Model, `prescribed`, or both; of a run `run` and its model.
     warnings: tuple[Note, ...] = ()
-    reason: str = ""
-    """Why the model was taken; empty where it was named."""
-    motion: str = HELD
-    """`held`, `trial`, `run`, or `prescribed`."""
+    reason: str = ""  #: Why the model was taken; empty where it was named.
+    motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
 
 
 def steady_rates(

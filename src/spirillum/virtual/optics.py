@@ -31,20 +31,14 @@ class VirtualLens:
     at x = y = 0. Pixel centres are at whole numbers, u to the right, v downwards.
     """
 
-    eye: float
-    """Height of the lens, m."""
-    surface: float
-    """Height of the surface between air and oil, m."""
-    index: float
-    """Refractive index of the oil."""
-    focal: float
-    """Focal length, pixels."""
-    size: tuple[int, int]
-    """Width and height of the picture, pixels."""
+    eye: float  #: Height of the lens, m.
+    surface: float  #: Height of the surface between air and oil, m.
+    index: float  #: Refractive index of the oil.
+    focal: float  #: Focal length, pixels.
+    size: tuple[int, int]  #: Width and height of the picture, pixels.
     leftwards: bool = False
     """Whether the nose points to the left in the picture: the camera is rotated by half a turn about its axis."""
-    tilt: tuple[float, float] = (0.0, 0.0)
-    """Angle of the optical axis to the vertical about x, then about y, rad."""
+    tilt: tuple[float, float] = (0.0, 0.0)  #: Angle of the optical axis to the vertical about x, then about y, rad.
     distortion: tuple[float, float] = (0.0, 0.0)
     """Coefficients k1, k2 of radial distortion, r -> r (1 + k1 r^2 + k2 r^4), r over the focal length."""
     turn: Samples = field(init=False, repr=False, compare=False)
@@ -88,51 +82,37 @@ class VirtualLens:
         return np.column_stack([points, np.full(len(points), height)])
 
 
-_SPACING = 2e-3
-"""From one line of the ruler to the next in the usual picture, m."""
+_SPACING = 2e-3  # from one line of the ruler to the next in the usual picture, m
 _SPACINGS = tuple(digit * 10.0**power for power in range(-5, -1) for digit in (1.0, 2.0, 5.0))
 """Those that rulers have, down to a stage micrometer's, m."""
-_SIDE_AXIS = 30e-3
-"""Height of the tube's axis above the far wall in the view from the side, m; assumed."""
-_GLASS = 2.0e-3
-"""Thickness of the tube's wall, m; assumed."""
+_SIDE_AXIS = 30e-3  # height of the tube's axis above the far wall in the view from the side, m; assumed
+_GLASS = 2.0e-3  # thickness of the tube's wall, m; assumed
 _LINE_WIDTH, _LINE_LENGTH, _RULER_DISTANCE, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
-_OIL = (0.72, 0.90, 1.98)
-"""Absorption coefficients of red, green and blue in the oil, 1/m: a faint tint, assumed."""
+_OIL = (0.72, 0.90, 1.98)  # absorption coefficients of red, green and blue in the oil, 1/m: a faint tint, assumed
 _GLASS_ABSORPTION = 38.0
 """Absorption coefficient of the glass, 1/m; assumed.
 
 Glass refracts nearly as oil does: lines of sight go straight through it.
 """
-_MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)
-"""Wavenumbers of the floor's fine structure, 1/m; assumed."""
+_MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)  # wavenumbers of the floor's fine structure, 1/m; assumed
 _SHEET = (0.90, 0.90, 0.88)
 _FINE_LINES, _STRONG_LINES = (0.11, (0.47, 0.60, 0.84)), (0.16, (0.17, 0.18, 0.23))
 """Grid paper: sRGB of the sheet; width of a line over the spacing, and sRGB of its ink; assumed."""
-_FINE = 6
-"""Samples of a pixel along u and along v."""
+_FINE = 6  # samples of a pixel along u and along v
 
 
 @dataclass(frozen=True)
 class Tank:
     """The still parts, in the camera's frame, m. Heights count from the floor (from the side: from the far wall)."""
 
-    view: str
-    """`top` or `side`."""
-    tube: float | None
-    """Inner radius of the tube; None: there is none."""
-    tube_height: float
-    """Height of the tube's axis; where the robot swims without one."""
-    tube_length: float
-    """Length of the tube; its middle is at x = 0."""
-    spacing: float
-    """From one line of the ruler to the next."""
-    ruler: float
-    """|y| at which the lines of both strips begin; in the usual picture they are 8 mm long."""
-    shrunk: float = 1.0
-    """Width of the picture over that of the usual one: ruler and floor are as much finer."""
-    grid: bool = False
-    """Whether grid paper covers the floor, instead of the ruler's strips."""
+    view: str  #: `top` or `side`.
+    tube: float | None  #: Inner radius of the tube; None: there is none.
+    tube_height: float  #: Height of the tube's axis; where the robot swims without one.
+    tube_length: float  #: Length of the tube; its middle is at x = 0.
+    spacing: float  #: From one line of the ruler to the next.
+    ruler: float  #: |y| at which the lines of both strips begin; in the usual picture they are 8 mm long.
+    shrunk: float = 1.0  #: Width of the picture over that of the usual one: ruler and floor are as much finer.
+    grid: bool = False  #: Whether grid paper covers the floor, instead of the ruler's strips.
 
     @property
     def outside(self) -> float:
@@ -143,14 +123,10 @@ class Tank:
 class Backdrop(NamedTuple):
     """The still parts as the camera sees them; linear light, single precision."""
 
-    light: np.ndarray
-    """Without the robot, (rows, columns, 3)."""
-    over: np.ndarray
-    """Transmission of the glass between robot and camera, (rows, columns)."""
-    shine: np.ndarray
-    """Light mirrored by the glass, (rows, columns)."""
-    floor: np.ndarray
-    """x and y of the floor behind each pixel, m, (rows, columns, 2)."""
+    light: np.ndarray  #: Without the robot, (rows, columns, 3).
+    over: np.ndarray  #: Transmission of the glass between robot and camera, (rows, columns).
+    shine: np.ndarray  #: Light mirrored by the glass, (rows, columns).
+    floor: np.ndarray  #: x and y of the floor behind each pixel, m, (rows, columns, 2).
 
 
 def tank_of(robot: Robot, view: str, shrunk: float = 1.0, *, grid: bool = False) -> Tank:
@@ -174,12 +150,10 @@ def _reach(robot: Robot) -> float:
 
 
 def spots(side: int) -> Samples:
-    """Positions of side^2 samples in each of 4 x 4 neighbouring pixels, -0.5 to 0.5, (16, side^2, 2).
-
-    In every pixel one sample lies in each of side x side cells and in each of side^2 rows and columns (multi-jittered
-    samples: K. Chiu, P. Shirley, C. Wang, Graphics Gems IV, 1994). The neighbours differ, and are shifted against each
-    other, so that an edge of any direction moves in steps finer than one sample's.
-    """
+    """Positions of side^2 samples in each of 4 x 4 neighbouring pixels, -0.5 to 0.5, (16, side^2, 2)."""
+    # In every pixel one sample lies in each of side x side cells and in each of side^2 rows and columns (multi-jittered
+    # samples: K. Chiu, P. Shirley, C. Wang, Graphics Gems IV, 1994). The neighbours differ, and are shifted against
+    # each other, so that an edge of any direction moves in steps finer than one sample's.
     rng = np.random.default_rng(4)
     count = side * side
     found = np.empty((16, count, 2))
@@ -240,14 +214,7 @@ def _print_grid(still: Backdrop, spacing: float, paper: Samples) -> None:
 
 
 def _line_share(positions: Samples, pixel: Samples, spacing: float, width: float) -> Samples:
-    """Share of each pixel that parallel lines cover, centred at multiples of the spacing.
-
-    Args:
-        positions: of the pixels' middles across the lines, m.
-        pixel: their sizes, m.
-        spacing: from one line to the next, m.
-        width: of a line, m.
-    """
+    """Share of each pixel that parallel lines cover, centred at multiples of the spacing; all in m."""
     low, high = (
         width * np.floor(edge / spacing + 0.5)
         + np.clip(edge - spacing * np.floor(edge / spacing + 0.5) + 0.5 * width, 0.0, width)
@@ -256,18 +223,12 @@ def _line_share(positions: Samples, pixel: Samples, spacing: float, width: float
     return np.asarray((high - low) / pixel)
 
 
-_SURFACE = 60e-3
-"""Height of the oil's surface above the reference plane, m; assumed."""
-_EYE = _SURFACE + 150e-3
-"""Height of the lens: 150 mm above the oil, as the paper has its camera above the tank."""
-_INDEX = 1.40
-"""Refractive index of silicone oil."""
-_FOCAL = 740.0 / 640.0
-"""Focal length over the width of the usual picture; assumed."""
-_SHORTEST, _LONGEST = 24, 2.0
-"""Shortest robot in pixels, longest in widths of the picture."""
-_LOOKS = 1001
-"""Times at which the visibility of the robot is checked."""
+_SURFACE = 60e-3  # height of the oil's surface above the reference plane, m; assumed
+_EYE = _SURFACE + 150e-3  # height of the lens: 150 mm above the oil, as the paper has its camera above the tank
+_INDEX = 1.40  # refractive index of silicone oil
+_FOCAL = 740.0 / 640.0  # focal length over the width of the usual picture; assumed
+_SHORTEST, _LONGEST = 24, 2.0  # shortest robot in pixels, longest in widths of the picture
+_LOOKS = 1001  # times at which the visibility of the robot is checked
 
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> VirtualLens:

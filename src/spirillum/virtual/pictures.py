@@ -16,16 +16,12 @@ from spirillum.virtual.optics import Backdrop, Tank, VirtualLens, backdrop, spot
 from spirillum.virtual.solids import MATERIALS, Lamps, RenderedSolid, Shading, joined, part_of, solids_of
 from spirillum.virtual.trajectory import CameraFramePose, TrialTrajectory
 
-_GLASS = 1.47
-"""Refractive index of the cover; borosilicate glass, assumed."""
-_WALL = 0.11
-"""Thickness of its wall over its radius; assumed: 1 mm of 9."""
-_AMBIENT = 0.85
-"""Light of the room beside the picture over the picture's mean; assumed."""
+_GLASS = 1.47  # refractive index of the cover; borosilicate glass, assumed
+_WALL = 0.11  # thickness of its wall over its radius; assumed: 1 mm of 9
+_AMBIENT = 0.85  # light of the room beside the picture over the picture's mean; assumed
 _SIDEWAYS = float(np.cos(np.radians(75.0)))
 """Cosine of the angle to the vertical above which light comes from the room instead of the floor."""
-_ENCODED = 2.0
-"""Offset of a normal's components in its encoding as a colour, which is positive."""
+_ENCODED = 2.0  # offset of a normal's components in its encoding as a colour, which is positive
 _EMPTY = -1e30
 _NEAREST, _FARTHEST = 1e-9, 0.9999
 _FAR = np.linspace(_NEAREST, _FARTHEST, 501)
@@ -37,10 +33,8 @@ _SHARP, _BLUR = 2.0, 0.25
 class Glass(NamedTuple):
     """The cover in a window of the picture."""
 
-    share: Samples
-    """Share of each pixel that the cover has, (rows, columns)."""
-    across: Samples
-    """x and y of its unit normal in the camera's frame, (rows, columns, 2)."""
+    share: Samples  #: Share of each pixel that the cover has, (rows, columns).
+    across: Samples  #: x and y of its unit normal in the camera's frame, (rows, columns, 2).
 
 
 class Cover:
@@ -110,22 +104,10 @@ class Cover:
 
 
 def light_path(far: Samples, radius: float, height: float, index: float) -> tuple[Samples, Samples]:
-    """Where the floor is seen through a round cover with air inside, straight from above.
-
-    A line of sight stays in a plane with the normal, where wall and air are circles, and n times its distance from the
-    centre is the same in oil, glass and air (Bouguer's formula: M. Born, E. Wolf,
-    Principles of Optics, 3.2). Where that exceeds the air's radius, the air mirrors it (total reflection).
-
-    Args:
-        far: distance of the line of sight from the centre over the cover's radius, 0 to 1, (n,).
-        radius: of the cover, m.
-        height: of its centre above the floor, m.
-        index: refractive index of the oil.
-
-    Returns:
-        Distance by which the floor is seen farther from the centre, m, and the share of the light that is from there;
-        the rest comes from the room; (n,) each.
-    """
+    """How far out the floor is seen through a round cover with air inside, m, and the share of its light."""
+    # A line of sight stays in a plane with the normal, where wall and air are circles, and n times its distance from
+    # the centre is the same in oil, glass and air (Bouguer's formula: M. Born, E. Wolf, Principles of Optics, 3.2).
+    # Where that exceeds the air's radius, the air mirrors it (total reflection).
     inner = radius * (1.0 - _WALL)
     distance = far * radius
     at_oil, in_glass = np.arcsin(far), np.arcsin(index / _GLASS * far)
@@ -149,24 +131,19 @@ def _mirrored(inside: Samples, outside: Samples) -> Samples:
     return np.asarray(np.where(inside + outside < 1e-4, upright, oblique))
 
 
-_STILL = 0.1
-"""Motion blur below which an exposure is rendered at one time, pixels."""
-_STEP = 0.8
-"""Motion blur between two times of an exposure, pixels."""
+_STILL = 0.1  # motion blur below which an exposure is rendered at one time, pixels
+_STEP = 0.8  # motion blur between two times of an exposure, pixels
 _MAX_TIMES = 8
 _LAMPS = {
     "top": ((0.25, 0.55, 0.85, 0.62), (-0.5, -0.45, 0.75, 0.38)),
     "side": ((0.2, 0.9, 0.5, 0.68), (0.0, 0.1, 1.0, 0.34)),
 }
 """Direction towards each lamp (right, up, towards the camera) in the picture, and its strength; assumed."""
-_SHADOW = 0.26
-"""Relative loss of light in the robot's shadow on the floor; assumed."""
+_SHADOW = 0.26  # relative loss of light in the robot's shadow on the floor; assumed
 _MARGIN = 3
-_SIDE = 4
-"""Samples of a pixel along u and along v."""
+_SIDE = 4  # samples of a pixel along u and along v
 _SAMPLES = _SIDE**2
-_FEW = 13
-"""One in so many vertices serves to estimate the motion blur."""
+_FEW = 13  # one in so many vertices serves to estimate the motion blur
 
 
 class Painter:
@@ -288,8 +265,7 @@ _LETTERS = {  # 3 x 5 pixels, rows from the top
     "i": "010 000 010 010 010",
     "c": "000 011 100 100 011",
 }
-_LARGE = 480
-"""Width of a picture above which the letters are twice as large, pixels."""
+_LARGE = 480  # width of a picture above which the letters are twice as large, pixels
 
 
 def stamp(image: np.ndarray) -> None:
@@ -305,11 +281,9 @@ def stamp(image: np.ndarray) -> None:
     corner[mask] = (60, 60, 66)
 
 
-_VIGNETTING = 0.20
-"""Relative loss of light in the corners; assumed."""
+_VIGNETTING = 0.20  # relative loss of light in the corners; assumed
 _STEPS = 1 << 14
-_BRIGHTNESS = 1.05
-"""Exposure of the camera: linear light of white paper is about 0.8."""
+_BRIGHTNESS = 1.05  # exposure of the camera: linear light of white paper is about 0.8
 
 
 class FrameEncoder:

@@ -81,10 +81,8 @@ def _box(along: tuple[float, float], half: Samples, colour: tuple[float, float, 
     return RobotMesh("contents", "body", np.asarray(mesh.vertices), faces, colours, ("contents",), which)
 
 
-_LONGEST = 5e-3
-"""Longest edge of a triangle, m."""
-_CREASE = float(np.radians(35.0))
-"""Angle between triangles above which an edge is sharp, rad."""
+_LONGEST = 5e-3  # longest edge of a triangle, m
+_CREASE = float(np.radians(35.0))  # angle between triangles above which an edge is sharp, rad
 MATERIALS: dict[str, tuple[float, float, float, float]] = {
     "body": (0.34, 0.70, 0.45, 60.0),
     "shaft": (0.25, 0.55, 0.70, 25.0),
@@ -108,43 +106,30 @@ def linear(colours: Samples) -> Samples:
 class Lamps(NamedTuple):
     """Lamps far away, in the camera's frame."""
 
-    towards: Samples
-    """Unit vector towards each lamp, (k, 3)."""
-    halfway: Samples
-    """Unit vector halfway between lamp and camera, (k, 3)."""
-    strength: Samples
-    """(k,)."""
+    towards: Samples  #: Unit vector towards each lamp, (k, 3).
+    halfway: Samples  #: Unit vector halfway between lamp and camera, (k, 3).
+    strength: Samples  #: (k,).
 
 
 class Shading(NamedTuple):
     """Colours of triangles, and the light on their corners."""
 
-    colour: Samples
-    """Linear colour of diffuse light, (m, 3)."""
-    gloss: Samples
-    """Linear colour of specular light, (m, 3)."""
-    diffuse: Samples
-    """Diffuse light of each corner, (m, 3)."""
-    specular: Samples
-    """Specular light of each corner, (m, 3)."""
+    colour: Samples  #: Linear colour of diffuse light, (m, 3).
+    gloss: Samples  #: Linear colour of specular light, (m, 3).
+    diffuse: Samples  #: Diffuse light of each corner, (m, 3).
+    specular: Samples  #: Specular light of each corner, (m, 3).
 
 
 @dataclass(frozen=True)
 class RenderedSolid:
     """A rigid part of the robot, in its own axes, m."""
 
-    vertices: Samples = field(repr=False)
-    """(n, 3), m."""
-    faces: Faces = field(repr=False)
-    """Triangles, outward oriented, (m, 3)."""
-    colours: Samples = field(repr=False)
-    """Linear colour of each triangle, (m, 3)."""
-    gloss: Samples = field(repr=False)
-    """Linear colour of its specular light, (m, 3)."""
-    normals: Samples = field(repr=False)
-    """Unit normals at the corners of each triangle, (m, 3, 3)."""
-    kind: Faces = field(repr=False)
-    """Index of each triangle's material in `MATERIALS`, (m,)."""
+    vertices: Samples = field(repr=False)  #: (n, 3), m.
+    faces: Faces = field(repr=False)  #: Triangles, outward oriented, (m, 3).
+    colours: Samples = field(repr=False)  #: Linear colour of each triangle, (m, 3).
+    gloss: Samples = field(repr=False)  #: Linear colour of its specular light, (m, 3).
+    normals: Samples = field(repr=False)  #: Unit normals at the corners of each triangle, (m, 3, 3).
+    kind: Faces = field(repr=False)  #: Index of each triangle's material in `MATERIALS`, (m,).
 
     def shading(self, turn: Samples, lamps: Lamps) -> Shading:
         """Colours, and light on the corners."""

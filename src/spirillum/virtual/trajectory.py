@@ -15,40 +15,30 @@ if TYPE_CHECKING:
 
     from spirillum.dynamics.run_file import Poses
 
-_MAX_OBLIQUITY = 0.5
-"""Largest angle of a run's robot to the channel, rad."""
-_SAMPLES_PER_TURN = 240
-"""Samples of the wobble per turn of the tail."""
+_MAX_OBLIQUITY = 0.5  # largest angle of a run's robot to the channel, rad
+_SAMPLES_PER_TURN = 240  # samples of the wobble per turn of the tail
 
 
 @dataclass(frozen=True)
 class CameraFramePose:
     """Position and attitude of the robot at one time, in the camera's frame."""
 
-    position: Samples
-    """The body's mid-length, m, (3,)."""
-    body: Samples
-    """Rotation of the body, (3, 3)."""
-    rotor: Samples
-    """Rotation of the rotor from its tail at phase 0, (3, 3)."""
+    position: Samples  #: The body's mid-length, m, (3,).
+    body: Samples  #: Rotation of the body, (3, 3).
+    rotor: Samples  #: Rotation of the rotor from its tail at phase 0, (3, 3).
 
 
 @dataclass(frozen=True)
 class TrialTrajectory:
     """Position and angles over time in the camera's frame, linear between samples."""
 
-    time: Samples = field(repr=False)
-    """(n,) increasing, s."""
-    position: Samples = field(repr=False)
-    """The body's mid-length, m, (n, 3)."""
+    time: Samples = field(repr=False)  #: (n,) increasing, s.
+    position: Samples = field(repr=False)  #: The body's mid-length, m, (n, 3).
     heading: Samples = field(repr=False)
     """Angle of the motor axis to x in the plane of the picture, about +z, rad, (n,)."""
-    pitch: Samples = field(repr=False)
-    """Angle by which the nose points towards the camera, rad, (n,)."""
-    body_angle: Samples = field(repr=False)
-    """Angle of the body about +x, unwrapped, rad, (n,)."""
-    tail_phase: Samples = field(repr=False)
-    """Phase of the tail about +x in the lab, unwrapped, rad, (n,)."""
+    pitch: Samples = field(repr=False)  #: Angle by which the nose points towards the camera, rad, (n,).
+    body_angle: Samples = field(repr=False)  #: Angle of the body about +x, unwrapped, rad, (n,).
+    tail_phase: Samples = field(repr=False)  #: Phase of the tail about +x in the lab, unwrapped, rad, (n,).
 
     @property
     def duration(self) -> float:
@@ -125,19 +115,7 @@ def steady_trajectory(
     body_angle: float = 0.0,
     tail_phase: float = 0.0,
 ) -> TrialTrajectory:
-    """Swimming at constant rates along the channel.
-
-    Args:
-        duration: from the first frame to the last, s.
-        forward_velocity: along x, m/s.
-        body_rotation_rate: about +x, rad/s.
-        tail_rotation_rate: about +x in the lab, rad/s.
-        position: of the body's mid-length at the first frame, m, (3,).
-        heading: angle of the robot's axis to the channel, rad.
-        wobble: amplitude of a transverse oscillation at the tail's rate, m.
-        body_angle: of the body at the first frame, rad.
-        tail_phase: of the tail at the first frame, rad.
-    """
+    """Swimming at constant rates along the channel; `wobble` is the amplitude of a transverse oscillation, m."""
     turns = abs(tail_rotation_rate) * duration / (2.0 * np.pi)
     time = np.linspace(0.0, duration, 2 + (int(_SAMPLES_PER_TURN * turns) if wobble > 0 else 0))
     path = position + np.outer(time, [forward_velocity, 0.0, 0.0])

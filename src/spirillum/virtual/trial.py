@@ -45,7 +45,7 @@ from spirillum.virtual.artifacts import (
 )
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.motion import TrialMotion, motion_of, motion_of_run, motion_of_trial
-from spirillum.virtual.optics import Tank, VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
+from spirillum.virtual.optics import VirtualLens, check_size, framed, lens_of, out_of_picture, tank_of
 from spirillum.virtual.pictures import FrameEncoder, Painter
 from spirillum.virtual.trial_options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
@@ -56,8 +56,7 @@ if TYPE_CHECKING:
 
 _QUALITY = {"preset": "veryfast", "x264-params": "mbtree=0"}
 """With `mbtree`, small pictures now and then gave different bytes from equal frames."""
-_THREADS = 2
-"""Threads of the encoder, a fixed number, so that a seed determines the bytes."""
+_THREADS = 2  # threads of the encoder, a fixed number, so that a seed determines the bytes
 
 
 class FrameWriter(Protocol):
@@ -129,40 +128,28 @@ def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
 
 
 _MOST_FRAMES = 200_000
-_LEAST_DEPTH = 1e-6
-"""Least distance of the stated axis from the floor and from the oil's surface, m."""
+_LEAST_DEPTH = 1e-6  # least distance of the stated axis from the floor and from the oil's surface, m
 
 
 @dataclass(frozen=True, repr=False)
 class VirtualTrial(DisplayMixin):
     """A virtual trial that was written."""
 
-    path: Path
-    """The video, or the folder of frames."""
-    setup: Path
-    """The setup file."""
-    truth: Path
-    """The truth, JSON; beside it the truth on every frame (NetCDF)."""
+    path: Path  #: The video, or the folder of frames.
+    setup: Path  #: The setup file.
+    truth: Path  #: The truth, JSON; beside it the truth on every frame (NetCDF).
     robot: Robot
     rates: Mapping[str, float]
     """True `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`, `motor_rotation_rate`, SI."""
-    model: str
-    """Model, `prescribed`, or `run`: the source of the motion."""
-    frames: int
-    """Number of frames in the video."""
-    dropped: int
-    """Number of frames that were lost."""
-    size: tuple[int, int]
-    """Width and height, pixels."""
-    fps: float
-    """Frames a second."""
-    seed: int
-    """Of all random numbers."""
+    model: str  #: Model, `prescribed`, or `run`: the source of the motion.
+    frames: int  #: Number of frames in the video.
+    dropped: int  #: Number of frames that were lost.
+    size: tuple[int, int]  #: Width and height, pixels.
+    fps: float  #: Frames a second.
+    seed: int  #: Of all random numbers.
     warnings: tuple[Note, ...] = ()
-    model_reason: str = ""
-    """Why the model was taken; empty where it was named."""
-    motion: str = HELD
-    """`held`, `trial`, `run`, or `prescribed`."""
+    model_reason: str = ""  #: Why the model was taken; empty where it was named.
+    motion: str = HELD  #: `held`, `trial`, `run`, or `prescribed`.
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
@@ -204,7 +191,6 @@ def _shown(
     camera: CameraOptions,
     progress: Callable[[str, int, int], None] | None,
 ) -> tuple[Robot, TrialMotion]:
-    """The robot of a video and its motion."""
     from spirillum.dynamics.run_file import open_run, robot_of
 
     if run is None or (isinstance(run, str | Path) and str(run) == RELEASED):
@@ -312,7 +298,9 @@ def render(
     }
     if robot_file != robot.name:
         texts["robot"] = robot_text(robot)
-    painter = _painter_of(robot, tank, lens, troubles, seed)
+    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
+    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
+    painter = Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
     frames = FrameEncoder(
         painter, disturbances, trajectory, camera.exposure, ViewArtifacts(troubles, seed, camera.size)
     )
@@ -329,13 +317,6 @@ def render(
         _write_frames(writer, frames, (kept, counted), camera.fps, on_progress)
         on_progress("render: writing", len(kept), len(kept))
     return written
-
-
-def _painter_of(robot: Robot, tank: Tank, lens: VirtualLens, troubles: Troubles, seed: int) -> Painter:
-    """Painter of the robot, with uneven stripes and a cover of glass among the artifacts."""
-    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
-    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
-    return Painter(robot, tank, lens, edges, covered=troubles.glass_cover)
 
 
 def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[Note]:

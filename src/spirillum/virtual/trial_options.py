@@ -45,7 +45,6 @@ def _check_field(width: float) -> float:
 
 
 def _read_frame_rate(value: Any) -> float:
-    """Frames per second."""
     return float(Fraction(in_range(1.0, 1000.0, " frames a second")(value)).limit_denominator(1001))
 
 

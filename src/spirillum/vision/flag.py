@@ -11,10 +11,8 @@ from spirillum.notes import Note
 class Flag:
     """Something about a video that whoever uses its numbers has to know."""
 
-    name: str
-    """Short, for machines, such as `robot-left-the-view`."""
-    sentence: str
-    """One sentence for people: finding, time, and effect on the numbers."""
+    name: str  #: Short, for machines, such as `robot-left-the-view`.
+    sentence: str  #: One sentence for people: finding, time, and effect on the numbers.
     spoils: tuple[str, ...] = ()
     """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
     frame: int | None = None

@@ -49,8 +49,7 @@ class CameraSetup(Section):
     """Calibration of the lens; without it the lens is taken as free of distortion, beyond what the markers show."""
 
 
-INDICES = (1.0, 3.0)
-"""Least and largest refractive index."""
+INDICES = (1.0, 3.0)  #: Least and largest refractive index.
 
 
 class TankSetup(Section):

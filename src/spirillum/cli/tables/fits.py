@@ -88,8 +88,7 @@ def model_ranking(answer: Answer) -> Blocks:
     yield from (Detail(_failures(item)) for item in answer["models"])
 
 
-_STANDS_OUT = 2.5
-"""Standard deviations below which the worst of some tens of means is as far off as chance makes it."""
+_STANDS_OUT = 2.5  # standard deviations below which the worst of some tens of means is as far off as chance makes it
 
 
 def _failures(item: Answer) -> str:

@@ -111,7 +111,12 @@ def model_comparison(answer: Answer, *, all_of_it: bool = False) -> Blocks:
         if item["answered"]:
             if "trial" in item:
                 yield from released_columns({"trial": item["trial"]})
-            yield Detail(_own_error(item))
+            error = item["error_estimate"]
+            estimate = ""
+            if error["value"] is not None:
+                against = error.get("against", "another resolution")
+                estimate = f"{percent(error['value'])} of the forward velocity, against {against}; "
+            yield Detail(f"known error of {item['model']}: {estimate}{error['statement']}")
         else:
             yield f"no answer by {item['model']}: {item['reason']}"
     yield from files_of(answer, file="picture", plot="why models differ")
@@ -183,16 +188,6 @@ def _shown_unit(models: Sequence[Answer], name: str) -> str:
     return display_unit(max(sizes, default=None), models[0][name]["unit"])
 
 
-def _own_error(item: Answer) -> str:
-    """A model's error in words, with its own estimate where it has one."""
-    error = item["error_estimate"]
-    estimate = ""
-    if error["value"] is not None:
-        against = error.get("against", "another resolution")
-        estimate = f"{percent(error['value'])} of the forward velocity, against {against}; "
-    return f"known error of {item['model']}: {estimate}{error['statement']}"
-
-
 def _difference(share: float | None) -> str:
     if share is None:
         return "-"
@@ -202,8 +197,7 @@ def _difference(share: float | None) -> str:
     return "0.0%" if float(text) == 0 else f"{text}%"
 
 
-_FACTOR = 2.0
-"""Ratio from which on a difference is shown as a multiple."""
+_FACTOR = 2.0  # ratio from which on a difference is shown as a multiple
 
 
 def simulation(answer: Answer) -> Blocks:
@@ -223,28 +217,19 @@ def simulation(answer: Answer) -> Blocks:
     if "placement" in answer:
         yield from placement_of(answer["placement"])
     if "in_tube" in answer:
-        yield _in_tube(answer["in_tube"])
+        pose = answer["in_tube"]
+        shown = {name: in_words(pose[name]) for name in pose if name != "ends"}
+        if pose["wait"]["value"]:
+            shown["gap"] += " after the wait, where the run begins"
+        details = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
+        yield Detail(f"in the tube: ends {pose['ends']}, {', '.join(details)}")
     if "state" in answer:
-        yield _end_state(answer)
+        yield Detail(f"state at the end: {answer['state']} ({END_STATES[answer['state']]})")
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
     yield Detail(f"last 2/3 of run: over the last two thirds of {whole}, on or off")
     yield Detail(f"steady part: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
-
-
-def _end_state(answer: Answer) -> Detail:
-    """The state in which a released robot ends, and what it means."""
-    return Detail(f"state at the end: {answer['state']} ({END_STATES[answer['state']]})")
-
-
-def _in_tube(pose: Answer) -> Detail:
-    """Under what a free run in the tube was made."""
-    shown = {name: in_words(pose[name]) for name in pose if name != "ends"}
-    if pose["wait"]["value"]:
-        shown["gap"] += " after the wait, where the run begins"
-    details = [f"{name.replace('_', ' ')} {words}" for name, words in shown.items()]
-    return Detail(f"in the tube: ends {pose['ends']}, {', '.join(details)}")
 
 
 def _averages(title: str, answer: Answer) -> Table:
@@ -267,12 +252,10 @@ def _rounded(value: float | None, most: float | None) -> float | None:
 
 
 _ROUNDING = 1e-12
-_NONE: Answer = {"value": None}
-"""Of the time, which has no mean."""
+_NONE: Answer = {"value": None}  # of the time, which has no mean
 
 
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """What happened, a line each."""
     for event in merged_events([(event["time"], event["what"]) for event in events]):
         again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
         before = " before the run, in the wait" if event.time < 0.0 else ""
@@ -421,7 +404,6 @@ def _learnt(learnt: Answer, drawn: Answer) -> str:
 
 
 def _scores(scores: Answer, unit: str) -> Blocks:
-    """Every controller with its intervals."""
     rows = grid("", "controller", "runs", "good", "mean error", "beyond feedback", "energy")
     for column in rows.columns[1:]:
         column.justify = "right"

@@ -21,8 +21,7 @@ class Detail(str):
     __slots__ = ()
 
 
-Block = str | Table
-"""A line, a detail or a table of an answer; the first one is its title, or has it."""
+Block = str | Table  #: A line, a detail or a table of an answer; the first one is its title, or has it.
 Blocks = Iterator[Block]
 _NUMBERS = ("value", "low", "high", "SI", "last 2/3 of run", "drive on", "steady part", "held", "trial", "steady")
 """Columns of numbers, which are never folded: names are."""
@@ -80,8 +79,7 @@ def columns_grid(title: str, answer: Answer, only: Iterable[str] | None = None) 
     return table
 
 
-RELEASED_COLUMNS = ("trial", "steady")
-"""Entries of an answer beside the held one."""
+RELEASED_COLUMNS = ("trial", "steady")  #: Entries of an answer beside the held one.
 
 
 def released_columns(answer: Answer) -> Iterator[Block]:
@@ -164,8 +162,7 @@ def placement_of(placement: Answer, head: str = "placement") -> Iterator[Detail]
     yield Detail(f"{head}: {', '.join(details)}")
 
 
-RELEASED = "released at"
-"""Head of the line on the placement of a robot that is released there."""
+RELEASED = "released at"  #: Head of the line on the placement of a robot that is released there.
 
 
 def unsteady(answer: Answer) -> Iterator[str]:

@@ -63,10 +63,8 @@ def _empty_results(answer: Answer) -> Iterator[str]:
         yield f"{answer['unanswered']} of {answer['results']} results are empty: notes and variable `outside` say why"
 
 
-_MANY = 5
-"""Quantities from which on a ranking has units below their names, to fit into a terminal."""
-_WHOLE = 24
-"""Length of names that are not wrapped."""
+_MANY = 5  # quantities from which on a ranking has units below their names, to fit into a terminal
+_WHOLE = 24  # length of names that are not wrapped
 
 
 def _ranking(answer: Answer, rows: int) -> Blocks:
@@ -78,7 +76,9 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
         yield f"no robot has an answer{': ' if why else ''}{'; '.join(why)}"
         return
     columns = [column for name in robots[0] if name != "robot" for column in _columns(robots, name)]
-    found = grid(_basis(ranking), "", "robot")
+    walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
+    order = order_in_words(settled="settled" in ranking, held=ranking["held"])
+    found = grid(f"{order}: model {ranking['model']}, friction {ranking['friction']}{walls}", "", "robot")
     found.columns[1].no_wrap = all(len(item["robot"]) <= _WHOLE for item in robots)
     split = len(columns) >= _MANY
     for title, _ in columns:
@@ -94,12 +94,6 @@ def _ranking(answer: Answer, rows: int) -> Blocks:
     if ranking["low_and_high"] in ENDS:
         where = ", of robots at a fixed pose: in ranking.csv" if "settled" in ranking else ""
         yield Detail(f"low, high: {ENDS[ranking['low_and_high']]}{where}")
-
-
-def _basis(ranking: Answer) -> str:
-    walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    order = order_in_words(settled="settled" in ranking, held=ranking["held"])
-    return f"{order}: model {ranking['model']}, friction {ranking['friction']}{walls}"
 
 
 def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:
@@ -156,7 +150,6 @@ def design(answer: Answer) -> Blocks:
 
 
 def _confirmed(designs: Sequence[Answer]) -> Table:
-    """Held and trial of the best designs."""
     paths = list(designs[0]["design"])
     units = {
         path: display_unit(designs[0]["design"][path]["value"], designs[0]["design"][path]["unit"]) for path in paths

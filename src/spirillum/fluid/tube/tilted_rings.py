@@ -253,8 +253,8 @@ class TiltedRings(Rings):
     ) -> Samples:
         """Waves of one k and some orders on arcs of rings.
 
-        Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs about
-        the tube's axis, (rings, angles, 3), m.
+        Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs
+        about the tube's axis, (rings, angles, 3), m.
         """
         from spirillum.kernels.stokes_flow import ring_waves, single_ring_waves
 

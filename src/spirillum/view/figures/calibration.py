@@ -27,14 +27,10 @@ if TYPE_CHECKING:
     from spirillum.calibration.identifiability import LikelihoodProfile
 
 
-_MOST = 6
-"""Numbers of the figure: more would leave no room for a pair's contours."""
-_LETTERS = 13
-"""Letters of a line below a panel."""
-_MARGIN = 1.0
-"""Room for the labels beside the cells, inches."""
-_LIMIT = 3.84
-"""Misfit at the limits of a 95 % interval: chi squared of one degree of freedom."""
+_MOST = 6  # numbers of the figure: more would leave no room for a pair's contours
+_LETTERS = 13  # letters of a line below a panel
+_MARGIN = 1.0  # room for the labels beside the cells, inches
+_LIMIT = 3.84  # misfit at the limits of a 95 % interval: chi squared of one degree of freedom
 _BINS = 32
 
 

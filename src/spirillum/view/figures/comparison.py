@@ -34,11 +34,9 @@ from spirillum.view.figures.style import (
     styled,
 )
 
-MOST = 12
-"""Robots in the figure."""
+MOST = 12  #: Robots in the figure.
 _ROW, _ENDS = 0.24, 1.2  # inches
-_LINE, _WIDE = 0.19, 68
-"""Height of a line of the title, inches, and the characters that it holds."""
+_LINE, _WIDE = 0.19, 68  # height of a line of the title, inches, and the characters that it holds
 
 
 _NO_WALLS = "The channel's walls are not computed"
@@ -119,10 +117,8 @@ def _of(robots: tuple[RankedRobot, ...], which: str, name: str) -> Values:
     return np.array([getattr(robot, which)[name] for robot in robots])
 
 
-_LINE_HEIGHT = 0.34
-"""Height of one model in a panel, inches."""
-_ROOM = 1.42
-"""Width of a panel over its longest bar: room for the difference written beside it."""
+_LINE_HEIGHT = 0.34  # height of one model in a panel, inches
+_ROOM = 1.42  # width of a panel over its longest bar: room for the difference written beside it
 
 
 @dataclass(frozen=True)
@@ -133,8 +129,7 @@ class _Panel:
     symbol: str
     unit: str
     value: Callable[[Prediction], float]
-    estimated: bool = False
-    """Whether a model's estimate of its own error is of this quantity."""
+    estimated: bool = False  # whether a model's estimate of its own error is of this quantity
 
 
 # Each is taken for a turn or a radian of the tail, so that models which differ in their rates can be compared.
@@ -153,15 +148,18 @@ _PANELS = (
 
 
 def comparison_figure(comparison: ModelComparison) -> Figure:
-    """Four panels with a line for each model: advance, counter-rotation, torque and efficiency.
-
-    A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
-    the error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
-    """
+    """Four panels with a line for each model: advance, counter-rotation, torque and efficiency."""
+    # A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans the
+    # error that a model estimates of its own speed. A model without an answer keeps its line, marked "no answer".
     with styled():
+        rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
+        if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
+            driven = f"tail at {rates[0]:.4g} Hz"
+        else:
+            driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: models side by side",
-            _conditions(comparison),
+            f"{driven} · friction model '{comparison.friction}' · computed, no measured data",
             width=PAGE,
             heights=[_LINE_HEIGHT * len(comparison.models) + 0.1] * 2,
             columns=2,
@@ -182,16 +180,6 @@ def _label(comparison: ModelComparison, name: str) -> str:
     """A model's name, with a star if its result contains calibration factors."""
     answer = comparison.predictions.get(name)
     return f"{name}*" if answer is not None and answer.calibrated else name
-
-
-def _conditions(comparison: ModelComparison) -> str:
-    """Tail rate where all models share one, else what drives them; friction."""
-    rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
-    if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
-        driven = f"tail at {rates[0]:.4g} Hz"
-    else:
-        driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
-    return f"{driven} · friction model '{comparison.friction}' · computed, no measured data"
 
 
 def _notes(comparison: ModelComparison) -> list[str]:
@@ -269,16 +257,11 @@ def _finish(axes: Axes, values: np.ndarray) -> None:
 
 
 _EFFECT_HEIGHT = 0.36
-_ROOM_OF_AXIS = 3.0
-"""Of a logarithmic axis beyond its values, for the words beside them."""
+_ROOM_OF_AXIS = 3.0  # of a logarithmic axis beyond its values, for the words beside them
 
 
 def effects_figure(comparison: ModelComparison) -> Figure:
-    """A line for each effect, from the speed before it to the speed with it, with the factor beside it.
-
-    Raises:
-        InputError: if the effects are not known, for want of a model among those that are compared.
-    """
+    """A line for each effect, from the speed before it to the speed with it, with the factor beside it."""
     effects = comparison.effects
     if not effects:
         raise InputError(
@@ -300,7 +283,10 @@ def effects_figure(comparison: ModelComparison) -> Figure:
         axes = sheet.panels[0, 0]
         scale = UnitPrefix.of(speeds, "m/s")
         _draw_waterfall(axes, speeds / scale.factor)
-        axes.set_yticks(range(len(effects)), [_effect_label(row, effect.name) for row, effect in enumerate(effects)])
+        axes.set_yticks(
+            range(len(effects)),
+            [effect.name if row == 0 else f"+ {effect.name}" for row, effect in enumerate(effects)],
+        )
         axes.set_ylim(len(effects) - 0.4, -0.6)
         axes.set_xlabel(f"forward velocity ({scale.unit})")
         return sheet.finished()
@@ -316,10 +302,6 @@ def _why_no_trial(comparison: ModelComparison) -> str:
 
 
 _TRIAL = f"From the lubrication film on: the trial (60 s of waiting, 20 s with the motor on); {ASSUMPTION}."
-
-
-def _effect_label(row: int, name: str) -> str:
-    return name if row == 0 else f"+ {name}"
 
 
 def _draw_waterfall(axes: Axes, speeds: np.ndarray) -> None:

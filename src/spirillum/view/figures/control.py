@@ -15,16 +15,21 @@ from spirillum.units import show
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, UnitPrefix, plain, styled
 
-_MOST_SEEN = 1500
-"""Largest number of plotted frames."""
+_MOST_SEEN = 1500  # largest number of plotted frames
 
 
 def control_figure(control: Control) -> Figure:
     """Plot position, distance from the target, and duty with flow over time; shaded where flow is imposed."""
     with styled():
+        pulse = control.drawn.pulse
+        flow = "no pulse of flow"
+        if pulse is not None:
+            flow = f"flow {show(pulse.velocity, 'mm/s')} from {pulse.start:.3g} to {pulse.end:.3g} s (shaded)"
         sheet = Sheet(
             f"{plain(control.robot.name)}: {control.task.kind}, controller {control.controller}, seed {control.seed}",
-            _subtitle(control),
+            f"model {control.model} · camera {show(control.lab.camera.latency, 's')} late · remote "
+            f"{show(control.lab.remote.delay, 's')} late · friction times {control.drawn.friction:.3g} · {flow} · "
+            f"{'good' if control.score.good else 'not good'} enough · computed, no measured data",
             width=PAGE,
             heights=[1.9, 1.5, 0.8],
             columns=1,
@@ -45,18 +50,6 @@ def control_figure(control: Control) -> Figure:
         panels[-1].set_xlim(0.0, float(time[-1]))
         panels[-1].set_xlabel("time (s)")
         return sheet.finished()
-
-
-def _subtitle(control: Control) -> str:
-    pulse = control.drawn.pulse
-    flow = "no pulse of flow"
-    if pulse is not None:
-        flow = f"flow {show(pulse.velocity, 'mm/s')} from {pulse.start:.3g} to {pulse.end:.3g} s (shaded)"
-    return (
-        f"model {control.model} · camera {show(control.lab.camera.latency, 's')} late · remote "
-        f"{show(control.lab.remote.delay, 's')} late · friction times {control.drawn.friction:.3g} · {flow} · "
-        f"{'good' if control.score.good else 'not good'} enough · computed, no measured data"
-    )
 
 
 def _legend(control: Control) -> list[Line2D]:

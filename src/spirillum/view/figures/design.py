@@ -27,16 +27,22 @@ _TODAY = {**_MARKED, "marker": "o", "markersize": 5, "color": "white"}
 
 
 def design_figure(design: Design) -> Figure:
-    """Panels: with two objectives their front; with two fields the landscape; the objective along every field.
-
-    One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
-    """
+    """Panels: with two objectives their front; with two fields the landscape; the objective along every field."""
+    # One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
     count = len(design.profiles) + (design.front is not None) + (design.landscape is not None)
     columns = min(count, 2)
     with styled():
+        words = [
+            f"model {design.model}{', calibrated' if design.calibrated else ''}",
+            *(_in_words(item) for item in design.conditions),
+        ]
+        if len(design.profiles) > 1:
+            words.append("along each field the others at their best values")
+        if design.uncertainty is not None:
+            words.append(f"{design.searched.samples.number} draws of the unknown parameters")
         sheet = Sheet(
             f"{plain(design.today.name)}: {_in_words(design.objectives[0].words)}",
-            _subtitle(design),
+            " · ".join([*words, "computed, no measured data"]),
             width=COLUMN if columns == 1 else PAGE,
             heights=[2.0] * -(-count // columns),
             columns=columns,
@@ -63,20 +69,7 @@ def _in_words(text: str) -> str:
     return plain(text.replace("_", " ").replace(">=", "≥").replace("<=", "≤"))
 
 
-def _subtitle(design: Design) -> str:
-    words = [
-        f"model {design.model}{', calibrated' if design.calibrated else ''}",
-        *(_in_words(item) for item in design.conditions),
-    ]
-    if len(design.profiles) > 1:
-        words.append("along each field the others at their best values")
-    if design.uncertainty is not None:
-        words.append(f"{design.searched.samples.number} draws of the unknown parameters")
-    return " · ".join([*words, "computed, no measured data"])
-
-
 def _legend(design: Design) -> list[Line2D]:
-    """Legend entries of the plotted elements."""
     found = [Line2D([], [], **_BEST, label="best")]
     if design.landscape is not None and _today(design) is not None:
         found.append(Line2D([], [], **_TODAY, label="today"))

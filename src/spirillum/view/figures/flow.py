@@ -28,12 +28,9 @@ if TYPE_CHECKING:
 
 _BESIDE, _STRIP = 1.45, 1.1
 """Typical room beside a panel for its labels and colour bar; height of the pressure along a tube, inches."""
-_TALLEST = 4.2
-"""Largest height of a panel, inches."""
-_SPEED_DECADES = 3.0
-"""Largest range of the logarithmic colours: what is slower has the darkest one."""
-_PRESSURE_DECADES = 2.0
-"""Range of the pressure's logarithmic colours on each side; below it they are linear."""
+_TALLEST = 4.2  # largest height of a panel, inches
+_SPEED_DECADES = 3.0  # largest range of the logarithmic colours: what is slower has the darkest one
+_PRESSURE_DECADES = 2.0  # range of the pressure's logarithmic colours on each side; below it they are linear
 _LINES_PER_INCH = 0.36
 _HELD = "Held from moving sideways by"
 _LINES = "direction of the velocity's part in the plane"
@@ -44,12 +41,9 @@ class _View:
     """A plane's data as a panel shows them: rows upwards, lengths in a readable unit."""
 
     plane: xr.Dataset
-    first: str
-    """Horizontal axis."""
-    second: str
-    """Vertical axis."""
-    across: str
-    """Axis across the plane."""
+    first: str  # horizontal axis
+    second: str  # vertical axis
+    across: str  # axis across the plane
     lengths: UnitPrefix
     x: Values
     y: Values
@@ -91,10 +85,8 @@ class _View:
 
 
 def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
-    """Two panels to scale: speed (logarithmic colours) with streamlines, and pressure (colours about zero).
-
-    In a tube a plane along it gets a third one: the pressure at the glass that the robot does not lie on.
-    """
+    """Two panels to scale: speed (logarithmic colours) with streamlines, and pressure (colours about zero)."""
+    # In a tube a plane along it gets a third one: the pressure at the glass that the robot does not lie on.
     view = _View.of(plane)
     strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
     with styled():
@@ -268,7 +260,6 @@ def _at_glass(view: _View) -> tuple[Values, Values]:
 
 
 def _draw_strip(axes: Axes, view: _View) -> None:
-    """The pressure along the tube."""
     x, pressure = _at_glass(view)
     scale = UnitPrefix.of(pressure, "Pa")
     axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)

@@ -85,6 +85,5 @@ def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
 
 
 def _step_out(panels: Samples, rate: float) -> None:
-    """Mark the step-out rate of the constrained robot."""
     for axes in panels:
         axes.axvline(rate, **_STEP_OUT)

@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 class Plot:
     """A figure that notebooks show by themselves."""
 
-    figure: Figure = field(repr=False)
-    """The figure of matplotlib."""
+    figure: Figure = field(repr=False)  #: The figure of matplotlib.
 
     def save(self, path: str | Path) -> Path:
         """Write the figure as PNG, PDF or SVG, and give its path.
@@ -91,7 +90,6 @@ def plot(answer: Any) -> Plot:
 
 
 def _of_measurement(answer: Measurement) -> Figure:
-    """The first figure of a measurement."""
     for picture in measurement_figures(answer).values():
         return picture.figure()
     raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")

@@ -13,10 +13,8 @@ from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, PAGE, UnitPrefix, plain, styled
 
 _SPEED = "forward_velocity"
-_ROW = 0.34
-"""Height of a row, inches."""
-_ROOM = 1.4
-"""Width of the axis over its largest value: room for the number beside it."""
+_ROW = 0.34  # height of a row, inches
+_ROOM = 1.4  # width of the axis over its largest value: room for the number beside it
 
 
 class _Row(NamedTuple):
@@ -68,7 +66,6 @@ def prediction_figure(prediction: Prediction) -> Figure:
 
 
 def _rows(prediction: Prediction) -> Iterator[_Row]:
-    """The motions that have a speed."""
     over = prediction.band or prediction.intervals
     band = {} if over is None else over.of(_SPEED)
     held = "held at a pose" if prediction.model.placed else "axial motion"
@@ -97,7 +94,6 @@ def _bars(prediction: Prediction) -> Iterator[str]:
 
 
 def _missing(prediction: Prediction) -> Iterator[str]:
-    """Why a motion has no speed."""
     released = {"trial": prediction.trial, "steady motion": prediction.steady}
     reasons = {name: motion.reason for name, motion in released.items() if motion is not None and motion.reason}
     for reason in dict.fromkeys(reasons.values()):

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_SHORT = 0.2
-"""Time constant over the run's length above which the run does not reach the steady state."""
-_TILTS = {"pitch": "green", "yaw": "purple"}
-"""Angles of the tilt, and their colours."""
+_SHORT = 0.2  # time constant over the run's length above which the run does not reach the steady state
+_TILTS = {"pitch": "green", "yaw": "purple"}  # angles of the tilt, and their colours
 
 
 def settling_figure(settling: Settling) -> Figure:
@@ -100,7 +98,6 @@ _STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewi
 
 
 def _steady(axes: Axes, value: float) -> None:
-    """Plot the resting pose."""
     axes.axhline(value, **_STEADY)
 
 
@@ -117,8 +114,7 @@ _SHOWN = {
     "effective_friction": "inferred $B_{eff}$",
 }
 _KINDS = (("on the lubrication film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
-_MOST = 4
-"""Robots of the figure."""
+_MOST = 4  # robots of the figure
 
 
 def release_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:

@@ -155,14 +155,11 @@ def _sense(robot: Robot) -> float:
     drive, sign = robot.drive, 1.0
     if drive is not None and drive.kind == "dc-motor" and robot.motor is not None:
         sign = -1.0 if robot.motor.polarity == "reverse" else 1.0
-    elif drive is not None and (given := drive.rate or drive.torque or _field_rate(robot)):
+    elif drive is not None and (
+        given := drive.rate or drive.torque or (0.0 if robot.magnetic is None else robot.magnetic.rotation_rate)
+    ):
         sign = robot.hand * (1.0 if given > 0 else -1.0)
     return sign
-
-
-def _field_rate(robot: Robot) -> float:
-    """Rotation rate of the field of a magnetic drive, rad/s; 0 for any other."""
-    return 0.0 if robot.magnetic is None else robot.magnetic.rotation_rate
 
 
 def robot_figure(robot: Robot) -> Figure:

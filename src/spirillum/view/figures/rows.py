@@ -16,12 +16,9 @@ from spirillum.units import Hz
 from spirillum.view.figures.study_panels import StudyView, spread
 from spirillum.view.figures.style import COLOURS, PATCH, Look, UnitPrefix, label_of_model, look_of_model
 
-MOST_CURVES = 6
-"""Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
-FEW_CURVES = 2
-"""Amplitudes with a curve of their own, for more than two models."""
-MOST_LARGE_MARKS = 60
-"""Robots of a list whose marks have full size."""
+MOST_CURVES = 6  #: Amplitudes with a curve of their own against the assumed motor rate, for one or two models.
+FEW_CURVES = 2  #: Amplitudes with a curve of their own, for more than two models.
+MOST_LARGE_MARKS = 60  #: Robots of a list whose marks have full size.
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
 _OBSERVED = COLOURS["black"]
 HOLLOW: Any = {"linestyle": "none", "marker": "D", "markersize": 7.5, "markerfacecolor": "none"}
@@ -46,16 +43,11 @@ Draw = Callable[[Axes, StudyView, Values], None]
 class PanelRow:
     """A row of panels that share their vertical axis."""
 
-    label: str
-    """Plotted quantity with its unit."""
-    draw: Draw
-    """Plot one panel: axes, part of the study, horizontal positions (amplitudes or robots)."""
-    across: Literal["tails", "rates"] = "tails"
-    """Horizontal axis: the tails (or robots), or the assumed motor rate."""
-    logarithmic: bool = False
-    """Whether the vertical axis is logarithmic."""
-    tells: str = ""
-    """Explanation for the note below the figure, a sentence."""
+    label: str  #: Plotted quantity with its unit.
+    draw: Draw  #: Plot one panel: axes, part of the study, horizontal positions (amplitudes or robots).
+    across: Literal["tails", "rates"] = "tails"  #: Horizontal axis: the tails (or robots), or the assumed motor rate.
+    logarithmic: bool = False  #: Whether the vertical axis is logarithmic.
+    tells: str = ""  #: Explanation for the note below the figure, a sentence.
 
 
 def grid_rows(shown: StudyView) -> list[PanelRow]:

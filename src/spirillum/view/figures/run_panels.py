@@ -19,19 +19,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_MOST_EVENTS = 12
-"""Events that are named."""
+_MOST_EVENTS = 12  # events that are named
 _WIDE = (0.04, 0.08)
 """Width of a label with one number and with two, over that of the axis: events without room share one."""
-_LETTER = 0.07
-"""Share of a time axis above which the panel's letter is placed."""
+_LETTER = 0.07  # share of a time axis above which the panel's letter is placed
 
 
 def events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
-    """Times within the run, and what happened then; what it begins with is no event in it.
-
-    Of what happens again and again, as where a contact bounces, the first time and the number of times.
-    """
+    """Times within the run, and what happened then; what it begins with is no event in it."""
+    # Of what happens again and again, as where a contact bounces, the first time and the number of times.
     try:
         listed = json.loads(str(dataset.attrs.get("events", "[]")))
         found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
@@ -92,8 +88,7 @@ def _close_together(positions: list[float]) -> list[list[int]]:
 
 
 _RIM, _FILL, _EDGE = "#5d7486", "#dfe3e6", "#4a5258"
-_ROOM = 1.06
-"""Half-width of the panel over the tube's radius."""
+_ROOM = 1.06  # half-width of the panel over the tube's radius
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
 _ALONG = np.linspace(0.0, 1.0, 12)
 

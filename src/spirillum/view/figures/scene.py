@@ -17,8 +17,7 @@ from spirillum.robot.mesh import centreline_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.style import PAGE, UnitPrefix
 
-Metal = tuple[str, str, str]
-"""Colours of a shaded surface: shadow, middle, highlight."""
+Metal = tuple[str, str, str]  #: Colours of a shaded surface: shadow, middle, highlight.
 
 _SHELLS = 48
 _LARGEST_WIRE = 4000
@@ -100,12 +99,10 @@ def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: f
     )
 
 
-PHASE = 0.35 * np.pi
-"""Phase of the tail in the picture, rad."""
+PHASE = 0.35 * np.pi  #: Phase of the tail in the picture, rad.
 INK = "#1d2b33"
 FAINT = "#6b7d88"
-HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)
-"""White rim that keeps text legible on any background."""
+HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)  #: White rim that keeps text legible on any background
 
 
 @dataclass(frozen=True)
@@ -114,20 +111,15 @@ class DrawingLayout:
 
     robot: Robot
     scale: UnitPrefix
-    total: float
-    """Length of the robot, or twice its height if that is more: the measure of margins and text."""
+    total: float  #: Length of the robot, or twice its height if that is more: the measure of margins and text.
     nose: float
     rear: float
     root: float
     tip: float
-    half_height: float
-    """Largest distance of the robot from the motor axis."""
-    floor: float
-    """Height of the floor, or of the robot's underside without a channel."""
-    ceiling: float | None
-    """Height of the upper wall where the picture reaches it."""
-    wall: float
-    """Displayed thickness of the walls; the true one is unknown."""
+    half_height: float  #: Largest distance of the robot from the motor axis.
+    floor: float  #: Height of the floor, or of the robot's underside without a channel.
+    ceiling: float | None  #: Height of the upper wall where the picture reaches it.
+    wall: float  #: Displayed thickness of the walls; the true one is unknown.
 
     @classmethod
     def of(cls, robot: Robot) -> DrawingLayout:

@@ -21,10 +21,8 @@ class Picture:
     """Deferred figure with its title and caption."""
 
     title: str
-    caption: str
-    """Content and limits of the figure, sentences."""
-    alternative: str
-    """Alternative text."""
+    caption: str  #: Content and limits of the figure, sentences.
+    alternative: str  #: Alternative text.
     draw: Callable[[], Figure] = field(repr=False)
 
     @classmethod
@@ -39,10 +37,8 @@ class Picture:
 
 
 _NARROWEST = 5.2
-_MARGINS, _GAP = 0.94, 0.14
-"""Typical room for the labels beside a row of panels, and between panels, inches."""
-_EDGE = 0.012
-"""Free edge at the left and at the right, share of the width."""
+_MARGINS, _GAP = 0.94, 0.14  # typical room for the labels beside a row of panels, and between panels, inches
+_EDGE = 0.012  # free edge at the left and at the right, share of the width
 
 
 def width_of(columns: int, panel: float) -> float:
@@ -60,21 +56,7 @@ def add_letters(panels: Iterable[Axes]) -> None:
 class Sheet:
     """A figure with a grid of panels of given height below title, subtitle and legend, notes at the foot.
 
-    Args:
-        title: bold, in the first line.
-        subtitle: below the title, wrapped to the width.
-        width: width of the figure, inches; see `width_of`.
-        heights: height of the panels of each row, inches.
-        columns: number of columns.
-        notes: sentences at the foot, each wrapped to the width; a formula in them must not contain a space.
-        legend: entries between subtitle and panels.
-        legend_below: entries between panels and notes.
-        sharex: which panels share their horizontal axes, as in `Figure.subplots`.
-        sharey: which panels share their vertical axes, as in `Figure.subplots`.
-
-    Attributes:
-        figure: the figure.
-        panels: the panels, (rows, columns).
+    Widths and heights are in inches; a formula in a note must not contain a space.
     """
 
     def __init__(
@@ -142,10 +124,8 @@ def _within(figure: Figure | SubFigure) -> SubFigure:
 
 
 def _wrap(text: Text) -> None:
-    """Break the lines of a text at the free edge at the right of its figure.
-
-    Words are measured one by one: matplotlib measures every beginning of a line, which with formulas takes seconds.
-    """
+    """Break the lines of a text at the free edge at the right of its figure."""
+    # Words are measured one by one: matplotlib measures every beginning of a line, which with formulas takes seconds.
     figure = cast("Figure", text.get_figure(root=True))
     room = (1.0 - 2.0 * _EDGE) * figure.bbox.width
 

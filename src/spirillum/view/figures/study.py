@@ -29,22 +29,14 @@ from spirillum.view.figures.style import UnitPrefix, distinct_labels, plain
 if TYPE_CHECKING:
     import xarray as xr
 
-PANEL = (1.72, 1.5)
-"""Width and height of a panel of a grid of tails, inches."""
-MOST_COLUMNS = 5
-"""Wavelengths of one figure."""
-MOST_FIGURES = 4
-"""Figures of the channels of one study."""
-MOST_CHANNELS = 4
-"""Channels of the figure of the upper bound."""
-MOST_TAILS = 200
-"""Amplitudes of one panel."""
-MOST_ROBOTS = 2000
-"""Listed robots of one panel."""
-NAMED_ROBOTS = 60
-"""Listed robots that are named; more are numbered."""
-_TICK_LETTER = 0.066
-"""Width of a letter of a tick label, inches."""
+PANEL = (1.72, 1.5)  #: Width and height of a panel of a grid of tails, inches.
+MOST_COLUMNS = 5  #: Wavelengths of one figure.
+MOST_FIGURES = 4  #: Figures of the channels of one study.
+MOST_CHANNELS = 4  #: Channels of the figure of the upper bound.
+MOST_TAILS = 200  #: Amplitudes of one panel.
+MOST_ROBOTS = 2000  #: Listed robots of one panel.
+NAMED_ROBOTS = 60  #: Listed robots that are named; more are numbered.
+_TICK_LETTER = 0.066  # width of a letter of a tick label, inches
 _DASHED = (0, (4.0, 2.0))
 
 

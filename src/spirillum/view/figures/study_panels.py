@@ -29,12 +29,9 @@ NOTHING_MEASURED = "Computed only: this figure contains no measured data."
 class PaperFigure(NamedTuple):
     """Layout of a study's figure of one channel after a figure of a paper."""
 
-    file: str
-    """Name of the study's figure."""
-    label: str
-    """Name of the paper's figure."""
-    largest_reynolds: float
-    """Re_max of its caption."""
+    file: str  #: Name of the study's figure.
+    label: str  #: Name of the paper's figure.
+    largest_reynolds: float  #: Re_max of its caption.
 
 
 def spread(count: int, most: int) -> list[int]:
@@ -49,8 +46,7 @@ class StudyView:
     """A study's dataset, or a part of it, as figures read it."""
 
     dataset: xr.Dataset
-    whole: xr.Dataset
-    """The dataset from which scales are taken, so that all figures of a study share them."""
+    whole: xr.Dataset  #: The dataset from which scales are taken, so that all figures of a study share them.
     paper_figures: Mapping[str, PaperFigure] = field(default_factory=dict)
     """Figures of a paper by channel, for a study that repeats it."""
 
@@ -107,7 +103,9 @@ class StudyView:
     @property
     def upper_bound(self) -> bool:
         """Whether rates and speeds under the robots' own drive are upper bounds: a motor without contact friction."""
-        return self.motor_driven and self.friction_unset
+        return self.motor_driven and all(
+            (robot.get("friction") or {}).get("effective") is None for robot in self.robots
+        )
 
     @property
     def shaded(self) -> bool:
@@ -135,11 +133,6 @@ class StudyView:
         return "forward_velocity_settled" in self.whole and bool(
             np.isfinite(self.whole["forward_velocity_settled"]).any()
         )
-
-    @cached_property
-    def friction_unset(self) -> bool:
-        """Whether reading `rotor` holds the rotor's own B_m alone."""
-        return all((robot.get("friction") or {}).get("effective") is None for robot in self.robots)
 
     @cached_property
     def own_drive_readings(self) -> tuple[str, ...]:
@@ -249,10 +242,8 @@ class StudyView:
         )
 
     def observed_motor_rate(self) -> tuple[Values, Values]:
-        """Observed omega_m with the half width of its interval, rad/s; else tail less body rate.
-
-        The half widths of tail and body then add up: not too narrow, however the two are correlated.
-        """
+        """Observed omega_m with the half width of its interval, rad/s; else tail less body rate."""
+        # The half widths of tail and body then add up: not too narrow, however the two are correlated.
         rate, half = self.values("observed_motor_rate"), self.values("observed_motor_rate_ci95")
         tail, body = (self.values(f"observed_{name}_rate") for name in ("tail", "body"))
         halves = self.values("observed_tail_rate_ci95") + self.values("observed_body_rate_ci95")

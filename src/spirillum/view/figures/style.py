@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context, rcParamsDefault
+from matplotlib import rc_context, rc_params_from_file, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
@@ -33,42 +33,11 @@ COLOURS = {
 }
 """Palette of Okabe and Ito, distinguishable for colour-blind readers (without its yellow, too pale for lines)."""
 
-_STYLE: Any = {  # Any: the type of the keys differs between versions of matplotlib
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "mathtext.fontset": "dejavusans",
-    "axes.titlesize": 9.0,
-    "axes.titley": 1.0,
-    "axes.labelsize": 9.0,
-    "axes.linewidth": 0.7,
-    "axes.edgecolor": "#444444",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.5,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.4,
-    "lines.markersize": 4.5,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "svg.fonttype": "path",
-    "svg.hashsalt": "spirillum",
-}
-COLUMN, PAGE = 3.35, 6.69
-"""Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider."""
+COLUMN, PAGE = 3.35, 6.69  #: Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider.
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings on the display of a session's own figures, which do not change ours."""
-PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}
-"""Line that represents an area in a legend."""
-DPI = 200
-"""Of PNG files."""
+PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}  #: Line that represents an area in a legend.
+DPI = 200  #: Of PNG files.
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _MICRO = re.compile(r"(\d )u(?=[mNWgl]\b)")
@@ -92,8 +61,7 @@ class Look:
     """Colour, line and marker that identify a model in every figure."""
 
     colour: str
-    line: Any
-    """A line style of matplotlib: text, or an offset with lengths of dashes."""
+    line: Any  #: A line style of matplotlib: text, or an offset with lengths of dashes.
     marker: str
 
 
@@ -120,8 +88,7 @@ def label_of_model(name: str) -> str:
 class UnitPrefix:
     """A unit with a prefix that makes a set of values readable."""
 
-    factor: float
-    """SI value of one unit."""
+    factor: float  #: SI value of one unit.
     unit: str
 
     @classmethod
@@ -151,17 +118,15 @@ def _settings() -> dict[Any, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of settings that the library means to drop
         own: dict[Any, Any] = {name: value for name, value in rcParamsDefault.items() if name not in _OTHERS}
-    own.update(_STYLE)
+    own.update(rc_params_from_file(Path(__file__).with_name("spirillum.mplstyle"), use_default_template=False))
     return own
 
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Plot and save in the style of all figures, without changing the user's settings.
-
-    All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it.
-    Names may hold characters that the font lacks; they become boxes, not warnings.
-    """
+    """Plot and save in the style of all figures, without changing the user's settings."""
+    # All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it. Names may
+    # hold characters that the font lacks; they become boxes, not warnings.
     with rc_context(_settings()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
         yield

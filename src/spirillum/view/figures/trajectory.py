@@ -27,24 +27,16 @@ from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plai
 if TYPE_CHECKING:
     import xarray as xr
 
-COLUMNS = {"single": COLUMN, "double": PAGE}
-"""Widths of a figure that fills one or both columns of a page, inches."""
+COLUMNS = {"single": COLUMN, "double": PAGE}  #: Widths of a figure that fills one or both columns of a page, inches.
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
-_LETTERS_BESIDE = 40
-"""Letters of a legend, with seven for each line's sample, above which it has two columns."""
-_MANY_TURNS = 30.0
-"""Turns of the tail above which oscillations fill a panel, and means over a turn are plotted too."""
-_DECADES = 5
-"""Range of a logarithmic axis."""
-_DECADES_BARE = 30.0
-"""Ratio of gaps above which only decades are labelled."""
-_SPREAD = 30.0
-"""Ratio of the largest values of two lines above which their axis is logarithmic."""
-_STILL = 0.5
-"""Change of azimuth below which a robot counts as stationary, degrees."""
-_ONE_WAY = 0.75
-"""Net change of azimuth above which a robot circulates in the tube in one direction."""
+_LETTERS_BESIDE = 40  # letters of a legend, with seven for each line's sample, above which it has two columns
+_MANY_TURNS = 30.0  # turns of the tail above which oscillations fill a panel, and means over a turn are plotted too
+_DECADES = 5  # range of a logarithmic axis
+_DECADES_BARE = 30.0  # ratio of gaps above which only decades are labelled
+_SPREAD = 30.0  # ratio of the largest values of two lines above which their axis is logarithmic
+_STILL = 0.5  # change of azimuth below which a robot counts as stationary, degrees
+_ONE_WAY = 0.75  # net change of azimuth above which a robot circulates in the tube in one direction
 
 
 @dataclass(frozen=True)
@@ -52,16 +44,12 @@ class _Panel:
     """Lines over time with one unit."""
 
     label: str
-    lines: tuple[tuple[str, str], ...]
-    """Variable and its legend label."""
-    logarithmic: bool = False
-    """Whether a logarithmic axis may be used."""
+    lines: tuple[tuple[str, str], ...]  # variable and its legend label
+    logarithmic: bool = False  # whether a logarithmic axis may be used
     film: bool = False
     """Whether the axis is logarithmic over the whole range of the lines, with the roughness as a level."""
-    changing: bool = False
-    """Whether a panel whose lines are constant is left out."""
-    mean: bool = False
-    """Whether the mean over a turn of the tail is plotted for the first line of a long run."""
+    changing: bool = False  # whether a panel whose lines are constant is left out
+    mean: bool = False  # whether the mean over a turn of the tail is plotted for the first line of a long run
 
 
 _PANELS = (
@@ -147,10 +135,8 @@ _LINE_OF: dict[str, Any] = {
 }
 
 
-_MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")
-"""Panels of the short figure, the first two that a run has."""
-PANELS = ("main", "all")
-"""Which panels a figure has: speed and gap, or everything."""
+_MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")  # panels of the short figure, the first two that a run has
+PANELS = ("main", "all")  #: Which panels a figure has: speed and gap, or everything.
 
 
 def trajectory_figure(dataset: xr.Dataset, column: str = "double", panels: str = "all") -> Figure:
@@ -242,7 +228,6 @@ def _around(dataset: xr.Dataset) -> str:
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
-    """Settings of the run."""
     attrs = dataset.attrs
     found = [_around(dataset)] if in_tube else []
     if (mean := float(dataset.get("mean_forward_velocity_on", np.nan))) == mean:
@@ -326,10 +311,8 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
 
 
 def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, beside: int, turn: int) -> None:
-    """Draw lines over time in a sheet of `beside` columns; a single one has low panels.
-
-    The mean over `turn` samples is plotted too, where the panel has one; 0: none.
-    """
+    """Draw lines over time in a sheet of `beside` columns; a single one has low panels."""
+    # The mean over `turn` samples is plotted too, where the panel has one; 0: none.
     lines = _lines(dataset, panel, time)
     values = np.concatenate([line for _, line in lines])
     scale = UnitPrefix.of(values, unit_of(panel.lines[0][0]))

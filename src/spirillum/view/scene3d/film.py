@@ -29,18 +29,15 @@ from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.view.scene3d.scene import DrawnRobot, Scene
+    from spirillum.view.scene3d.scene import DrawnRobot
 
 
 _SIDE, _LEFT, _FOOT = 0.24, 0.125, 0.035
 """Side of the square over the height of a frame; its left edge over the width; room below it over the height."""
-_FINE = 3
-"""Rendered pixels per displayed pixel, along each side (supersampling)."""
-_RIM, _ROOM = 0.93, 0.90
-"""Radius of the tube, outside and inside, over half of the square."""
+_FINE = 3  # rendered pixels per displayed pixel, along each side (supersampling)
+_RIM, _ROOM = 0.93, 0.90  # radius of the tube, outside and inside, over half of the square
 _GLASS, _WATER, _BODY = "#5d7486", "#eef3f6", "#c9ced2"
-_MOST = 600
-"""Number of plotted points of the path."""
+_MOST = 600  # number of plotted points of the path
 
 
 class CrossSection:
@@ -86,8 +83,7 @@ class CrossSection:
 
 CAMERAS = ("auto", "fixed", "follow")
 """Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
-_ALONG = ("front", "rear")
-"""Views that show the cross-section themselves."""
+_ALONG = ("front", "rear")  # views that show the cross-section themselves
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
 _LARGEST_TURN = 0.25
@@ -104,12 +100,9 @@ class Film(DisplayMixin):
     frames: int
     size: tuple[int, int]
     fps: int
-    speed: float
-    """Time of the run over time of the video."""
-    follows: bool
-    """Whether the camera follows the robot."""
-    turn_per_frame: float
-    """Largest part of a turn of the tail between two frames."""
+    speed: float  #: Time of the run over time of the video.
+    follows: bool  #: Whether the camera follows the robot.
+    turn_per_frame: float  #: Largest part of a turn of the tail between two frames.
     warnings: tuple[Note, ...]
 
     @property
@@ -251,7 +244,11 @@ class _Shots:
         stamp = Stamp(self._size, times, speed)
         with Scene(self._solids, self._size, glass=self._glass, rows=self._rows, quick=True) as scene:
             if self._glass is None:
-                self._add_grid(scene)
+                corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
+                path = self._poses.position
+                scene.add_grid(
+                    self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0)
+                )
             for time in times:
                 pose = self._poses.at(float(time))
                 scene.place(pose)
@@ -266,11 +263,6 @@ class _Shots:
         if not self._follows:
             return self._camera
         return self._camera.moved((pose.position - first.position) * self._free)
-
-    def _add_grid(self, scene: Scene) -> None:
-        corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
-        path = self._poses.position
-        scene.add_grid(self._view, path.min(axis=0) + corners.min(axis=0), path.max(axis=0) + corners.max(axis=0))
 
 
 def _channel_centre(dataset: xr.Dataset) -> float | None:

@@ -18,20 +18,16 @@ from spirillum.view.figures.style import UnitPrefix, plain, styled
 from spirillum.view.scene3d.scenery import SceneCamera, ruler_steps
 
 _DPI = 200
-_REFERENCE = 900.0
-"""Height of a picture in pixels at which text has its nominal size."""
+_REFERENCE = 900.0  # height of a picture in pixels at which text has its nominal size
 
 
 @dataclass(frozen=True)
 class Bar:
     """Scale bar in the scene, projected."""
 
-    length: float
-    """Length, m."""
-    start: tuple[float, float]
-    """Pixel of its left end."""
-    end: tuple[float, float]
-    """Pixel of its right end."""
+    length: float  #: Length, m.
+    start: tuple[float, float]  #: Pixel of its left end.
+    end: tuple[float, float]  #: Pixel of its right end.
 
 
 def scale_bar(camera: SceneCamera, size: tuple[int, int], middle: Samples) -> Bar:
@@ -61,7 +57,9 @@ def words_on(size: tuple[int, int], camera: SceneCamera, bar: Bar, title: str, l
         )
         _draw_bar(axes, bar, unit, size)
         _draw_axes(axes, camera, unit, size)
-        return _rendered(figure)
+        canvas: Any = figure.canvas
+        canvas.draw()
+        return np.array(canvas.buffer_rgba())
 
 
 def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -83,7 +81,6 @@ def blended_into(words: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _runs(truth: Any) -> list[slice]:
-    """Stretches of consecutive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], truth, [False]]).astype(np.int8)))
     return [slice(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
@@ -132,12 +129,6 @@ def _canvas(size: tuple[int, int]) -> tuple[Figure, Axes, float]:
     axes.set_ylim(size[1], 0.0)
     axes.set_axis_off()
     return figure, axes, min(size[1] / _REFERENCE, size[0] / _REFERENCE)
-
-
-def _rendered(figure: Figure) -> np.ndarray:
-    canvas: Any = figure.canvas
-    canvas.draw()
-    return np.array(canvas.buffer_rgba())
 
 
 def _draw_bar(axes: Axes, bar: Bar, unit: float, size: tuple[int, int]) -> None:

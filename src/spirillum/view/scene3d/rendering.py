@@ -96,8 +96,7 @@ def _can_draw(window: Any) -> bool:
     return False
 
 
-FILMS = {".mp4": "a film", ".gif": "a film"}
-"""Endings of the supported video files, for `output_target`."""
+FILMS = {".mp4": "a film", ".gif": "a film"}  #: Endings of the supported video files, for `output_target`.
 _PALETTE_FRAMES = 9
 _QUALITY = {"crf": "18", "preset": "veryfast"}
 

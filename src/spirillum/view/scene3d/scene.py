@@ -21,8 +21,7 @@ from spirillum.view.scene3d.scenery import SceneCamera, View, add_glass, ruler_s
 _ALONG, _AROUND = 160, 49
 _HALF_ANGLE = 0.9
 _DARKEST = 0.5
-_REACH = 0.30
-"""Distance from the floor over which the shadow fades, in radii of the channel."""
+_REACH = 0.30  # distance from the floor over which the shadow fades, in radii of the channel
 
 
 def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
@@ -115,10 +114,8 @@ def add_light(plotter: Any, pyvista: Any, *, surrounded: bool = True) -> None:
 
 _COLOUR = "#c3d3dd"
 _MOST_LINES = 400
-_BEYOND = 8
-"""Lines beyond what is to be seen, on every side."""
-_WIDTH = 0.014
-"""Width of a line, in distances of lines."""
+_BEYOND = 8  # lines beyond what is to be seen, on every side
+_WIDTH = 0.014  # width of a line, in distances of lines
 _ACROSS_GRID: dict[View, int] = {"perspective": 2, "top": 2, "side": 1}
 """Axis across the grid, by view; along x there is none, for the robot swims through it."""
 
@@ -158,8 +155,7 @@ _MATERIALS: dict[str, _Material] = {
 _QUICK: _Material = {"ambient": 0.46, "diffuse": 0.58, "specular": 0.30, "specular_power": 40.0}
 """Shading of a video's solids: reflected surroundings would double the time of a frame."""
 _QUICK_METAL: _Material = {"ambient": 0.34, "diffuse": 0.62, "specular": 0.75, "specular_power": 16.0}
-_SHARP = 35.0
-"""Angle between faces above which an edge is sharp, deg."""
+_SHARP = 35.0  # angle between faces above which an edge is sharp, deg
 
 
 @dataclass(frozen=True)
@@ -168,10 +164,8 @@ class DrawnRobot:
 
     robot: Robot
     pieces: tuple[Any, ...]
-    length: float
-    """Largest extent, m."""
-    radius: float
-    """Largest distance of any point from the motor axis, m."""
+    length: float  #: Largest extent, m.
+    radius: float  #: Largest distance of any point from the motor axis, m.
 
     @classmethod
     def of(cls, robot: Robot, *, fineness: float = 1.0) -> DrawnRobot:
@@ -202,10 +196,8 @@ class DrawnRobot:
 
 
 def level_height(solids: DrawnRobot) -> float:
-    """Height of the motor axis of a level robot above its channel's axis, m; 0 without a channel.
-
-    It is negative: the lowest at which body and tail, at any phase, do not cut into the glass.
-    """
+    """Height of the motor axis of a level robot above its channel's axis, m; 0 without a channel."""
+    # It is negative: the lowest at which body and tail, at any phase, do not cut into the glass.
     channel = solids.robot.channel
     return 0.0 if channel is None else -max(0.5 * channel.diameter - solids.radius, 0.0)
 

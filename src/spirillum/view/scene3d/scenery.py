@@ -40,18 +40,12 @@ class Margins:
 class SceneCamera:
     """A camera; lengths in m, the lab's axes."""
 
-    focal: Samples
-    """Point in the middle of the picture."""
-    sight: Samples
-    """Unit vector of the line of sight, away from the camera."""
-    up: Samples
-    """Unit vector upwards in the picture."""
-    distance: float
-    """Distance of the camera from the focal point."""
-    half_height: float
-    """Half of the height that the picture shows at the focal point."""
-    parallel: bool
-    """Whether lines of sight are parallel: lengths are then to scale all over the picture."""
+    focal: Samples  #: Point in the middle of the picture.
+    sight: Samples  #: Unit vector of the line of sight, away from the camera.
+    up: Samples  #: Unit vector upwards in the picture.
+    distance: float  #: Distance of the camera from the focal point.
+    half_height: float  #: Half of the height that the picture shows at the focal point.
+    parallel: bool  #: Whether lines of sight are parallel: lengths are then to scale all over the picture.
 
     @property
     def right(self) -> Samples:
@@ -128,12 +122,10 @@ def _framed(
     return camera
 
 
-WALL = 0.035
-"""Displayed thickness of the glass, in radii: the true one is unknown."""
+WALL = 0.035  #: Displayed thickness of the glass, in radii: the true one is unknown.
 _SIDES = 144
 _MOST_MARKS = 300
-_CLEAR = 0.004
-"""Alpha below which a side of a tube is not rendered."""
+_CLEAR = 0.004  # alpha below which a side of a tube is not rendered
 _AROUND = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
 _CEILING, _FLOOR, _BAND, _NEAR = "#cdd6dc", "#e3eef4", "#eaf1f5", "#f4fafd"
 _RIM, _EDGE, _TICK = "#9dbfd1", "#5f8ba3", "#54788e"
@@ -160,10 +152,8 @@ def _tube(pyvista: Any, radius: float, start: float, end: float, colours: Sample
 
 
 def _inner_colours() -> Samples:
-    """Colours of the inner side: light from above on the floor, a soft streak along each side.
-
-    They are fixed, and not worked out from lamps: the tube fills the picture, and lamps would double a frame's time.
-    """
+    """Colours of the inner side: light from above on the floor, a soft streak along each side."""
+    # They are fixed, and not worked out from lamps: the tube fills the picture, and lamps would double a frame's time.
     height = np.sin(_AROUND)[:, None]
     streak = np.exp(-(((height - 0.18) / 0.10) ** 2))
     shade = np.clip(0.5 - 0.5 * height, 0.0, 1.0) ** 0.8

@@ -24,12 +24,9 @@ from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_v
 if TYPE_CHECKING:
     from spirillum.view.scene3d.scene import DrawnRobot
 
-SMALLEST, LARGEST = 64, 4096
-"""Allowed widths and heights of a picture, pixels."""
-_FINER = 2
-"""Rendered pixels per pixel of a picture, along width and height (supersampling)."""
-_MOST_FINER = 5_000_000
-"""Pixels of a picture above which supersampling is off: it would take gigabytes."""
+SMALLEST, LARGEST = 64, 4096  #: Allowed widths and heights of a picture, pixels.
+_FINER = 2  # rendered pixels per pixel of a picture, along width and height (supersampling)
+_MOST_FINER = 5_000_000  # pixels of a picture above which supersampling is off: it would take gigabytes
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,16 +35,11 @@ class Picture3D(DisplayMixin):
 
     robot: Robot
     view: View
-    phase: float
-    """Phase of the tail, rad."""
-    pixels: np.ndarray
-    """(height, width, 3) the picture, sRGB bytes."""
-    camera: SceneCamera
-    """View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab."""
-    pose: RobotPose
-    """Pose of the robot: its body's mid-length, attitude, and the angle of its tail."""
-    path: Path | None
-    """The file that was written."""
+    phase: float  #: Phase of the tail, rad.
+    pixels: np.ndarray  #: (height, width, 3) the picture, sRGB bytes.
+    camera: SceneCamera  #: View: `camera.pixels(points, size)` gives the picture coordinates of points of the lab.
+    pose: RobotPose  #: Pose of the robot: its body's mid-length, attitude, and the angle of its tail.
+    path: Path | None  #: The file that was written.
 
     def to_dict(self) -> dict[str, Any]:
         """The picture's facts, as ``show --json`` prints them."""

@@ -21,43 +21,31 @@ from spirillum.robust import mad_scale
 from spirillum.vision.video.frames import Frame
 from spirillum.vision.video.pictures import reduced, reduction
 
-_COARSE = 160
-"""Width of the reduced picture whose coarse structure is compared, pixels."""
-_REACH = 10
-"""Largest shift that is looked for there, pixels."""
+_COARSE = 160  # width of the reduced picture whose coarse structure is compared, pixels
+_REACH = 10  # largest shift that is looked for there, pixels
 _BLUR = 12.0
 """Standard deviation of the widest blur, pixels; wider ones are made on a reduced picture, as they take long."""
-_SWAYS = 0.15
-"""Scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels."""
-_STEPS, _STILL = 12, 0.005
-"""Most Gauss-Newton steps, and the step below which they end, pixels."""
-_STEEP = 0.85
-"""Share of the picture with the smallest gradients, which is not used."""
-_MOST_EDGES = 40_000
-"""Most edge pixels that are used."""
-_ROW = 100
-"""Edge pixels that are interpolated side by side."""
-_OUTLIER = 3.0
-"""Residual over the usual one from which on a pixel does not count."""
+_SWAYS = 0.15  # scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels
+_STEPS, _STILL = 12, 0.005  # most Gauss-Newton steps, and the step below which they end, pixels
+_STEEP = 0.85  # share of the picture with the smallest gradients, which is not used
+_MOST_EDGES = 40_000  # most edge pixels that are used
+_ROW = 100  # edge pixels that are interpolated side by side
+_OUTLIER = 3.0  # residual over the usual one from which on a pixel does not count
 
 
 class PictureRegistration(NamedTuple):
     """How a picture lies against the anchor."""
 
-    right: float
-    """Shift to the right, pixels."""
-    down: float
-    """Shift downwards, pixels."""
-    roll: float
-    """Angle by which it is turned clockwise about its middle, rad."""
+    right: float  #: Shift to the right, pixels.
+    down: float  #: Shift downwards, pixels.
+    roll: float  #: Angle by which it is turned clockwise about its middle, rad.
 
 
 @dataclass(frozen=True)
 class Anchor:
     """What stands still in the pictures of a video, to which each of them is registered."""
 
-    flat: Samples = field(repr=False)
-    """High-pass filtered brightness, (h, w)."""
+    flat: Samples = field(repr=False)  #: High-pass filtered brightness, (h, w).
 
     def pose(self, flat: Samples, start: PictureRegistration) -> PictureRegistration:
         """How a high-pass filtered picture lies against the anchor; `start` where the anchor shows no edge."""
@@ -111,12 +99,9 @@ class Anchor:
 class Steadied(NamedTuple):
     """How a camera swayed during a video."""
 
-    anchor: Anchor
-    """The first picture, reduced where it is large."""
-    times: Samples
-    """Times of the frames, s, (n,)."""
-    poses: Samples
-    """How each lies against the anchor: right and down, pixels, roll, rad, (n, 3)."""
+    anchor: Anchor  #: The first picture, reduced where it is large.
+    times: Samples  #: Times of the frames, s, (n,).
+    poses: Samples  #: How each lies against the anchor: right and down, pixels, roll, rad, (n, 3).
 
     def frame(self, frame: Frame) -> Frame:
         """A frame as a camera would have taken it that did not move."""
@@ -126,10 +111,8 @@ class Steadied(NamedTuple):
 
 
 def sways(frames: Sequence[Frame]) -> bool:
-    """Whether some pictures lie higher and lower than others, or are turned, as those of a camera in a hand.
-
-    Along the rows a ruler's lines may hide it: a hand does not move in one direction alone.
-    """
+    """Whether some pictures lie higher and lower than others, or are turned, as those of a camera in a hand."""
+    # Along the rows a ruler's lines may hide it: a hand does not move in one direction alone.
     flats = (_flat(frame.reduced(_reduction(frame))) for frame in frames)
     anchor = Anchor(next(flats))
     poses = np.array(
@@ -175,7 +158,6 @@ def _matrix(pose: PictureRegistration, size: tuple[int, int]) -> Samples:
 
 
 def _flat(image: np.ndarray) -> Samples:
-    """High-pass filtered brightness, about 0."""
     cv2 = import_optional("cv2", "measuring a video", "video")
     grey = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_RGB2GRAY)
     wide = max(15.0, grey.shape[1] / 20.0)

@@ -18,10 +18,8 @@ from spirillum.vision.video.pictures import reduction
 
 _SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 480_000_000
 """Most and fewest frames from which scale and appearance are learnt, and the bytes that they may take between."""
-_GOLDEN = 0.618034
-"""Step of the low-discrepancy sequence that spreads them."""
-_UNKNOWN = 10.0
-"""Duration from which is learnt where that of the video is unknown, s."""
+_GOLDEN = 0.618034  # step of the low-discrepancy sequence that spreads them
+_UNKNOWN = 10.0  # duration from which is learnt where that of the video is unknown, s
 
 
 def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[CalibratedCamera, Video]:
@@ -77,15 +75,7 @@ def background(frames: Sequence[Frame], factor: int) -> Samples:
 def ruler_of(
     still: Samples, bounds: tuple[int, int, int, int], turn: float, factor: int, frames: Sequence[Frame] = ()
 ) -> tuple[Lines | None, int]:
-    """The ruler, in pixels of the full picture, and the factor by which pictures may be reduced that show it.
-
-    Args:
-        still: the background, (h, w, 3).
-        bounds: region of interest in the full picture: left, top, right, bottom.
-        turn: angle of the channel to the rows, positive downwards to the right, rad; off by up to 45 degrees.
-        factor: by which the background was reduced.
-        frames: of the video; where the ruler is too fine for the reduced background, they are looked at as they are.
-    """
+    """The ruler, in pixels of the full picture, and the factor by which pictures may be reduced that show it."""
     left, top, right, bottom = (at // factor for at in bounds)
     found = ruler_in(still, (left, top, right, bottom), turn)
     if factor == 1 or not frames:

@@ -27,12 +27,9 @@ def opposite(direction: str) -> str:
 class BodyPose(NamedTuple):
     """Pose of the body's mid-length in the camera's frame, at the height of the robot's axis."""
 
-    x: float
-    """Position along the channel from below the lens, m."""
-    y: float
-    """Lateral position from below the lens, m."""
-    heading: float
-    """Angle of the motor axis to the x axis about +z, rad."""
+    x: float  #: Position along the channel from below the lens, m.
+    y: float  #: Lateral position from below the lens, m.
+    heading: float  #: Angle of the motor axis to the x axis about +z, rad.
 
 
 @dataclass(frozen=True)
@@ -45,32 +42,20 @@ class Optics:
     then by `tilt_y` about y, then by `tilt_x` about x.
     """
 
-    size: tuple[int, int]
-    """Width and height of the picture, pixels."""
-    focal: float
-    """Focal length, pixels."""
-    height: float
-    """Height of the lens above the reference plane, m."""
-    axis_height: float
-    """Height of the robot's axis above the reference plane, m."""
-    surface: float | None = None
-    """Height of the surface above the reference plane, m; None: no refraction."""
-    index: float = 1.0
-    """Refractive index below the surface over that above."""
-    centre: tuple[float, float] | None = None
-    """Principal point, pixels; None: the centre of the picture."""
-    tilt_x: float = 0.0
-    """Tilt about x, rad."""
-    tilt_y: float = 0.0
-    """Tilt about y, rad."""
-    rotation: float = 0.0
-    """Rotation about the optical axis, rad."""
+    size: tuple[int, int]  #: Width and height of the picture, pixels.
+    focal: float  #: Focal length, pixels.
+    height: float  #: Height of the lens above the reference plane, m.
+    axis_height: float  #: Height of the robot's axis above the reference plane, m.
+    surface: float | None = None  #: Height of the surface above the reference plane, m; None: no refraction.
+    index: float = 1.0  #: Refractive index below the surface over that above.
+    centre: tuple[float, float] | None = None  #: Principal point, pixels; None: the centre of the picture.
+    tilt_x: float = 0.0  #: Tilt about x, rad.
+    tilt_y: float = 0.0  #: Tilt about y, rad.
+    rotation: float = 0.0  #: Rotation about the optical axis, rad.
     k1: float = 0.0
     """Radial distortion: r, the tangent of the angle to the optical axis, becomes r (1 + k1 r^2 + k2 r^4)."""
-    k2: float = 0.0
-    """Radial distortion of fourth order."""
-    direction: str = "right"
-    """Where in the picture x points: one of `DIRECTIONS`."""
+    k2: float = 0.0  #: Radial distortion of fourth order.
+    direction: str = "right"  #: Where in the picture x points: one of `DIRECTIONS`.
 
     @cached_property
     def numbers(self) -> Samples:

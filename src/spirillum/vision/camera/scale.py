@@ -20,29 +20,20 @@ from spirillum.vision.setup import Checkerboard, Setup
 from spirillum.vision.video.display import AS_STORED, Display
 from spirillum.vision.video.pictures import IMAGES, bits_of, eight_bit, read_header, read_image
 
-_FEWEST = 3
-"""Fewest pictures with a detected board."""
-_POOR_FIT = 2.0
-"""Largest root mean square reprojection error, pixels."""
+_FEWEST = 3  # fewest pictures with a detected board
+_POOR_FIT = 2.0  # largest root mean square reprojection error, pixels
 
 
 class Lens(NamedTuple):
     """A lens with radial distortion: a distance r from the optical axis becomes r (1 + k1 r^2 + k2 r^4)."""
 
-    focal: float
-    """Focal length, pixels."""
-    focal_error: float
-    """Standard error of the focal length, pixels."""
-    centre: tuple[float, float]
-    """Principal point, pixels."""
-    k1: float
-    """Radial distortion of second order."""
-    k2: float
-    """Radial distortion of fourth order."""
-    residual: float
-    """Root mean square reprojection error of the corners, pixels."""
-    pictures: int
-    """Number of pictures in which the board was detected."""
+    focal: float  #: Focal length, pixels.
+    focal_error: float  #: Standard error of the focal length, pixels.
+    centre: tuple[float, float]  #: Principal point, pixels.
+    k1: float  #: Radial distortion of second order.
+    k2: float  #: Radial distortion of fourth order.
+    residual: float  #: Root mean square reprojection error of the corners, pixels.
+    pictures: int  #: Number of pictures in which the board was detected.
 
 
 def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: Display = AS_STORED) -> Lens:
@@ -95,42 +86,30 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int], display: D
     return Lens(focal, focal_error, centre, float(distortion[0]), float(distortion[1]), float(residual), len(found))
 
 
-_PRIOR_TILT = 0.1
-"""Prior standard deviation of the camera's tilts, rad."""
-_PRIOR_K1 = 0.1
-"""Prior standard deviation of the lens's k1, without a checkerboard."""
-_LINE_ERROR = 0.1
-"""Standard error of a line's position, pixels."""
-_CORRELATED = 12.0
-"""Points of a ruler with correlated errors, as they share a window."""
-_HUBER = 3.0 / math.sqrt(_CORRELATED)
-"""Residual from which on Huber's loss is linear, standard errors."""
-_FOCAL = (0.2, 250.0)
-"""Plausible focal lengths over the picture's width."""
+_PRIOR_TILT = 0.1  # prior standard deviation of the camera's tilts, rad
+_PRIOR_K1 = 0.1  # prior standard deviation of the lens's k1, without a checkerboard
+_LINE_ERROR = 0.1  # standard error of a line's position, pixels
+_CORRELATED = 12.0  # points of a ruler with correlated errors, as they share a window
+_HUBER = 3.0 / math.sqrt(_CORRELATED)  # residual from which on Huber's loss is linear, standard errors
+_FOCAL = (0.2, 250.0)  # plausible focal lengths over the picture's width
 _MODEL = 3e-4
 """Relative standard uncertainty of lengths by the models of lens and body, with an exact setup.
 
 Assumed; on rendered videos with an exact setup, errors of the speed are below 0.02 %."""
-_SMALL_ROLL = 0.1
-"""Roll from which on the fit does not begin with an upright camera, rad."""
-_STEP = 1e-3
-"""Relative step of numerical derivatives."""
+_SMALL_ROLL = 0.1  # roll from which on the fit does not begin with an upright camera, rad
+_STEP = 1e-3  # relative step of numerical derivatives
 
 
 @dataclass(frozen=True)
 class Scale:
     """Scale of lengths at the height of the robot's axis, with its uncertainty."""
 
-    length_per_pixel: float
-    """Length per pixel at the height of the robot's axis, in the centre of the picture, m."""
+    length_per_pixel: float  #: Length per pixel at the height of the robot's axis, in the centre of the picture, m.
     relative_uncertainty: float
     """Relative standard uncertainty of all lengths, by heights, index, spacing and the fit of the lines."""
-    sources: dict[str, float]
-    """Contributions to it by source, such as `robot.axis_height`; they add in quadrature."""
-    markers: int
-    """Number of detected lines of the ruler; 0 where the scale was given."""
-    residual: float
-    """Root mean square residual of the lines, pixels; NaN without a ruler."""
+    sources: dict[str, float]  #: Contributions to it by source, such as `robot.axis_height`; they add in quadrature.
+    markers: int  #: Number of detected lines of the ruler; 0 where the scale was given.
+    residual: float  #: Root mean square residual of the lines, pixels; NaN without a ruler.
     apparent_size: float = math.nan
     """Apparent size of the body over that of its file at this scale; NaN where not measured."""
 
@@ -157,11 +136,9 @@ def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) 
 
 
 def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens | None = None) -> CalibratedCamera:
-    """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines.
-
-    The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
-    of the setup, by the implicit derivative of the fit.
-    """
+    """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines."""
+    # The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain
+    # number of the setup, by the implicit derivative of the fit.
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101 - the setup ensures it
     assert height is not None  # noqa: S101
@@ -232,12 +209,9 @@ def first_rotation(optics: Optics, lines: Lines) -> float:
 class _Geometry(NamedTuple):
     """A camera before a ruler."""
 
-    optics: Optics
-    """The camera."""
-    spacing: float
-    """Spacing of the ruler's lines, m."""
-    height: float
-    """Height of the ruler, m."""
+    optics: Optics  # the camera
+    spacing: float  # spacing of the ruler's lines, m
+    height: float  # height of the ruler, m
 
     @property
     def distance(self) -> float:
@@ -341,10 +315,8 @@ def _uncertain(setup: Setup) -> dict[str, float]:
 
 
 def _changed(before: _Geometry, name: str, step: float) -> _Geometry:
-    """A fitted camera before its ruler, with one number of the setup changed by a relative step.
-
-    Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
-    """
+    """A fitted camera before its ruler, with one number of the setup changed by a relative step."""
+    # Its focal length is such that the ruler's lines are as far apart as they were: the fit hardly changes.
     optics, far = before.optics, step * before.optics.height
     if name == "markers.spacing":
         after = before._replace(spacing=before.spacing * (1.0 + step))

@@ -49,8 +49,7 @@ __all__ = ["FrameDetection", "Watcher", "follow", "scale_of"]
 class SwayConstants:
     """A camera that swayed."""
 
-    window: int = 7
-    """Frames before and after a moment whose medians are compared."""
+    window: int = 7  #: Frames before and after a moment whose medians are compared.
     jump: float = 1.5
     """Step of the robot against the background from which on pictures were not moved back well, pixels.
 
@@ -66,14 +65,10 @@ SWAY = SwayConstants()
 class FalseDetectionConstants:
     """Frames on which something else than the robot was followed."""
 
-    fewest: int = 12
-    """Fewest frames on which stripes or tail are read."""
-    shortest: int = 3
-    """Fewest frames in a row without them."""
-    beside: int = 5
-    """Frames to both sides of a jump whose medians are compared."""
-    jump: float = 0.15
-    """Jump of the place over the body's length."""
+    fewest: int = 12  #: Fewest frames on which stripes or tail are read.
+    shortest: int = 3  #: Fewest frames in a row without them.
+    beside: int = 5  #: Frames to both sides of a jump whose medians are compared.
+    jump: float = 0.15  #: Jump of the place over the body's length.
 
 
 FALSE_DETECTION = FalseDetectionConstants()
@@ -82,17 +77,15 @@ FALSE_DETECTION = FalseDetectionConstants()
 class Swayed(NamedTuple):
     """Uncertainty and flags by a camera that swayed."""
 
-    drift: float
-    """Standard uncertainty of the velocity, m/s."""
+    drift: float  #: Standard uncertainty of the velocity, m/s.
     flags: tuple[Flag, ...]
 
 
 def swayed_by(still: Steadied, motion: RobotMotion, setup: Setup, sight: CalibratedCamera) -> Swayed:
-    """How much a camera that swayed makes the velocity uncertain, and whether it may be given.
-
-    A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which is
-    nearer than the background, by more: what is not known is the difference, for as much as the camera has drifted.
-    """
+    """How much a camera that swayed makes the velocity uncertain, and whether it may be given."""
+    # A camera that turns moves all of its picture alike. One that is carried along the channel moves the robot, which
+    # is nearer than the background, by more: what is not known is the difference, for as much as the camera has
+    # drifted.
     optics, right, down = sight.optics, still.poses[:, 0], still.poses[:, 1]
     behind = 0.0 if setup.markers.height is None else setup.markers.height
     pixel = optics.length_per_pixel
@@ -377,8 +370,7 @@ def follow(
     return track_of(video, setup, learnt, follower.record, flags, still, outline)
 
 
-_SAME_TIME = 1e-3
-"""Largest difference between two times of one frame, s."""
+_SAME_TIME = 1e-3  # largest difference between two times of one frame, s
 
 
 def _outline_check(frames: Sequence[Frame], learnt: InitialDetection, record: Record, setup: Setup) -> OutlineCheck:

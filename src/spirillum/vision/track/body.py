@@ -25,12 +25,9 @@ class PoseFit(NamedTuple):
     """Pose of the body on a frame, with its quality of fit."""
 
     pose: BodyPose
-    error: BodyPose
-    """Standard errors, m and rad; NaN where the fit failed."""
-    share: float
-    """Inlier share of the edges in view, 0 to 1."""
-    inside: float
-    """Share of the edges that lie in the picture, 0 to 1."""
+    error: BodyPose  #: Standard errors, m and rad; NaN where the fit failed.
+    share: float  #: Inlier share of the edges in view, 0 to 1.
+    inside: float  #: Share of the edges that lie in the picture, 0 to 1.
     elongation: float = np.nan
     """By how much nose and rear lie farther apart than the level body's edges do, m; NaN without edges at both."""
     cues: Samples | None = None
@@ -46,35 +43,23 @@ class PoseFit(NamedTuple):
 class _Part:
     """A part of a picture, blurred a little, and the outline there at the last pose that was looked at."""
 
-    grey: np.ndarray
-    """Brightness, (h, w, 1), single precision."""
-    origin: Samples
-    """Pixel (u, v) of its upper left corner, (2,)."""
-    colours: ColourPart | None
-    """Its colours; None where they are not needed, or nothing is in view."""
-    pose: BodyPose
-    """The pose."""
-    places: tuple[Samples, Samples, Samples, Samples]
-    """The edges at this pose: see `Contour.places`."""
-    profiles: Samples | None = None
-    """Brightness across them; None where it was not needed yet."""
+    grey: np.ndarray  # brightness, (h, w, 1), single precision
+    origin: Samples  # pixel (u, v) of its upper left corner, (2,)
+    colours: ColourPart | None  # its colours; None where they are not needed, or nothing is in view
+    pose: BodyPose  # the pose
+    places: tuple[Samples, Samples, Samples, Samples]  # the edges at this pose: see `Contour.places`
+    profiles: Samples | None = None  # brightness across them; None where it was not needed yet
 
 
 class _Edges(NamedTuple):
     """Edges on a frame."""
 
-    shifts: Samples
-    """Displacements along their normals, pixels, (n,)."""
-    known: np.ndarray
-    """Whether they are valid, (n,)."""
-    variance: Samples
-    """Their variances, pixels^2, (n,); infinite where invalid."""
-    slopes: Samples
-    """Jacobian of the displacements by the pose, (n, 3)."""
-    inside: np.ndarray
-    """Whether the edge lies in the picture, (n,)."""
-    votes: np.ndarray
-    """Whether it moves with the body, (n,)."""
+    shifts: Samples  # displacements along their normals, pixels, (n,)
+    known: np.ndarray  # whether they are valid, (n,)
+    variance: Samples  # their variances, pixels^2, (n,); infinite where invalid
+    slopes: Samples  # jacobian of the displacements by the pose, (n, 3)
+    inside: np.ndarray  # whether the edge lies in the picture, (n,)
+    votes: np.ndarray  # whether it moves with the body, (n,)
 
 
 class BodyFinder:
@@ -395,17 +380,8 @@ def _usual(residuals: list[Samples]) -> tuple[Samples, Samples, np.ndarray]:
 
 
 def _elongation(left: Samples, slopes: Samples, used: Samples, nose: np.ndarray, behind: np.ndarray) -> float:
-    """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
-
-    Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
-
-    Args:
-        left: residual displacement of each edge along its normal, pixels, (n,).
-        slopes: Jacobian of the displacements by the pose, (n, 3).
-        used: weights of the edges, 0 for outliers, (n,).
-        nose: mask of the edges of the nose, (n,).
-        behind: mask of those of rear and seal, (n,).
-    """
+    """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m."""
+    # Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
     if min(np.count_nonzero(used[nose]), np.count_nonzero(used[behind])) < OUTLINE.fewest_at_end:
         return np.nan
     design = np.column_stack([slopes, np.where(nose, slopes[:, 0], 0.0)])

@@ -23,29 +23,21 @@ from spirillum.vision.track.constants import SINGLE_LINE
 class ColourConstants:
     """Classes of colour of the stripes."""
 
-    pairs: int = 3
-    """Kinds of neighbouring stripes that have to be seen before their order is judged."""
-    whole_samples: int = 4
-    """Fewest angles of a stripe, and of those beside it, when its width is taken."""
+    pairs: int = 3  #: Kinds of neighbouring stripes that have to be seen before their order is judged.
+    whole_samples: int = 4  #: Fewest angles of a stripe, and of those beside it, when its width is taken.
     blurred_width: float = 0.3
     """Width over that of a stripe below which a colour between two others is their blurred edge."""
-    glare: float = 240.0
-    """Brightness of glare to begin with, of 255."""
-    pale: float = 0.7
-    """Ratio of the weakest to the strongest channel from which on a bright colour is glare."""
-    seen: float = 0.03
-    """Share of the samples from which on a class is seen."""
-    contrast: float = 0.25
-    """Least difference of two learnt colours over that of their names."""
-    fits: float = 0.7
-    """Share of neighbouring stripes that have to stand in a given order."""
+    glare: float = 240.0  #: Brightness of glare to begin with, of 255.
+    pale: float = 0.7  #: Ratio of the weakest to the strongest channel from which on a bright colour is glare.
+    seen: float = 0.03  #: Share of the samples from which on a class is seen.
+    contrast: float = 0.25  #: Least difference of two learnt colours over that of their names.
+    fits: float = 0.7  #: Share of neighbouring stripes that have to stand in a given order.
 
 
 COLOURS = ColourConstants()
 
 
-_MANY = 6
-"""Most classes for which all assignments of names are tried; more are assigned by the least total distance."""
+_MANY = 6  # most classes for which all assignments of names are tried; more are assigned by the least total distance
 
 
 def named_colours(names: Sequence[str]) -> Samples:
@@ -196,11 +188,9 @@ def named_rightly(palette: Samples, start: Samples) -> bool:
 
 
 def told_apart(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
-    """Whether the classes that are seen are two or more, and differ as their names do.
-
-    Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may be
-    learnt as colours: they differ by much less.
-    """
+    """Whether the classes that are seen are two or more, and differ as their names do."""
+    # Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may
+    # be learnt as colours: they differ by much less.
     palette, start, glare = palettes
     nearest = _nearest(samples, np.concatenate([palette, glare]))
     seen = [k for k in range(len(palette)) if np.mean(nearest == k) > COLOURS.seen]
@@ -220,14 +210,7 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
 
 
 def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float) -> float:
-    """Median width of the stripes that are fully in view, rad; NaN for too few of them.
-
-    Args:
-        profiles: colours along the angle, for some frames, (f, n, 3); NaN where not in view.
-        angles: angles of the samples, rad, (n,).
-        palettes: result of `colour_classes`.
-        stated: stated width, rad; far narrower runs are blurred edges between two colours.
-    """
+    """Median width of the stripes that are fully in view, rad; NaN for too few of them."""
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
     least = max(COLOURS.whole_samples, COLOURS.blurred_width * stated / step)
@@ -269,10 +252,8 @@ def _neighbours(profiles: Samples, angles: Samples, palette: Samples, glare: Sam
 class SeenLine(NamedTuple):
     """What a seal and the line on it look like."""
 
-    palette: Samples
-    """Colour of each class, (2, 3)."""
-    sheen: Samples
-    """What the lamp adds at each angle, (n, 3)."""
+    palette: Samples  #: Colour of each class, (2, 3).
+    sheen: Samples  #: What the lamp adds at each angle, (n, 3).
 
 
 def is_single(stripes: Sequence[str]) -> bool:

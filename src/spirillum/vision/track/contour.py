@@ -25,24 +25,15 @@ from spirillum.vision.camera.optics import BodyPose, Optics, placed
 class ContourConstants:
     """Apparent edges of the body: which are used, and the least standard error of each, pixels."""
 
-    front: float = 0.04
-    """Error of the front end."""
-    rear: float = 0.06
-    """Error of the rear end of a striped body."""
-    bare_rear: float = 0.5
-    """Error of the rear end of a body without stripes."""
-    side: float = 0.04
-    """Error of the sides."""
-    striped_side: float = 0.3
-    """Error of the sides of the seal, where stripes pass."""
-    coupling: float = 0.15
-    """Error of the coupling's edges."""
-    seal: float = 0.03
-    """Error of the front edge of the seal."""
-    end_width: float = 0.9
-    """Half width of the ends that is used, over the body's radius."""
-    seal_arc: float = 1.0
-    """Angle from the top up to which the seal's edge is used, rad."""
+    front: float = 0.04  #: Error of the front end.
+    rear: float = 0.06  #: Error of the rear end of a striped body.
+    bare_rear: float = 0.5  #: Error of the rear end of a body without stripes.
+    side: float = 0.04  #: Error of the sides.
+    striped_side: float = 0.3  #: Error of the sides of the seal, where stripes pass.
+    coupling: float = 0.15  #: Error of the coupling's edges.
+    seal: float = 0.03  #: Error of the front edge of the seal.
+    end_width: float = 0.9  #: Half width of the ends that is used, over the body's radius.
+    seal_arc: float = 1.0  #: Angle from the top up to which the seal's edge is used, rad.
 
 
 CONTOUR = ContourConstants()
@@ -51,13 +42,10 @@ CONTOUR = ContourConstants()
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""
 
-EDGE_CUES = ("outline", "seal", "coupling")
-"""What edges belong to, each a cue of its own to where the body is."""
+EDGE_CUES = ("outline", "seal", "coupling")  #: What edges belong to, each a cue of its own to where the body is.
 
-_ORDERS = 7, 4
-"""Orders of the polynomials in the lens's x and y."""
-_NODES = 8, 5
-"""Interpolation nodes in x and y."""
+_ORDERS = 7, 4  # orders of the polynomials in the lens's x and y
+_NODES = 8, 5  # interpolation nodes in x and y
 _AROUND, _PER_TURN = 128, 144
 """Points around the axis, and along a full circle of a profile's arc, from which a silhouette is computed."""
 
@@ -66,18 +54,14 @@ _AROUND, _PER_TURN = 128, 144
 class Contour:
     """Apparent edge points of a body as functions of the lens's position in the body's frame."""
 
-    group: np.ndarray = field(repr=False)
-    """Index into `GROUPS` of each point, (n,)."""
-    normals: Samples = field(repr=False)
-    """Approximate outward normals in the plane, in the body's frame, (n, 2)."""
+    group: np.ndarray = field(repr=False)  #: Index into `GROUPS` of each point, (n,).
+    normals: Samples = field(repr=False)  #: Approximate outward normals in the plane, in the body's frame, (n, 2).
     floor: Samples = field(repr=False)
     """Least standard error of each point, pixels, (n,): edge profiles vary, most where stripes pass."""
     _factors: Samples = field(repr=False)
     """Chebyshev coefficients of the points with the upper and with the lower rims of flat ends, (a, b, 4, n)."""
-    _reach: Samples = field(repr=False)
-    """Largest distances of the lens along and across, m, (2,)."""
-    cue: np.ndarray = field(repr=False)
-    """Index into `EDGE_CUES` of each point, (n,)."""
+    _reach: Samples = field(repr=False)  #: Largest distances of the lens along and across, m, (2,).
+    cue: np.ndarray = field(repr=False)  #: Index into `EDGE_CUES` of each point, (n,).
 
     @property
     def seal(self) -> np.ndarray:

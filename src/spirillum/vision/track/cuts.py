@@ -29,46 +29,31 @@ from spirillum.vision.track.visibility import EVERYTHING
 class CutConstants:
     """Videos whose times do not fit what they show."""
 
-    window: int = 8
-    """Frames before and after a moment through which straight lines are fitted."""
-    clear: float = 8.0
-    """Jump over the standard deviation of the other jumps."""
-    place: float = 1.0
-    """Least jump of the place, pixels."""
-    angle: float = 0.12
-    """Least jump of an angle, rad."""
-    persists: float = 0.5
-    """Share of a jump below which a series goes on after it as before."""
-    gap: float = 3.0
-    """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
+    window: int = 8  #: Frames before and after a moment through which straight lines are fitted.
+    clear: float = 8.0  #: Jump over the standard deviation of the other jumps.
+    place: float = 1.0  #: Least jump of the place, pixels.
+    angle: float = 0.12  #: Least jump of an angle, rad.
+    persists: float = 0.5  #: Share of a jump below which a series goes on after it as before.
+    gap: float = 3.0  #: Time between two frames over the usual one from which on it is a gap, and no line goes across.
     long_window: int = 30
     """Readings before and after a gap through which lines are fitted that show whether time has passed."""
-    clock_place: float = 0.3
-    """Distance of these lines below which they meet, pixels."""
-    clock_angle: float = 0.05
-    """Distance of these lines below which they meet, rad."""
+    clock_place: float = 0.3  #: Distance of these lines below which they meet, pixels.
+    clock_angle: float = 0.05  #: Distance of these lines below which they meet, rad.
     clock_errors: float = 5.0
     """Distance over its standard error below which they meet; errors of readings are not independent."""
-    unseen: int = 20
-    """Frames without the robot over which lines go on: it may be lost where it jumps."""
-    advance: float = 0.5
-    """Least advance of a robot that turns, pixels."""
-    tail_turns: float = 1.0
-    """Turns of the tail in which it has to advance by that."""
-    body_turns: float = 0.25
-    """Turns of the body in which it has to."""
-    misread: float = 0.5
-    """Jump of the tail's phase, rad, from which on its turns may be miscounted."""
+    unseen: int = 20  #: Frames without the robot over which lines go on: it may be lost where it jumps.
+    advance: float = 0.5  #: Least advance of a robot that turns, pixels.
+    tail_turns: float = 1.0  #: Turns of the tail in which it has to advance by that.
+    body_turns: float = 0.25  #: Turns of the body in which it has to.
+    misread: float = 0.5  #: Jump of the tail's phase, rad, from which on its turns may be miscounted.
 
 
 CUTS = CutConstants()
 
 
 def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None = None) -> tuple[Flag, ...]:
-    """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow.
-
-    Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
-    """
+    """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow."""
+    # Where the picture goes on evenly there, the outline has hopped, and the angles that are read by it: see `hops_in`.
     jumps = [jump for jump in _jumps(motion, length_per_pixel) if jump is not None]
     usual = _usual(motion.time)
     for one, other in pairwise(sorted(jumps)):
@@ -85,20 +70,15 @@ def cuts_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
 class Hops(NamedTuple):
     """Jumps of what was read on pictures that go on evenly."""
 
-    distance: float
-    """Standard error of the displacement from end to end, m."""
-    angle: float
-    """Standard error of the body's angle from end to end, rad."""
-    phase: float
-    """Standard error of the tail's phase from end to end, rad."""
+    distance: float  #: Standard error of the displacement from end to end, m.
+    angle: float  #: Standard error of the body's angle from end to end, rad.
+    phase: float  #: Standard error of the tail's phase from end to end, rad.
     flags: tuple[Flag, ...]
 
 
 def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps | None) -> Hops:
-    """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since.
-
-    Of a video that is cut nothing is given, and nothing is looked for in it.
-    """
+    """Find jumps of the place or the angles on which the picture does not jump: another edge was followed since."""
+    # Of a video that is cut nothing is given, and nothing is looked for in it.
     if picture is None or cuts_in(motion, length_per_pixel, picture):
         return Hops(0.0, 0.0, 0.0, ())
     hops = [
@@ -129,24 +109,15 @@ def hops_in(motion: RobotMotion, length_per_pixel: float, picture: PictureSteps 
 class Clock(NamedTuple):
     """Evidence of the motion about the largest gap between the times of the frames."""
 
-    relative_error: float
-    """Relative standard uncertainty that it leaves in the length of the video."""
+    relative_error: float  #: Relative standard uncertainty that it leaves in the length of the video.
     flags: tuple[Flag, ...]
 
 
 def clock_of(motion: RobotMotion, length_per_pixel: float, period: float, stated: Samples | None = None) -> Clock:
-    """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?
-
-    Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
-    no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they meet
-    by both, as of a slow robot, the uncertainty holds both.
-
-    Args:
-        motion: the robot's motion.
-        length_per_pixel: length per pixel, m.
-        period: period of the stripes, rad.
-        stated: times of the frames as the video states them, s, (n,), where lost frames were put back; else None.
-    """
+    """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?"""
+    # Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as
+    # if no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they
+    # meet by both, as of a slow robot, the uncertainty holds both.
     time, x, body_angle, tail_phase = motion
     none = Clock(0.0, ())
     if time.size < 2:
@@ -194,11 +165,10 @@ def one_picture(motion: RobotMotion) -> tuple[Flag, ...]:
 
 
 def stands_still(motion: RobotMotion, length_per_pixel: float) -> tuple[Flag, ...]:
-    """Flag a robot that turns, but does not advance by half a pixel.
-
-    A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong compression
-    leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the body.
-    """
+    """Flag a robot that turns, but does not advance by half a pixel."""
+    # A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong
+    # compression leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the
+    # body.
     time, x, body_angle, tail_phase = motion
     known = np.isfinite(x)
     turns, turned = (_turned(angle) for angle in (tail_phase, body_angle))
@@ -223,11 +193,9 @@ def _turned(angle: Samples) -> float:
 
 
 def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
-    """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle.
-
-    It is in units of what rates that are not quite steady explain (`least`, more where the lines go on for longer than
-    they were fitted), or of what the scatter of the readings does; 0 where too few are known.
-    """
+    """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle."""
+    # It is in units of what rates that are not quite steady explain (`least`, more where the lines go on for longer
+    # than they were fitted), or of what the scatter of the readings does; 0 where too few are known.
     middle, far, variance, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, 0.0, []
     for part in (slice(None, gap + 1), slice(gap + 1, None)):
         known = np.flatnonzero(np.isfinite(values[part]))
@@ -248,10 +216,8 @@ def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: fl
 class _Jump(NamedTuple):
     """The largest jump of a series."""
 
-    moment: float
-    """Time, s."""
-    size: float
-    """Of the series."""
+    moment: float  # time, s
+    size: float  # of the series
 
 
 def _jumps(motion: RobotMotion, length_per_pixel: float) -> list[_Jump | None]:

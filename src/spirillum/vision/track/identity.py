@@ -35,13 +35,11 @@ class Identified(NamedTuple):
     start: Start
     stripes: Stripes
     wire: TailWave
-    size: float
-    """Apparent size over the size of the robot file at the stated scale."""
+    size: float  #: Apparent size over the size of the robot file at the stated scale.
     robot: bool
     """Whether stripes or tail match the robot; both have to where the size is unexpected, the whole tail where the
     contrast is."""
-    stands: bool = False
-    """Whether its stripes were found in the static background, without its tail."""
+    stands: bool = False  #: Whether its stripes were found in the static background, without its tail.
 
     @property
     def whole(self) -> bool:
@@ -93,16 +91,7 @@ class Identified(NamedTuple):
 def identify(
     name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples, *, by_seal: bool = True
 ) -> Identified:
-    """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds.
-
-    Args:
-        name: name of the video.
-        setup: the setup.
-        stated: the robot's body at the stated scale.
-        frames: frames spread over the video.
-        still: static background of the frames, (h, w, 3).
-        by_seal: whether it is looked for by its coloured seal first, else by its outline alone.
-    """
+    """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds."""
     found: Identified | InputError
     try:
         found, is_whole = _at_stated_size(name, setup, stated, frames, still, by_seal=by_seal)
@@ -191,16 +180,10 @@ def _nothing_moves(frames: list[Frame], still: Samples) -> bool:
 
 
 def _standing_bodies(stated: BodyFinder, still: Samples) -> list[BodyFinder]:
-    """Untrained finders of a body at the places of a background where one may stand, most likely first.
-
-    A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
-    the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
-    an empty tube shows neither.
-
-    Args:
-        stated: the robot's body at the stated scale.
-        still: static background of the frames, (h, w, 3), or reduced by a whole factor.
-    """
+    """Untrained finders of a body at the places of a background where one may stand, most likely first."""
+    # A robot that moves is found in what changes. One that stands belongs to the background, beside rulers and edges of
+    # the tank that look as clear as its body. Only where stripes and the whole tail are read there too is it the robot:
+    # an empty tube shows neither.
     shape = stated.shape(stated.optics.size[0] // still.shape[1])
     picture = np.clip(np.round(still), 0.0, 255.0).astype(np.uint8)
     found = []
@@ -237,10 +220,8 @@ def _with_nose(
 
 
 def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
-    """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
-
-    A body alone constrains its ends little where it is blurred, or looked for at a wrong scale.
-    """
+    """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end."""
+    # A body alone constrains its ends little where it is blurred, or looked for at a wrong scale.
     side = opposite(stated.optics.direction)
     turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})
     body = BodyFinder(stated.robot, replace(stated.optics, direction=side), stated.bounds)

@@ -27,14 +27,11 @@ from spirillum.vision.video.frames import Frame
 class _Plane(NamedTuple):
     """A grid in the plane through the robot's axis, along and across the channel."""
 
-    x: Samples
-    """Positions along, m, (c,)."""
-    y: Samples
-    """Positions across, m, (r,)."""
+    x: Samples  # positions along, m, (c,)
+    y: Samples  # positions across, m, (r,)
     columns: Samples
     """Pixel column of each of its points, (r, c); outside of the picture where the point is not looked at."""
-    rows: Samples
-    """Pixel row of each of its points, (r, c)."""
+    rows: Samples  # pixel row of each of its points, (r, c)
 
 
 class SealSearch:
@@ -108,19 +105,15 @@ class Start:
 
     body: BodyFinder = field(repr=False)
     """The body, which has learnt, in front of a camera that shows it as large as it looks."""
-    size: float
-    """How large it looks, over the body that was looked for."""
+    size: float  #: How large it looks, over the body that was looked for.
     off: tuple[float, float]
     """From where its edges were learnt to where its outline lies, (x, y), m: the search takes a lit side and a shadow
     for a part of the body, by some tenths of a pixel, and edges are learnt where it has found them."""
     seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which the robot was found, 8-bit RGB, and where."""
-    path: list[tuple[float, BodyPose]]
-    """When it was where."""
-    score: float
-    """How clear its edges usually are, grey per pixel."""
-    clearness: float
-    """How clearly it stands out: `spirillum.vision.track.size.clearness`."""
+    path: list[tuple[float, BodyPose]]  #: When it was where.
+    score: float  #: How clear its edges usually are, grey per pixel.
+    clearness: float  #: How clearly it stands out: `spirillum.vision.track.size.clearness`.
     rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames with a false detection that is as clear, and where."""
     flags: tuple[Flag, ...]
@@ -147,10 +140,8 @@ class _Learnt(NamedTuple):
 
     frames: list[Frame]
     poses: list[BodyPose]
-    score: float
-    """How clear its edges usually are, grey per pixel."""
-    whole: list[bool]
-    """Whether it is in full view."""
+    score: float  # how clear its edges usually are, grey per pixel
+    whole: list[bool]  # whether it is in full view
 
     @property
     def typical(self) -> BodyPose:
@@ -276,10 +267,8 @@ def _rivals_of_seal(frames: Sequence[Frame], found: Sequence[list[PoseCandidate]
 
 
 def _by_whole_outline(body: BodyFinder, learnt: _Learnt) -> tuple[BodyFinder, _Learnt] | None:
-    """The body by its whole outline, which is more accurate; None unless it moves with the seal, and has its size.
-
-    What stands still seems to move along where the robot hardly moves.
-    """
+    """The body by its whole outline, which is more accurate; None unless it moves with the seal, and has its size."""
+    # What stands still seems to move along where the robot hardly moves.
     poses, pixel = np.array(learnt.poses), body.optics.length_per_pixel
     if float(np.ptp(poses[:, 0])) < SEAL.far_enough * pixel or not body.outline_moves:
         return None

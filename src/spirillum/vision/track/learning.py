@@ -29,40 +29,29 @@ from spirillum.vision.video.pictures import reduction
 class GlareConstants:
     """Glare that stands still on the robot's path."""
 
-    share: float = 0.9
-    """Share of the frames on which a spot has to be white."""
-    covered: float = 0.95
-    """Share of the body's diameter that surely hides what is behind it."""
-    least: float = 0.005
-    """Least size of its part on the path, over what body and coupling cover."""
-    most: float = 1.0
-    """Largest size of it all, over that: what is larger is an overexposed background."""
-    rim: float = 0.4
-    """Width of its rim, over the radius of a disk as large as the spot."""
+    share: float = 0.9  #: Share of the frames on which a spot has to be white.
+    covered: float = 0.95  #: Share of the body's diameter that surely hides what is behind it.
+    least: float = 0.005  #: Least size of its part on the path, over what body and coupling cover.
+    most: float = 1.0  #: Largest size of it all, over that: what is larger is an overexposed background.
+    rim: float = 0.4  #: Width of its rim, over the radius of a disk as large as the spot.
     across: float = 0.5
     """Least sine of the angle between an edge and the path of the robot, of edges that show how far it has moved."""
-    passes: float = 2.0
-    """Least change of the distance of such an edge from a spot, within its rim, pixels."""
-    fewest: int = 3
-    """Fewest edge points of which this is true."""
-    drift: float = 0.08
-    """Standard error of the displacement from end to end, pixels."""
+    passes: float = 2.0  #: Least change of the distance of such an edge from a spot, within its rim, pixels.
+    fewest: int = 3  #: Fewest edge points of which this is true.
+    drift: float = 0.08  #: Standard error of the displacement from end to end, pixels.
     beside: tuple[float, float] = (0.6, 0.85)
     """Distances from the axis at which the edge of a mirrored lamp is looked for, over the body's diameter."""
-    lines: int = 5
-    """Lines along the path between these distances."""
+    lines: int = 5  #: Lines along the path between these distances.
     veil_width: float = 0.3
     """Width of the stretches whose brightness is compared, over the body's diameter: wider than a ruler's lines."""
     veil_step: float = 30.0
     """Least step of the brightness at the edge of a mirrored lamp, of 255.
 
     On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
-    sharp: float = 0.4
-    """Least share of the step within four pixels on either side of it."""
+    sharp: float = 0.4  #: Least share of the step within four pixels on either side of it.
     slant: int = 8
     """Largest distance along the path of the step on one side of the body from that on the other, pixels."""
-    in_view: float = 0.5
-    """Least share of the path that has to be in the picture."""
+    in_view: float = 0.5  #: Least share of the path that has to be in the picture.
     veil_drift: float = 0.5
     """Standard error of the displacement from end to end under a mirrored lamp, pixels. Assumed."""
 
@@ -73,8 +62,7 @@ GLARE = GlareConstants()
 class Glare(NamedTuple):
     """What glare that stands still leaves in a track."""
 
-    drift: float
-    """Standard error of the displacement from end to end, pixels."""
+    drift: float  #: Standard error of the displacement from end to end, pixels.
     flags: tuple[Flag, ...]
 
 
@@ -138,15 +126,7 @@ def _veil(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFin
 def _brightness(
     images: Sequence[np.ndarray], pose: BodyPose, body: BodyFinder, along: Samples, across: Samples
 ) -> Samples | None:
-    """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view.
-
-    Args:
-        images: frames spread over the video, 8-bit RGB, (h, w, 3) each.
-        pose: of the robot halfway.
-        body: the robot's body.
-        along: places along its axis from its mid-length, m, (n,).
-        across: places across, m, (k,).
-    """
+    """Median brightness at points along the path of a robot, of 255, (n,); None where much of it is out of view."""
     grid = np.stack(np.meshgrid(along, across, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     pixels = np.nan_to_num(seen(grid, pose, body.optics), nan=-1.0).round().astype(int)
     left, top, right, bottom = body.bounds
@@ -199,16 +179,10 @@ def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
 
 
 def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
-    """Spots that stay white where they are, on the path of the body, (h, w).
-
-    What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
-    shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
-    highlight that reaches over the body's rim would else lose there, and seem to stand.
-
-    Args:
-        white: what is white on each of n frames, (h, w).
-        bodies: corners of what body and coupling cover on each frame, (n, k, 2).
-    """
+    """Spots that stay white where they are, on the path of the body, (h, w)."""
+    # What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that
+    # are shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole
+    # way: a highlight that reaches over the body's rim would else lose there, and seem to stand.
     cv2 = import_optional("cv2", "measuring a video", "video")
     middle, shape = len(white) // 2, white[0].shape
     moved = np.round(bodies.mean(axis=1) - bodies[middle].mean(axis=0)).astype(int)
@@ -249,14 +223,10 @@ def _pass(body: BodyFinder, poses: Sequence[BodyPose], spots: np.ndarray, low: n
 class InitialDetection(NamedTuple):
     """Camera, scale, and the robot as it looks."""
 
-    sight: CalibratedCamera
-    """The calibrated camera."""
-    known: Identified
-    """The robot."""
-    still: Samples
-    """Static background of the pictures, (h, w, 3); reduced by a whole factor where they are large."""
-    glare: Glare
-    """Glare that stands still."""
+    sight: CalibratedCamera  #: The calibrated camera.
+    known: Identified  #: The robot.
+    still: Samples  #: Static background of the pictures, (h, w, 3); reduced by a whole factor where they are large.
+    glare: Glare  #: Glare that stands still.
 
     @property
     def flags(self) -> tuple[Flag, ...]:

@@ -30,26 +30,16 @@ from spirillum.vision.video.frames import Frame
 class AppearanceConstants:
     """Whether the body's cover is opaque or glass."""
 
-    places: int = 60
-    """Places along the axis between the seal and the nose."""
-    lines: int = 61
-    """Lines along the axis, from one side to the other."""
-    reach: float = 1.45
-    """Outermost line, over the body's radius."""
-    core: float = 0.35
-    """Outermost line of the middle of the cover, over the body's radius."""
-    beyond: float = 1.25
-    """Innermost line of the background, over the body's radius."""
-    rim: float = 0.22
-    """Distance from the outline within which a rim is looked for, over the body's radius."""
-    fewest: int = 3
-    """Fewest pictures with all of the cover in view."""
-    least: float = 20.0
-    """Least significant difference of brightness, of 255."""
-    white: float = 228.0
-    """Brightness of glare, of 255."""
-    glare: float = 0.005
-    """Share of the cover under glare from which on nothing is concluded."""
+    places: int = 60  #: Places along the axis between the seal and the nose.
+    lines: int = 61  #: Lines along the axis, from one side to the other.
+    reach: float = 1.45  #: Outermost line, over the body's radius.
+    core: float = 0.35  #: Outermost line of the middle of the cover, over the body's radius.
+    beyond: float = 1.25  #: Innermost line of the background, over the body's radius.
+    rim: float = 0.22  #: Distance from the outline within which a rim is looked for, over the body's radius.
+    fewest: int = 3  #: Fewest pictures with all of the cover in view.
+    least: float = 20.0  #: Least significant difference of brightness, of 255.
+    white: float = 228.0  #: Brightness of glare, of 255.
+    glare: float = 0.005  #: Share of the cover under glare from which on nothing is concluded.
     uneven: float = 0.5
     """Change of the brightness along the axis over that from the middle to the background from which on contents show.
 
@@ -63,8 +53,7 @@ class AppearanceConstants:
 APPEARANCE = AppearanceConstants()
 
 
-Appearance = Literal["opaque", "glass", "unknown"]
-"""As `robot.appearance` of a setup."""
+Appearance = Literal["opaque", "glass", "unknown"]  #: As `robot.appearance` of a setup.
 
 
 def appearance_of(robot: Robot, optics: Optics, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> Appearance:
@@ -121,24 +110,18 @@ class LoneOutlineConstants:
 
     ahead: tuple[float, float] = (0.25, 2.0)
     """Stretch before the nose whose texture is that under the body, from the nose on, over the body's radius."""
-    across: float = 0.8
-    """Half its width, over the body's radius."""
-    lines: int = 15
-    """Lines along it."""
-    in_view: float = 0.5
-    """Least share of it that has to be in the picture."""
+    across: float = 0.8  #: Half its width, over the body's radius.
+    lines: int = 15  #: Lines along it.
+    in_view: float = 0.5  #: Least share of it that has to be in the picture.
     flat: float = 0.12
     """Half the width of the running mean along the lines that is subtracted, over the body's diameter."""
     texture: float = 4.0
     """Texture of the background from which on it is not plain, of 255; a single cable or speck makes none.
 
     On path-traced and drawn videos it was 0.5 on plain floors, and 8 to 16 on grid and millimetre paper."""
-    apart: float = 3.0
-    """Least displacement between two frames that are compared, pixels."""
-    fewest: int = 3
-    """Fewest pairs of frames for a test whether the edges at an end of the body move."""
-    steep: float = 0.6
-    """Least sine of the angle between such an edge and the path of the robot."""
+    apart: float = 3.0  #: Least displacement between two frames that are compared, pixels.
+    fewest: int = 3  #: Fewest pairs of frames for a test whether the edges at an end of the body move.
+    steep: float = 0.6  #: Least sine of the angle between such an edge and the path of the robot.
     stands: float = 0.5
     """Share of the contrast across the edges at an end that stays where it was from which on it stands still."""
     drift: float = 0.3
@@ -153,10 +136,8 @@ LONE_OUTLINE = LoneOutlineConstants()
 class OutlineCheck(NamedTuple):
     """What the cover of the body and the background leave open of its outline."""
 
-    drift: float = 0.0
-    """Standard error of the displacement from end to end by the outline alone, pixels."""
-    flags: tuple[Flag, ...] = ()
-    """A flag that names the cue and a frame, where the outline alone gives the pose."""
+    drift: float = 0.0  #: Standard error of the displacement from end to end by the outline alone, pixels.
+    flags: tuple[Flag, ...] = ()  #: A flag that names the cue and a frame, where the outline alone gives the pose.
     suspect: str = ""
     """What the outline may follow in place of the body; empty for an opaque body over a plain background."""
 
@@ -218,11 +199,9 @@ def _texture(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: Body
 
 
 def _stays(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body: BodyFinder, end: str) -> Samples:
-    """Share of the contrast across the edges at an end that stays where it was, (n,).
-
-    Each frame is compared with that on which the robot lies farthest ahead of the nose, or behind the rear: an opaque
-    body covers there what lay beside it. NaN where there is none.
-    """
+    """Share of the contrast across the edges at an end that stays where it was, (n,)."""
+    # Each frame is compared with that on which the robot lies farthest ahead of the nose, or behind the rear: an opaque
+    # body covers there what lay beside it. NaN where there is none.
     found, pixel = np.full(len(images), np.nan), body.optics.length_per_pixel
     x = np.array([pose.x for pose in poses])
     last = int(np.argmax(x) if end == "front" else np.argmin(x))

@@ -29,30 +29,23 @@ from spirillum.vision.track.visibility import EVERYTHING
 class FrameSeries(NamedTuple):
     """One series of a video, as it was read on each frame."""
 
-    values: Samples
-    """Position, m, or angle modulo `period`, rad, (n,); NaN where unreadable."""
-    period: float
-    """Period of the angle, rad; infinite for a position."""
-    least: float
-    """Least standard error of a step."""
+    values: Samples  #: Position, m, or angle modulo `period`, rad, (n,); NaN where unreadable.
+    period: float  #: Period of the angle, rad; infinite for a position.
+    least: float  #: Least standard error of a step.
 
 
 class Restored(NamedTuple):
     """Times with the lost frames put back."""
 
-    time: Samples
-    """Corrected time of each frame, s, (n,); the given times where nothing was corrected."""
-    relative_error: float
-    """Relative standard uncertainty that doubtful steps leave in the length of the video."""
-    flags: tuple[Flag, ...]
-    """What was corrected, or why nothing is given."""
+    time: Samples  #: Corrected time of each frame, s, (n,); the given times where nothing was corrected.
+    relative_error: float  #: Relative standard uncertainty that doubtful steps leave in the length of the video.
+    flags: tuple[Flag, ...]  #: What was corrected, or why nothing is given.
 
 
 class _Change(NamedTuple):
     """A motion that is not in one direction throughout."""
 
-    name: str
-    """Name of its flag."""
+    name: str  # name of its flag
     sentence: str
     advice: str
 
@@ -62,10 +55,8 @@ class _Jumps(NamedTuple):
 
     jump: Samples
     """Median of some frames after the step minus that of as many before it, modulo the period, (m,); NaN: unknown."""
-    usual: Samples
-    """Usual step in the time of one frame, (m,)."""
-    error: float
-    """Robust standard error of a jump."""
+    usual: Samples  # usual step in the time of one frame, (m,)
+    error: float  # robust standard error of a jump
     period: float
 
 
@@ -150,10 +141,8 @@ def _put_back(
 
 
 def _repeated(time: Samples, readings: tuple[FrameSeries, ...], frame: float, picture: PictureSteps | None) -> int:
-    """Number of frames that show no motion between frames that do.
-
-    Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
-    """
+    """Number of frames that show no motion between frames that do."""
+    # Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
     series = _all_jumps(time, readings, frame, 1)
     if _power(series) < LOST_FRAMES.repeats_power:
         return 0
@@ -301,11 +290,9 @@ def _sees(steps: _Jumps, lost: np.ndarray) -> bool:
 
 
 def _agrees(steps: _Jumps, lost: np.ndarray) -> bool:
-    """Whether the series has the losses' size; a series that cannot see them agrees.
-
-    What jumps are left with the corrected times is regressed on the losses: 0 within four standard errors, or within
-    `LOST_FRAMES.agrees`.
-    """
+    """Whether the series has the losses' size; a series that cannot see them agrees."""
+    # What jumps are left with the corrected times is regressed on the losses: 0 within four standard errors, or within
+    # `LOST_FRAMES.agrees`.
     if not _sees(steps, lost):
         return True
     at = (lost > 0) & np.isfinite(steps.jump)

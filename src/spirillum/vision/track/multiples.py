@@ -19,12 +19,9 @@ from spirillum.vision.track.constants import MULTIPLES
 class Multiples(NamedTuple):
     """How often which multiple of the smallest step is taken."""
 
-    repeated: int
-    """Frames that repeat the one before, and are not made up for by the next step."""
-    lost: int
-    """Frames that were lost, but for those before which one was repeated."""
-    steps: int
-    """Steps in all."""
+    repeated: int  #: Frames that repeat the one before, and are not made up for by the next step.
+    lost: int  #: Frames that were lost, but for those before which one was repeated.
+    steps: int  #: Steps in all.
 
 
 def multiples_of(time: Samples, values: Samples, period: float, frame: float) -> Multiples | None:

@@ -18,41 +18,31 @@ from spirillum.vision.track.constants import OUTLINE, SEAL, STRIPES
 from spirillum.vision.track.contour import GROUPS, Contour
 
 _SIDES = tuple(GROUPS.index(name) for name in ("rear", "left", "right", "seal"))
-_FLANKS = False, True, True, False
-"""Which of the sides are silhouettes."""
+_FLANKS = False, True, True, False  # which of the sides are silhouettes
 
 
 class ColourPart(NamedTuple):
     """Blurred colours of a part of a picture."""
 
-    picture: np.ndarray
-    """Red, green and blue, (h, w, 3), single precision."""
-    origin: Samples
-    """Pixel (u, v) of its upper left corner, (2,)."""
+    picture: np.ndarray  #: Red, green and blue, (h, w, 3), single precision.
+    origin: Samples  #: Pixel (u, v) of its upper left corner, (2,).
 
 
 class SealShifts(NamedTuple):
     """Displacements of the seal's edges along their normals on a frame."""
 
-    shifts: Samples
-    """Displacements, pixels, (n,)."""
-    known: np.ndarray
-    """Whether the displacement is valid, (n,)."""
-    variance: Samples
-    """Variances by the misfit of the profiles, pixels^2, (n,)."""
-    kind: np.ndarray
-    """Class of the colour at each edge, (n,)."""
+    shifts: Samples  #: Displacements, pixels, (n,).
+    known: np.ndarray  #: Whether the displacement is valid, (n,).
+    variance: Samples  #: Variances by the misfit of the profiles, pixels^2, (n,).
+    kind: np.ndarray  #: Class of the colour at each edge, (n,).
 
 
 class _Profiles(NamedTuple):
     """Profiles across the seal's edges."""
 
-    share: Samples
-    """Share of the stripe's colour, 1 inside to 0 outside, (n, m)."""
-    distance: Samples
-    """Fisher's squared distance of the stripe from its surroundings, (n,); 0 where they look alike."""
-    kind: np.ndarray
-    """Class of the colour at each edge, (n,)."""
+    share: Samples  # share of the stripe's colour, 1 inside to 0 outside, (n, m)
+    distance: Samples  # fisher's squared distance of the stripe from its surroundings, (n,); 0 where they look alike
+    kind: np.ndarray  # class of the colour at each edge, (n,)
 
 
 class SealEdges:
@@ -80,14 +70,7 @@ class SealEdges:
         self._bias = np.zeros((len(_SIDES), self._classes))
 
     def shifts(self, part: ColourPart, pixels: Samples, normals: Samples, *, rough: bool = False) -> SealShifts:
-        """Displacement of each edge along its normal.
-
-        Args:
-            part: the surroundings of the robot.
-            pixels: expected places of the edges, (n, 2).
-            normals: their outward normals, (n, 2).
-            rough: displacements of several pixels, with the same variance at all edges.
-        """
+        """Displacement of each edge along its normal."""
         found, count = self._profiles(part, pixels, normals), len(pixels)
         if rough:
             known = (found.distance > 0.0) & np.isfinite(found.share[:, 0])
@@ -157,11 +140,9 @@ class SealEdges:
                     self._bias[number, kind] += float(np.clip(np.median(mine), -1.0, 1.0))
 
     def size(self, seen: SealShifts, pixels: Samples, *, rough: bool = False) -> float:
-        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ.
-
-        Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the silhouette,
-        or nothing is: `rough` takes its length or its width alone where that differs.
-        """
+        """Size of the seal over the expected one, by its length and its width; NaN if one is hidden, or they differ."""
+        # Of a seal of another size by some pixels, borders of stripes or what lies under it are taken for the
+        # silhouette, or nothing is: `rough` takes its length or its width alone where that differs.
         found, distances = np.full(2, np.nan), np.zeros(2)
         for way, ends in enumerate(((0, 3), (1, 2))):
             sides = [self._sides[side] for side in ends]

@@ -19,32 +19,20 @@ from spirillum.vision.track.contour import GROUPS, Contour
 class SearchConstants:
     """Search for the body in a whole picture."""
 
-    body_width: float = 16.0
-    """Apparent width of the body in the reduced picture that is searched first, pixels."""
-    reduced_width: float = 48.0
-    """Least apparent width of the body in a large picture that was reduced before, pixels."""
-    headings: tuple[float, ...] = (-8.0, -4.0, 0.0, 4.0, 8.0)
-    """Headings that are tried, degrees."""
+    body_width: float = 16.0  #: Apparent width of the body in the reduced picture that is searched first, pixels.
+    reduced_width: float = 48.0  #: Least apparent width of the body in a large picture that was reduced before, pixels.
+    headings: tuple[float, ...] = (-8.0, -4.0, 0.0, 4.0, 8.0)  #: Headings that are tried, degrees.
     background_share: float = 0.8
     """Share of the background that is subtracted; less than 1, or a robot that hardly moves would vanish too."""
-    edge_stride: int = 2
-    """Every how many edge points one is used."""
-    column_step: int = 6
-    """Columns of the reduced picture that share one computed outline, pixels."""
-    peaks: int = 3
-    """Best places that are kept of each block of columns and heading."""
-    candidates: int = 5
-    """Candidates that are kept of a picture."""
-    coarse_blur: float = 1.0
-    """Standard deviation of the blur of the reduced picture, pixels."""
-    fine_blur: float = 1.2
-    """Standard deviation of the blur of the full picture, pixels."""
-    reach: int = 6
-    """Largest distance by which a candidate is moved in a round of refinement, pixels."""
-    margin: int = 24
-    """Width of the surroundings of a candidate that are looked at in refinement, pixels."""
-    travel_penalty: float = 0.5
-    """Relative score that a displacement of one body length between two frames costs."""
+    edge_stride: int = 2  #: Every how many edge points one is used.
+    column_step: int = 6  #: Columns of the reduced picture that share one computed outline, pixels.
+    peaks: int = 3  #: Best places that are kept of each block of columns and heading.
+    candidates: int = 5  #: Candidates that are kept of a picture.
+    coarse_blur: float = 1.0  #: Standard deviation of the blur of the reduced picture, pixels.
+    fine_blur: float = 1.2  #: Standard deviation of the blur of the full picture, pixels.
+    reach: int = 6  #: Largest distance by which a candidate is moved in a round of refinement, pixels.
+    margin: int = 24  #: Width of the surroundings of a candidate that are looked at in refinement, pixels.
+    travel_penalty: float = 0.5  #: Relative score that a displacement of one body length between two frames costs.
 
 
 SEARCH = SearchConstants()
@@ -53,14 +41,10 @@ SEARCH = SearchConstants()
 class Shape(NamedTuple):
     """A body's edges before a camera, for the search of a whole picture."""
 
-    contour: Contour
-    """The apparent edges."""
-    thin: Contour
-    """As many of them as the search uses."""
-    optics: Optics
-    """The camera."""
-    bounds: tuple[int, int, int, int]
-    """Part of the picture to look at: left, top, right, bottom."""
+    contour: Contour  #: The apparent edges.
+    thin: Contour  #: As many of them as the search uses.
+    optics: Optics  #: The camera.
+    bounds: tuple[int, int, int, int]  #: Part of the picture to look at: left, top, right, bottom.
 
     @classmethod
     def of(cls, contour: Contour, optics: Optics, bounds: tuple[int, int, int, int], factor: int = 1) -> Self:
@@ -84,8 +68,7 @@ class PoseCandidate(NamedTuple):
     """A candidate pose of the body."""
 
     pose: BodyPose
-    score: float
-    """Edge score at the pose, over the mean gradient of the picture."""
+    score: float  #: Edge score at the pose, over the mean gradient of the picture.
 
 
 def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[PoseCandidate]:
@@ -176,12 +159,7 @@ def refined(image: np.ndarray, still: Samples, body: Shape, start: PoseCandidate
 
 
 def most_likely(found: list[list[PoseCandidate]], size: float) -> list[PoseCandidate | None]:
-    """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm).
-
-    Args:
-        found: candidates on each frame; may be empty. A frame on which none has a score above 0 shows no robot.
-        size: the body's length, m.
-    """
+    """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm)."""
     chosen: list[PoseCandidate | None] = [None] * len(found)
     seen = [index for index, some in enumerate(found) if some and some[0].score > 0.0]
     if not seen:
@@ -226,10 +204,8 @@ def _slopes(
     *,
     bounded: bool = True,
 ) -> tuple[Samples, Samples, float]:
-    """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude.
-
-    The gradients are transposed, (w, h).
-    """
+    """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude."""
+    # The gradients are transposed, (w, h).
     cv2 = import_optional("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     whole, background = (

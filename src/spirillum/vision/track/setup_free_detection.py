@@ -35,36 +35,26 @@ from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.video.frames import Frame, Video
 from spirillum.vision.video.pictures import reduction
 
-_WRONG = 4.0
-"""Ratio beyond the usual lengths per pixel at which a stated spacing is wrong."""
+_WRONG = 4.0  # ratio beyond the usual lengths per pixel at which a stated spacing is wrong
 
 
 class Walls(NamedTuple):
     """Two edges along the channel on either side of the robot."""
 
-    distance: float
-    """Distance between them over the body's diameter."""
-    contrast: float
-    """Step of the brightness at the fainter one over the usual step, from row to row."""
-    ends: Samples
-    """Pixels of both ends of both edges, (2, 2, 2)."""
+    distance: float  #: Distance between them over the body's diameter.
+    contrast: float  #: Step of the brightness at the fainter one over the usual step, from row to row.
+    ends: Samples  #: Pixels of both ends of both edges, (2, 2, 2).
 
 
 class SetupFreeDetection(NamedTuple):
     """Setup-free detection in a video."""
 
-    lines: Lines | None
-    """Lines of the ruler; None where none was found."""
-    known: Identified | None
-    """The robot, in front of the provisional camera; None where none was found."""
-    direction: str
-    """Where in the picture its nose points."""
-    stripes: tuple[str, ...]
-    """Colours of its stripes in the order seen; empty where they could not be read."""
-    walls: Walls | None
-    """Walls of its channel; None where none were found."""
-    frames: list[Frame]
-    """Frames that were looked at."""
+    lines: Lines | None  #: Lines of the ruler; None where none was found.
+    known: Identified | None  #: The robot, in front of the provisional camera; None where none was found.
+    direction: str  #: Where in the picture its nose points.
+    stripes: tuple[str, ...]  #: Colours of its stripes in the order seen; empty where they could not be read.
+    walls: Walls | None  #: Walls of its channel; None where none were found.
+    frames: list[Frame]  #: Frames that were looked at.
     reduction: int
     """Factor by which they may be reduced where they are looked at as a whole: the ruler is resolved in them."""
 
@@ -191,10 +181,8 @@ def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) ->
 
 
 def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: float | None) -> list[float]:
-    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m.
-
-    A spacing by which the robot would be a dot, or far larger than the picture, is wrong and is not tried.
-    """
+    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m."""
+    # A spacing by which the robot would be a dot, or far larger than the picture, is wrong and is not tried.
     length = robot.body.length + robot.coupling.length + robot.tail.length
     wide = [length / (share * max(size)) for share in SETUP_FREE.shares]
     guesses = []
@@ -227,10 +215,8 @@ def _found_at(
 
 
 def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
-    """The robot at about the size of a body, searched again at the size that was found; None where it is not there.
-
-    First by the colours of its seal, which a cover of glass and a grid under it do not hide.
-    """
+    """The robot at about the size of a body, searched again at the size that was found; None where it is not there."""
+    # First by the colours of its seal, which a cover of glass and a grid under it do not hide.
     by_seal = _by_seal(video, setup, body, stills, factor)
     if by_seal is not None:
         return by_seal
@@ -288,10 +274,8 @@ def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
 
 
 def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | None:
-    """The outermost clear pair of edges along the robot's path, inside the ruler; None without one.
-
-    Brightness is taken at lines along the way, as the median along each, so that robot, ruler and dust drop out.
-    """
+    """The outermost clear pair of edges along the robot's path, inside the ruler; None without one."""
+    # Brightness is taken at lines along the way, as the median along each, so that robot, ruler and dust drop out.
     body = known.start.body
     optics, diameter = body.optics, body.robot.body.diameter
     poses = np.array([pose for _, pose in known.start.path])

@@ -31,12 +31,10 @@ _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
 """Candidate sizes over the expected one; sizes in between are fitted to the edges."""
 _RUNS = tuple(map(tuple, np.split(_SIZES, 2)))
 """Sizes that are looked for with one computed outline, that of the least of them: its camera sees farthest."""
-_FINE = 8
-"""Samples of the edges' gradient profile per pixel."""
+_FINE = 8  # samples of the edges' gradient profile per pixel
 _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002)
 """Half ranges of size, position (pixels) and heading (rad) in each round of the grid search."""
-_COUNTS = 13, 9, 5
-"""Grid points of each parameter in each round."""
+_COUNTS = 13, 9, 5  # grid points of each parameter in each round
 
 LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
 """Quantities that are proportional to the scale."""
@@ -92,10 +90,8 @@ def _magnified(optics: Optics, size: float) -> Optics:
 class OutlineFit(NamedTuple):
     """Misfit of an outline against the edges in the picture."""
 
-    size: float
-    """Apparent size over that of the robot file."""
-    move: BodyPose
-    """Correction to be added to the pose, m and rad."""
+    size: float  #: Apparent size over that of the robot file.
+    move: BodyPose  #: Correction to be added to the pose, m and rad.
 
     @property
     def resizes(self) -> bool:
@@ -109,11 +105,9 @@ class OutlineFit(NamedTuple):
 
 
 def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
-    """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees.
-
-    Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare and
-    shadows agree on no size, so that they do not bias the maximum.
-    """
+    """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees."""
+    # Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare
+    # and shadows agree on no size, so that they do not bias the maximum.
     pixels, normals, _, slopes = body.contour.places(pose, body.optics)
     middle = body.optics.pixels(np.array([[pose.x, pose.y, body.optics.axis_height]]))
     units = np.array([body.optics.length_per_pixel, body.optics.length_per_pixel, 1.0])
@@ -147,23 +141,18 @@ def _blurred(steep: Samples) -> Samples:
 class CheckedScale(NamedTuple):
     """The scale as the apparent sizes of body and tail leave it."""
 
-    scale: Scale
-    """With the apparent size, and a larger uncertainty where the ruler is doubted."""
-    flags: tuple[Flag, ...]
-    """What contradicts it."""
-    roll_error: float
-    """Standard error of the body's angle by an outline that is not the body's, rad."""
+    scale: Scale  #: With the apparent size, and a larger uncertainty where the ruler is doubted.
+    flags: tuple[Flag, ...]  #: What contradicts it.
+    roll_error: float  #: Standard error of the body's angle by an outline that is not the body's, rad.
 
 
 def checked_scale(
     scale: Scale, body: BodyFinder, size: float, spacing: float | None = None, tail: float = np.nan
 ) -> CheckedScale:
-    """Compare the scale with the apparent sizes of body and tail.
-
-    A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid may
-    be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body, the
-    ruler or the heights are doubted; where it agrees with the ruler, the outline.
-    """
+    """Compare the scale with the apparent sizes of body and tail."""
+    # A body of another size alone is a reason to doubt its outline: the rim of a glass cover, its contents or a grid
+    # may be taken for it. Where the tail, whose wavelength is measured apart from any outline, agrees with the body,
+    # the ruler or the heights are doubted; where it agrees with the ruler, the outline.
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel
     off = float(abs(np.log(size)))
@@ -225,10 +214,8 @@ def _told(size: float) -> str:
 class DirectionConstants:
     """Direction of the channel without a ruler."""
 
-    frames: int = 10
-    """Fewest frames with a place."""
-    way: float = 20.0
-    """Least displacement of a robot over the scatter of its positions for a direction."""
+    frames: int = 10  #: Fewest frames with a place.
+    way: float = 20.0  #: Least displacement of a robot over the scatter of its positions for a direction.
     least: float = 0.026
     """Least angle to the rows of the picture, rad: below it lengths are wrong by less than the lens's 0.03 %."""
 
@@ -239,24 +226,15 @@ DIRECTION = DirectionConstants()
 class AlignedTrack(NamedTuple):
     """Places and headings against the channel."""
 
-    position: Samples
-    """Along and across the channel, m, (n, 2)."""
-    heading: Samples
-    """Angle of the motor axis to the channel, rad, (n,)."""
+    position: Samples  #: Along and across the channel, m, (n, 2).
+    heading: Samples  #: Angle of the motor axis to the channel, rad, (n,).
     flags: tuple[Flag, ...]
 
 
 def align_with_path(time: Samples, position: Samples, heading: Samples) -> AlignedTrack:
-    """Turn a track so that x runs along the robot's path.
-
-    A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where the
-    robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
-
-    Args:
-        time: of each frame, s, (n,).
-        position: along the rows and columns of the picture, m, (n, 2); NaN where unknown.
-        heading: angle of the motor axis to the rows, rad, (n,).
-    """
+    """Turn a track so that x runs along the robot's path."""
+    # A ruler shows how the camera is rolled against the channel; a stated scale does not. The channel then runs where
+    # the robot goes, by robust lines through its places; or, for a robot that hardly moves, along its motor axis.
     known = np.isfinite(position).all(axis=1)
     if np.count_nonzero(known) < DIRECTION.frames:
         return AlignedTrack(position, heading, ())

@@ -30,22 +30,15 @@ from spirillum.vision.video.frames import Frame
 class SteadinessConstants:
     """Whether camera and ruler stayed where they were."""
 
-    parts: int = 4
-    """Stretches of the video whose backgrounds are compared."""
-    fewest_frames: int = 3
-    """Fewest frames of a stretch."""
-    reach: int = 12
-    """Largest shift that is searched, pixels."""
+    parts: int = 4  #: Stretches of the video whose backgrounds are compared.
+    fewest_frames: int = 3  #: Fewest frames of a stretch.
+    reach: int = 12  #: Largest shift that is searched, pixels.
     peak_range: float = 0.25
     """Range of correlations below the largest one whose peaks are refined: a ruler correlates at many shifts."""
-    smooth_share: float = 0.8
-    """Share of the picture with the smallest gradients, which is not used."""
-    most_peaks: int = 6
-    """Most peaks of the correlation that are refined, beside zero shift."""
-    clearly_better: float = 0.7
-    """Residual at a shift over that near zero, below which the shift is accepted."""
-    rows_beside: int = 6
-    """Rows beside the robot that its edges change, pixels."""
+    smooth_share: float = 0.8  #: Share of the picture with the smallest gradients, which is not used.
+    most_peaks: int = 6  #: Most peaks of the correlation that are refined, beside zero shift.
+    clearly_better: float = 0.7  #: Residual at a shift over that near zero, below which the shift is accepted.
+    rows_beside: int = 6  #: Rows beside the robot that its edges change, pixels.
     moved: float = 0.2
     """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered videos."""
     moved_roughly: float = 2.0
@@ -57,23 +50,17 @@ class SteadinessConstants:
 STEADINESS = SteadinessConstants()
 
 
-_STEPS, _STILL = 8, 0.01
-"""Most Gauss-Newton steps, and the step below which they end, pixels."""
-_ROW = 100
-"""Edge pixels that are interpolated side by side."""
-_MOST_EDGES = 8000
-"""About as many edge pixels are compared; more of them would not make a shift more certain."""
-_THREADS, _LARGE = 2, 6_000_000
-"""Threads, and the bytes of a picture from which on one has to do, for its memory."""
+_STEPS, _STILL = 8, 0.01  # most Gauss-Newton steps, and the step below which they end, pixels
+_ROW = 100  # edge pixels that are interpolated side by side
+_MOST_EDGES = 8000  # about as many edge pixels are compared; more of them would not make a shift more certain
+_THREADS, _LARGE = 2, 6_000_000  # threads, and the bytes of a picture from which on one has to do, for its memory
 
 
 class StillPicture(NamedTuple):
     """What stands still in some pictures."""
 
-    lines: Lines | None
-    """The ruler's lines; None without a ruler."""
-    flat: Samples
-    """High-pass filtered brightness; 0 in the rows of the robot, (h, w)."""
+    lines: Lines | None  #: The ruler's lines; None without a ruler.
+    flat: Samples  #: High-pass filtered brightness; 0 in the rows of the robot, (h, w).
 
 
 def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> StillPicture:
@@ -96,14 +83,7 @@ def shift_of(first: StillPicture, other: StillPicture) -> tuple[float, bool]:
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
-    """Flag a camera or tank that moved along the channel during the video.
-
-    Args:
-        frames: frames spread over the video, in order of time; all of them may be reduced by a whole factor, and what
-            counts as moved are pixels of these.
-        start: result of the first look at them.
-        ruled: whether a ruler is in the picture.
-    """
+    """Flag a camera or tank that moved along the channel during the video."""
     parts = [
         part
         for part in np.array_split(np.arange(len(frames)), STEADINESS.parts)
@@ -142,15 +122,9 @@ def _rows_of(start: Start, factor: int) -> tuple[int, int]:
 
 
 def shift_between(one: Samples, other: Samples) -> float:
-    """Shift of a picture to the right of another one, pixels, robust to objects that move in it.
-
-    Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
-    least median residual is taken, or the one nearest to 0 if it fits about as well.
-
-    Args:
-        one: the first picture, high-pass filtered, (h, w).
-        other: the second picture, (h, w).
-    """
+    """Shift of a picture to the right of another one, pixels, robust to objects that move in it."""
+    # Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
+    # least median residual is taken, or the one nearest to 0 if it fits about as well.
     cv2 = import_optional("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
     correlation = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
@@ -214,22 +188,14 @@ def _by_lines(one: Lines, other: Lines, rough: float) -> float:
 class PictureChangeConstants:
     """Change of the picture from frame to frame."""
 
-    width: float = 320.0
-    """Longer side to which the pictures are reduced, pixels."""
-    blur: float = 1.0
-    """Standard deviation of the blur that takes noise away, pixels of the reduced picture."""
-    fewest: int = 20
-    """Fewest frames for the usual change."""
-    around: int = 15
-    """Steps of the running median."""
-    least: float = 1.1
-    """Least change by two steps over that by one; with less, noise hides the motion."""
-    scatter: float = 0.4
-    """Largest scatter of the change over the rise by two steps."""
-    share: float = 0.5
-    """Share of the rise by two steps from which on a frame is missing."""
-    rest: float = 0.6
-    """Change over the usual one below which a frame repeats the one before."""
+    width: float = 320.0  #: Longer side to which the pictures are reduced, pixels.
+    blur: float = 1.0  #: Standard deviation of the blur that takes noise away, pixels of the reduced picture.
+    fewest: int = 20  #: Fewest frames for the usual change.
+    around: int = 15  #: Steps of the running median.
+    least: float = 1.1  #: Least change by two steps over that by one; with less, noise hides the motion.
+    scatter: float = 0.4  #: Largest scatter of the change over the rise by two steps.
+    share: float = 0.5  #: Share of the rise by two steps from which on a frame is missing.
+    rest: float = 0.6  #: Change over the usual one below which a frame repeats the one before.
 
 
 PICTURE_CHANGE = PictureChangeConstants()
@@ -260,8 +226,7 @@ class PictureChange:
 class PictureSteps(NamedTuple):
     """Evidence of the pictures about each step from a frame to the next."""
 
-    jumps: np.ndarray
-    """Mask of the steps on which the picture changes as if a frame or more were missing, (n - 1,)."""
+    jumps: np.ndarray  #: Mask of the steps on which the picture changes as if a frame or more were missing, (n - 1,).
     rests: np.ndarray
     """Mask of the steps on which it hardly changes, as on a frame that repeats the one before, (n - 1,)."""
 

@@ -25,18 +25,14 @@ from spirillum.vision.video.frames import Frame
 class FollowingConstants:
     """From frame to frame."""
 
-    search_interval: int = 15
-    """Frames between two searches of the whole picture for a robot that was lost."""
-    memory: int = 12
-    """Frames from which the next place is predicted."""
-    largest_jump: float = 4.0
-    """Largest accepted distance from the predicted position, pixels."""
+    search_interval: int = 15  #: Frames between two searches of the whole picture for a robot that was lost.
+    memory: int = 12  #: Frames from which the next place is predicted.
+    largest_jump: float = 4.0  #: Largest accepted distance from the predicted position, pixels.
     gap: float = 3.0
     """Time between two frames over the usual one from which on the robot may have left its predicted path."""
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
-    usual_edges: int = 200
-    """Frames with the body in view whose median is the usual share of the edges that fit."""
+    usual_edges: int = 200  #: Frames with the body in view whose median is the usual share of the edges that fit.
     few_edges: float = 0.75
     """Share of the edges that fit, over the usual one, below which the detection may be false: a shadow takes some."""
     more_edges: float = 1.2
@@ -52,28 +48,20 @@ _UNREAD = (np.nan, np.nan)
 class FrameDetection(NamedTuple):
     """The observation on one frame, for drawing."""
 
-    time: float
-    """Time of the frame, s."""
-    pose: BodyPose | None
-    """Pose of the body in the camera's frame; None where it was not detected."""
-    body_angle: float
-    """Rotation angle of the body, rad, modulo the stripes' period; NaN where unreadable."""
-    tail_phase: float
-    """Phase of the tail, rad, modulo 2 pi; NaN where unreadable."""
-    optics: Optics
-    """The camera."""
+    time: float  #: Time of the frame, s.
+    pose: BodyPose | None  #: Pose of the body in the camera's frame; None where it was not detected.
+    body_angle: float  #: Rotation angle of the body, rad, modulo the stripes' period; NaN where unreadable.
+    tail_phase: float  #: Phase of the tail, rad, modulo 2 pi; NaN where unreadable.
+    optics: Optics  #: The camera.
 
 
 @dataclass
 class Record:
     """Observations on all frames so far."""
 
-    time: list[float] = field(default_factory=list)
-    """Time of each frame, s."""
-    index: list[int] = field(default_factory=list)
-    """Number of each frame."""
-    placed: list[PoseFit] = field(default_factory=list)
-    """The body on each frame."""
+    time: list[float] = field(default_factory=list)  #: Time of each frame, s.
+    index: list[int] = field(default_factory=list)  #: Number of each frame.
+    placed: list[PoseFit] = field(default_factory=list)  #: The body on each frame.
     roll: list[tuple[float, float]] = field(default_factory=list)
     """Angle of the body modulo the stripes' period, and its standard error, rad; NaN where unreadable."""
     edges: list[np.ndarray] = field(default_factory=list)
@@ -167,10 +155,8 @@ class FrameTracker:
         return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
     def _may_be_elsewhere(self, found: PoseFit) -> bool:
-        """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do.
-
-        It is searched for at once where they do so on a frame for the first time, then now and then.
-        """
+        """Whether to search the whole picture: the body is lost, or far fewer of its edges fit than usually do."""
+        # It is searched for at once where they do so on a frame for the first time, then now and then.
         placed = self.record.placed
         now_and_then = len(placed) % FOLLOWING.search_interval == 0
         if not found.known:

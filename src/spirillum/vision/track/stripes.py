@@ -30,28 +30,20 @@ from spirillum.vision.track.colours import (
 from spirillum.vision.track.constants import SINGLE_LINE, STRIPES
 from spirillum.vision.track.widths import edge_shifts
 
-_ROWS = 16
-"""Samples along the axis."""
-_BLURRED = 2
-"""Stride of the frames on which the blur is fitted."""
-_HATS = 15
-"""Hat functions in which the sheen is expanded along the angle."""
+_ROWS = 16  # samples along the axis
+_BLURRED = 2  # stride of the frames on which the blur is fitted
+_HATS = 15  # hat functions in which the sheen is expanded along the angle
 
 
 @dataclass
 class _Appearance:
     """Appearance of the stripes in this video."""
 
-    palette: Samples
-    """Colour of each class, (classes, 3)."""
-    shade: Samples
-    """Shading factor and additive sheen at each angle, in each channel, (n, 6)."""
-    blur: float
-    """Standard deviation of the blur, pixels."""
-    residual: float
-    """Median residual of a channel, of 255."""
-    trust: Samples
-    """Weight of each angle, (n,); small where residuals are large, as under a highlight."""
+    palette: Samples  # colour of each class, (classes, 3)
+    shade: Samples  # shading factor and additive sheen at each angle, in each channel, (n, 6)
+    blur: float  # standard deviation of the blur, pixels
+    residual: float  # median residual of a channel, of 255
+    trust: Samples  # weight of each angle, (n,); small where residuals are large, as under a highlight
 
 
 class Stripes:
@@ -355,17 +347,9 @@ def _line_flag(name: str, what: str) -> Flag:
 
 
 def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) -> Samples:
-    """Shading factor and sheen along the angle, (n, 6), by regularised linear least squares.
-
-    The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
-    the two even where the body hardly turned, as the sheen is nearly white.
-
-    Args:
-        angles: rad, (n,).
-        models: model colours of the stripes in some frames, (f, n, 3).
-        wanted: observed colours, (f, n, 3).
-        kept: mask of the samples used, (f, n).
-    """
+    """Shading factor and sheen along the angle, (n, 6), by regularised linear least squares."""
+    # The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
+    # the two even where the body hardly turned, as the sheen is nearly white.
     s = angles / STRIPES.reach
     series = np.stack([s**power for power in range(5)], axis=1)
     centres = np.linspace(-1.0, 1.0, _HATS)

@@ -18,12 +18,10 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import TAIL
 
 _TAIL = ("tail_rotation_rate",)
-_COARSE = 13
-"""Stations along the tail at which the optics are evaluated."""
+_COARSE = 13  # stations along the tail at which the optics are evaluated
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
-_FACTORS = np.arange(0.60, 1.66, 0.03)
-"""Candidate wavelengths, over that of the robot file."""
+_FACTORS = np.arange(0.60, 1.66, 0.03)  # candidate wavelengths, over that of the robot file
 _NEAR = np.linspace(0.84, 1.16, 17)
 """Wavelengths over that of the robot file among which the apparent one is interpolated."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -35,10 +33,8 @@ _TURNS = np.column_stack([np.cos(_PHASES), np.sin(_PHASES)])
 class _Strip(NamedTuple):
     """A grid of pixels along and across the tail."""
 
-    middle: Samples
-    """Pixel of the tail's axis in each row, (rows, 2)."""
-    across: Samples
-    """Step from one column to the next, pixels, (rows, 2)."""
+    middle: Samples  # pixel of the tail's axis in each row, (rows, 2)
+    across: Samples  # step from one column to the next, pixels, (rows, 2)
     tilt: Samples
     """Derivatives with height of the shift along (e) and across (f) and of the magnification (g), (rows, 3)."""
 
@@ -46,10 +42,8 @@ class _Strip(NamedTuple):
 class _SeenShape(NamedTuple):
     """The shape of the tail in the picture."""
 
-    wavelength: float
-    """Over that of the robot file."""
-    amplitude: float
-    """Over that of the robot file."""
+    wavelength: float  # over that of the robot file
+    amplitude: float  # over that of the robot file
 
 
 def _other_than_a_helix() -> Flag:
@@ -140,10 +134,8 @@ class TailWave:
             self._flags = [self.unseen()]
 
     def _apparent_stretch(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> float:
-        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames.
-
-        NaN where its standard error is above `TAIL.stretch_error`.
-        """
+        """Apparent wavelength over that of the robot file at the scale of this camera, median over some frames."""
+        # NaN where its standard error is above `TAIL.stretch_error`.
         assert self.contrast is not None  # noqa: S101 - learnt
         found = []
         for image, strip in strips[:: max(1, len(strips) // 12)]:
@@ -260,10 +252,8 @@ class TailWave:
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
-        """Contrast of the best phase against the others, over the root mean square ridge of the strip.
-
-        Only the rows are filtered that the scores are summed over.
-        """
+        """Contrast of the best phase against the others, over the root mean square ridge of the strip."""
+        # Only the rows are filtered that the scores are summed over.
         xi, *rows = (rows[:: TAIL.row_stride] for rows in (self.xi, *strip))
         few = _Strip(*rows)
         ridge, scores = self._ridge(image, few, contrast), np.empty(TAIL.phases)
@@ -367,10 +357,8 @@ class TailWave:
         return scores is not None and float(np.interp(1.0, _FACTORS, scores)) > own
 
     def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
-        """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen.
-
-        Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
-        """
+        """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen."""
+        # Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
         found = []
         for weights in _CONTRASTS:
             contrast = np.array(weights) / np.linalg.norm(weights)
@@ -390,10 +378,9 @@ class TailWave:
         return shape if np.mean(read) > TAIL.seen_share and other.halves_agree(strips) else None
 
     def halves_agree(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> bool:
-        """Whether the front and the rear half of the tail show the same wavelength, each by itself.
-
-        A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both halves.
-        """
+        """Whether the front and the rear half of the tail show the same wavelength, each by itself."""
+        # A ruler, a grid or the rim of a reflection may look like a wave of some length, but not like one in both
+        # halves.
         assert self.contrast is not None  # noqa: S101 - only of a wave that was read
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in strips]
         middle = self.xi.size // 2

@@ -24,10 +24,8 @@ _ALONG = 0, 0, 1
 class CueConstants:
     """Agreement of the cues to where the body is."""
 
-    fewest: int = 5
-    """Fewest edges of a cue on a frame."""
-    frames: int = 8
-    """Fewest frames with outline and seal for a comparison of their motions."""
+    fewest: int = 5  #: Fewest edges of a cue on a frame.
+    frames: int = 8  #: Fewest frames with outline and seal for a comparison of their motions.
     apart: float = 0.4
     """Standard error of the displacement from end to end by cues that disagree that is flagged, pixels."""
     colour_drift: float = 0.1
@@ -43,33 +41,20 @@ CUES = CueConstants()
 class Cue(NamedTuple):
     """How far a cue was used in a video."""
 
-    share: float
-    """Share of the frames on which it was used, 0 to 1."""
-    disagreement: float
-    """Root mean square distance from the joint fit, standard deviations; NaN where it is not known."""
+    share: float  #: Share of the frames on which it was used, 0 to 1.
+    disagreement: float  #: Root mean square distance from the joint fit, standard deviations; NaN where it is not known
 
 
 class Agreement(NamedTuple):
     """Cues of a video, and what their disagreement leaves in the speed."""
 
-    cues: dict[str, Cue]
-    """Cues by name."""
-    drift: float
-    """Standard error of the displacement from end to end by cues that disagree, m."""
-    flags: tuple[Flag, ...]
-    """A flag where outline and seal do not move alike, and both count."""
+    cues: dict[str, Cue]  #: Cues by name.
+    drift: float  #: Standard error of the displacement from end to end by cues that disagree, m.
+    flags: tuple[Flag, ...]  #: A flag where outline and seal do not move alike, and both count.
 
 
 def cue_shifts(left: Samples, slopes: Samples, used: Samples, cue: np.ndarray, level: float) -> Samples:
-    """Displacement of each cue of edges from the joint pose, and its standard error, m, (cues, 2); NaN if unused.
-
-    Args:
-        left: residual displacement of each edge along its normal, pixels, (n,).
-        slopes: Jacobian of the displacements by the pose, (n, 3).
-        used: weights of the edges, 0 for outliers, (n,).
-        cue: index into `EDGE_CUES` of each edge, (n,).
-        level: standard error over the one by the weights.
-    """
+    """Displacement of each cue of edges from the joint pose, and its standard error, m, (cues, 2); NaN if unused."""
     found = np.full((len(EDGE_CUES), 2), np.nan)
     for number, along in enumerate(_ALONG):
         mine = (cue == number) & (used > 0.0)
@@ -83,18 +68,9 @@ def cue_shifts(left: Samples, slopes: Samples, used: Samples, cue: np.ndarray, l
 
 
 def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel: float, suspect: str = "") -> Agreement:
-    """Cues of a video: how often each was used, and whether they agree.
-
-    Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
-    mixture of both, with their weights.
-
-    Args:
-        time: times of the frames, s, (n,).
-        shifts: results of `cue_shifts` on each frame.
-        tail: phase of the tail on each frame, (n,); NaN where unreadable.
-        pixel: length per pixel, m.
-        suspect: what the outline may follow in place of the body; empty where nothing else is there.
-    """
+    """Cues of a video: how often each was used, and whether they agree."""
+    # Where outline and seal move unlike, the body may have followed either: the standard error of its way is that of a
+    # mixture of both, with their weights.
     stack = np.array(shifts)
     cues = {}
     for number, name in enumerate(EDGE_CUES):
@@ -126,14 +102,10 @@ def agreement_of(time: Samples, shifts: Sequence[Samples], tail: Samples, pixel:
 class RobotMotion(NamedTuple):
     """Position and unwrapped angles of a robot on every frame; NaN where unknown."""
 
-    time: Samples
-    """Time of each frame, s, (n,)."""
-    x: Samples
-    """Position along the channel, m, (n,)."""
-    body_angle: Samples
-    """Rotation angle of the body, unwrapped, rad, (n,)."""
-    tail_phase: Samples
-    """Phase of the tail, unwrapped, rad, (n,)."""
+    time: Samples  #: Time of each frame, s, (n,).
+    x: Samples  #: Position along the channel, m, (n,).
+    body_angle: Samples  #: Rotation angle of the body, unwrapped, rad, (n,).
+    tail_phase: Samples  #: Phase of the tail, unwrapped, rad, (n,).
 
 
 @dataclass(frozen=True)
@@ -148,34 +120,23 @@ class Track:
     """Time of each frame in the video, s, (n,); corrected where frames were lost while the times went on evenly."""
     frame: Samples = field(repr=False)
     """Number of each frame in the video, counted as it was recorded where that is known, (n,)."""
-    position: Samples = field(repr=False)
-    """The body's mid-length (x, y), m, (n, 2)."""
+    position: Samples = field(repr=False)  #: The body's mid-length (x, y), m, (n, 2).
     heading: Samples = field(repr=False)
     """Angle of the motor axis to the x axis in the plane of the picture, rad, (n,)."""
-    body_angle: Samples = field(repr=False)
-    """Angle by which the body has turned about +x, unwrapped, rad, (n,)."""
-    tail_phase: Samples = field(repr=False)
-    """Phase phi of the tail about +x in the lab, unwrapped, rad, (n,)."""
-    position_error: Samples = field(repr=False)
-    """Estimated standard error of the x position on each frame, m, (n,)."""
+    body_angle: Samples = field(repr=False)  #: Angle by which the body has turned about +x, unwrapped, rad, (n,).
+    tail_phase: Samples = field(repr=False)  #: Phase phi of the tail about +x in the lab, unwrapped, rad, (n,).
+    position_error: Samples = field(repr=False)  #: Estimated standard error of the x position on each frame, m, (n,).
     body_angle_error: Samples = field(repr=False)
     """Estimated standard error of the body's angle on each frame, rad, (n,)."""
     tail_phase_error: Samples = field(repr=False)
     """Estimated standard error of the tail's phase on each frame, rad, (n,)."""
-    picture: Samples = field(repr=False)
-    """For drawing: pixel (u, v) of the body's mid-length and of its nose, (n, 4)."""
-    size: tuple[int, int]
-    """Width and height of the picture, pixels."""
-    scale: Scale
-    """Scale of lengths."""
-    setup: Setup = field(repr=False)
-    """The setup that it was measured with."""
-    video: str
-    """Name of the video."""
-    flags: tuple[Flag, ...] = ()
-    """What to know about it."""
-    words: str = ""
-    """Metadata of the video's file, such as that it is synthetic."""
+    picture: Samples = field(repr=False)  #: For drawing: pixel (u, v) of the body's mid-length and of its nose, (n, 4).
+    size: tuple[int, int]  #: Width and height of the picture, pixels.
+    scale: Scale  #: Scale of lengths.
+    setup: Setup = field(repr=False)  #: The setup that it was measured with.
+    video: str  #: Name of the video.
+    flags: tuple[Flag, ...] = ()  #: What to know about it.
+    words: str = ""  #: Metadata of the video's file, such as that it is synthetic.
     drift: float = 0.0
     """Standard uncertainty of the velocity by a camera that drifted along the channel, and by glare, m/s."""
     body_angle_drift: float = 0.0

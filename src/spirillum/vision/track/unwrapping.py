@@ -26,18 +26,9 @@ _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": (
 def unwrapped(
     time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body", *, readable: float = 1.0
 ) -> tuple[Samples, tuple[Flag, ...]]:
-    """Continuous angles, NaN where unknown or outliers, and flags.
-
-    Each angle gets the whole periods that bring it nearest to its prediction by an alpha-beta filter, also after gaps.
-
-    Args:
-        time: time of each frame, s, (n,).
-        angle: angle modulo `period`, rad, (n,); NaN where unreadable.
-        error: standard error of each angle, rad, (n,).
-        period: period of the angle, rad.
-        part: `body` or `tail`, for the flags.
-        readable: share of a turn in which something of the pattern faces the camera.
-    """
+    """Continuous angles, NaN where unknown or outliers, and flags."""
+    # Each angle gets the whole periods that bring it nearest to its prediction by an alpha-beta filter, also after
+    # gaps.
     out = np.full(angle.shape, np.nan)
     known = np.flatnonzero(np.isfinite(angle) & np.isfinite(time))
     if known.size < 4:
@@ -277,11 +268,9 @@ def no_stripe_passes(motion: RobotMotion, robot: Robot, *, readable: float = 1.0
 
 
 def contradictions(motion: RobotMotion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:
-    """Flag rates that no torque-free swimmer has: signs of aliasing, or of a wrong robot file.
-
-    Without an external torque the body counter-rotates. The tail propels in the sense of its rotation and handedness,
-    and its advance per turn does not exceed that of a tail without body.
-    """
+    """Flag rates that no torque-free swimmer has: signs of aliasing, or of a wrong robot file."""
+    # Without an external torque the body counter-rotates. The tail propels in the sense of its rotation and handedness,
+    # and its advance per turn does not exceed that of a tail without body.
     time, x, body_angle, tail_phase = motion
     if robot.drive is not None and robot.drive.joint == "fixed":
         return ()  # body and tail are one rigid body
@@ -331,11 +320,9 @@ def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, .
 
 
 def _largest_advance(robot: Robot) -> float:
-    """Advance of a tail without body per turn, m, by resistive force theory (Gray and Hancock 1955): an upper bound.
-
-    A force-free helix of angle b, tan b = k B_o, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its
-    wavelength, with g = c_t/c_n no less than 1/2.
-    """
+    """Advance of a tail without body per turn, m, by resistive force theory (Gray and Hancock 1955): an upper bound."""
+    # A force-free helix of angle b, tan b = k B_o, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its wavelength,
+    # with g = c_t/c_n no less than 1/2.
     tail = robot.tail
     steepness = (2 * np.pi * tail.amplitude / tail.wavelength) ** 2
     return float(tail.wavelength * 0.5 * steepness / (0.5 + steepness))

@@ -17,8 +17,7 @@ from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import PoseCandidate, Shape, close_places
 
 _THREADS = 2
-EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
-"""All rates of a track."""
+EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")  #: All rates of a track.
 
 
 def rivals_in(

@@ -23,26 +23,17 @@ from spirillum.vision.flag import Flag
 class WidthConstants:
     """Uneven stripes."""
 
-    reach: float = radians(14.0)
-    """Largest shift of an edge that is tried, rad: a third of a stripe of eight."""
-    step: float = radians(0.5)
-    """Steps between the shifts that are tried, rad."""
+    reach: float = radians(14.0)  #: Largest shift of an edge that is tried, rad: a third of a stripe of eight.
+    step: float = radians(0.5)  #: Steps between the shifts that are tried, rad.
     steepest: float = radians(52.0)
     """Largest angle from the direction towards the camera at which an edge is located, rad."""
-    around: float = 0.42
-    """Half width over that of a stripe of the surroundings through which an edge is located."""
-    contrast: float = 40.0
-    """Least difference of the colours on either side, of 255."""
-    fewest: int = 8
-    """Fewest samples along the angle."""
-    frames: int = 20
-    """Fewest frames with two edges in view."""
-    rounds: int = 4
-    """Rounds in which stray edges are left out."""
-    stray: float = 4.0
-    """Residual over the usual one from which on an edge of a frame is left out."""
-    seen: int = 10
-    """Fewest frames of an edge."""
+    around: float = 0.42  #: Half width over that of a stripe of the surroundings through which an edge is located.
+    contrast: float = 40.0  #: Least difference of the colours on either side, of 255.
+    fewest: int = 8  #: Fewest samples along the angle.
+    frames: int = 20  #: Fewest frames with two edges in view.
+    rounds: int = 4  #: Rounds in which stray edges are left out.
+    stray: float = 4.0  #: Residual over the usual one from which on an edge of a frame is left out.
+    seen: int = 10  #: Fewest frames of an edge.
     linked: int = 4
     """Fewest frames on which two edges are seen together from which on they determine the distance of these."""
     uneven: float = radians(2.0)
@@ -51,8 +42,7 @@ class WidthConstants:
     """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
 
     On six degraded videos even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
-    left: float = 0.05
-    """Share of that range that is left as an error of each angle. Assumed."""
+    left: float = 0.05  #: Share of that range that is left as an error of each angle. Assumed.
     widest: float = 0.24
     """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
     painted: float = 0.2 / sqrt(3.0)
@@ -75,28 +65,16 @@ _TRIED = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
 class Evened(NamedTuple):
     """Angles of a body without what its stripes' widths do to them."""
 
-    angle: Samples
-    """Continuous, rad, (n,)."""
-    error: Samples
-    """Standard error on each frame, rad, (n,)."""
+    angle: Samples  #: Continuous, rad, (n,).
+    error: Samples  #: Standard error on each frame, rad, (n,).
     flags: tuple[Flag, ...]
-    drift: float = 0.0
-    """Standard uncertainty of the angle from end to end, where less than a turn was seen, rad."""
+    drift: float = 0.0  #: Standard uncertainty of the angle from end to end, where less than a turn was seen, rad.
 
 
 def edge_shifts(
     levels: Samples, angles: Samples, blur: Samples, shade: Samples, colours: Samples, angle: float
 ) -> Samples:
-    """Angles by which the edges in view lie beyond their even places, rad, (stripes,); NaN of others.
-
-    Args:
-        levels: colours along the angle over the frame's gains, (n, 3); NaN where nothing is seen.
-        angles: about the axis, rad, (n,).
-        blur: standard deviation of the blur at each angle, rad, (n,).
-        shade: shading factor and additive sheen at each angle, in each channel, (n, 6).
-        colours: of the stripes in their order, (stripes, 3).
-        angle: of the body, rad.
-    """
+    """Angles by which the edges in view lie beyond their even places, rad, (stripes,); NaN of others."""
     found = np.empty(len(colours))
     limits = WIDTHS.step, WIDTHS.steepest, WIDTHS.around, WIDTHS.contrast, WIDTHS.fewest
     stripe_edges(levels, angles, blur, shade, colours, angle, _TRIED, *limits, np.empty(_TRIED.size), found)
@@ -104,15 +82,7 @@ def edge_shifts(
 
 
 def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period: float) -> Evened:
-    """Angles corrected by the learnt widths; as they are where stripes are about even, or too little was seen.
-
-    Args:
-        angle: continuous angle of the body by an even pattern, rad, (n,); NaN where unknown.
-        read: the same as it was read, modulo `period`, rad, (n,).
-        error: its standard error, rad, (n,).
-        edges: result of `edge_shifts` on each frame, (n, stripes).
-        period: of the stripes, rad.
-    """
+    """Angles corrected by the learnt widths; as they are where stripes are about even, or too little was seen."""
     untouched, count = Evened(angle, error, ()), edges.shape[1]
     known = np.isfinite(angle) & (np.isfinite(edges).sum(axis=1) >= 2)
     if known.sum() < WIDTHS.frames:
@@ -156,11 +126,9 @@ def _off_even(places: Samples) -> Samples:
 
 
 def _not_of_paint(places: Samples) -> Flag | None:
-    """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side.
-
-    All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
-    deviation s sqrt((n - k)/(k (n - 1))).
-    """
+    """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side."""
+    # All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
+    # deviation s sqrt((n - k)/(k (n - 1))).
     count, off = places.size, _off_even(places)
     if not off.size:
         return None
@@ -179,12 +147,11 @@ def _not_of_paint(places: Samples) -> Flag | None:
 
 
 def _another_size(places: Samples) -> tuple[float, Flag] | None:
-    """The relative difference of the widths that are known from even ones, and a flag, if they differ all alike.
-
-    A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
-    than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
-    other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the size.
-    """
+    """The relative difference of the widths that are known from even ones, and a flag, if they differ all alike."""
+    # A body that looks smaller than it should brings all edges in view nearer to each other by the same share; in less
+    # than a turn that looks like stripes that are narrower than those out of view. Widths by hand differ among each
+    # other, too. By Bayes' rule, with equal prior odds: widths by hand against even ones, both with an error of the
+    # size.
     count, off = places.size, _off_even(places)
     if not 1 < off.size < count:
         return None
@@ -208,10 +175,8 @@ def _another_size(places: Samples) -> tuple[float, Flag] | None:
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:
-    """Shift of each edge, rad, (stripes,), and the scatter of an edge on a frame, rad.
-
-    The mean is 0 over each group of edges that frames link. The shift is NaN for edges that were seen too rarely.
-    """
+    """Shift of each edge, rad, (stripes,), and the scatter of an edge on a frame, rad."""
+    # The mean is 0 over each group of edges that frames link. The shift is NaN for edges that were seen too rarely.
     from scipy.sparse.csgraph import connected_components
 
     weight = np.isfinite(shifts).astype(float)

@@ -12,10 +12,8 @@ from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.flag import Flag
 
-ASPECTS = (0.2, 5.0)
-"""Least and largest width of a pixel over its height."""
-_SLANT = 0.02
-"""Tangent of an angle to the next quarter turn from which on it is mentioned."""
+ASPECTS = (0.2, 5.0)  #: Least and largest width of a pixel over its height.
+_SLANT = 0.02  # tangent of an angle to the next quarter turn from which on it is mentioned
 _QUARTERS = (False, False, False), (True, False, True), (False, True, True), (True, True, False)
 """Transposed, mirrored across and mirrored down, for each number of quarter turns against the clock."""
 
@@ -23,14 +21,10 @@ _QUARTERS = (False, False, False), (True, False, True), (False, True, True), (Tr
 class Display(NamedTuple):
     """How a stored picture is shown: stretched to square pixels, then transposed, then mirrored."""
 
-    aspect: float = 1.0
-    """Width of a stored pixel over its height."""
-    transposed: bool = False
-    """Whether rows and columns are exchanged."""
-    across: bool = False
-    """Whether left and right are exchanged afterwards."""
-    down: bool = False
-    """Whether top and bottom are exchanged afterwards."""
+    aspect: float = 1.0  #: Width of a stored pixel over its height.
+    transposed: bool = False  #: Whether rows and columns are exchanged.
+    across: bool = False  #: Whether left and right are exchanged afterwards.
+    down: bool = False  #: Whether top and bottom are exchanged afterwards.
 
     @property
     def is_turned(self) -> bool:
@@ -73,15 +67,12 @@ class Display(NamedTuple):
         return picture[:: -1 if self.down else 1, :: -1 if self.across else 1]
 
 
-AS_STORED = Display()
-"""Display of pictures with square pixels that stand upright."""
+AS_STORED = Display()  #: Display of pictures with square pixels that stand upright.
 
 
 def frame_display(frame: Any, aspect: float) -> tuple[Display, float]:
-    """Display of a video's frame, and the angle by which its display matrix is off a quarter turn, rad.
-
-    The matrix maps stored to shown coordinates: x' = a x + c y, y' = b x + d y, y downwards.
-    """
+    """Display of a video's frame, and the angle by which its display matrix is off a quarter turn, rad."""
+    # The matrix maps stored to shown coordinates: x' = a x + c y, y' = b x + d y, y downwards.
     try:
         matrix = next((data for data in frame.side_data if data.type.name == "DISPLAYMATRIX"), None)
     except ValueError:  # side data of a kind that PyAV does not know hide all others

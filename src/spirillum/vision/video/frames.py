@@ -73,32 +73,25 @@ def ahead(items: Iterator[T], count: int) -> Iterator[T]:
         thread.join()
 
 
-FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
-"""Endings of videos."""
+FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")  #: Endings of videos.
 
 _PURPOSE = "measuring a video"
 _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
 """Most and fewest frames that wait between two threads, and the bytes that they may take between."""
-_SAME_RATE = 0.01
-"""Relative difference from which on two rates are not the same."""
-_BATCH = 16
-"""Most pages of a TIFF file that are decoded at a time."""
+_SAME_RATE = 0.01  # relative difference from which on two rates are not the same
+_BATCH = 16  # most pages of a TIFF file that are decoded at a time
 _FEW, _MISSING = 2, 0.02
 """Number and share of frames, and share of the length, that a video may lack of what its file states."""
-_NEAR = 10.0
-"""Seconds that are rather decoded through than jumped over."""
+_NEAR = 10.0  # seconds that are rather decoded through than jumped over
 
 
 @dataclass(frozen=True)
 class Frame:
     """One picture."""
 
-    index: int
-    """Its number among those of the video, from 0."""
-    time: float
-    """When it was taken, s."""
-    image: np.ndarray = field(repr=False)
-    """8-bit RGB, (height, width, 3)."""
+    index: int  #: Its number among those of the video, from 0.
+    time: float  #: When it was taken, s.
+    image: np.ndarray = field(repr=False)  #: 8-bit RGB, (height, width, 3).
     _reduced: dict[int, np.ndarray] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def reduced(self, factor: int) -> np.ndarray:
@@ -116,26 +109,17 @@ class Frame:
 class Video:
     """A video that can be read any number of times."""
 
-    path: Path
-    """The video, or the folder."""
-    size: tuple[int, int]
-    """Width and height as shown, pixels."""
-    duration: float | None
-    """Length as the file states it, s; with a given rate, that of the frames that it states."""
-    rate: float | None
-    """Frames a second as the file states them, or as the setup gives them."""
-    given_rate: float | None = None
-    """Frames a second that replace a video's own time stamps."""
-    images: ImageSequence | None = None
-    """The images of a folder or stack; None for a video."""
-    display: Display = AS_STORED
-    """How the stored pictures of a video or its images are shown."""
-    stated: Stated = UNSTATED
-    """How long the file states a video to be."""
+    path: Path  #: The video, or the folder.
+    size: tuple[int, int]  #: Width and height as shown, pixels.
+    duration: float | None  #: Length as the file states it, s; with a given rate, that of the frames that it states.
+    rate: float | None  #: Frames a second as the file states them, or as the setup gives them.
+    given_rate: float | None = None  #: Frames a second that replace a video's own time stamps.
+    images: ImageSequence | None = None  #: The images of a folder or stack; None for a video.
+    display: Display = AS_STORED  #: How the stored pictures of a video or its images are shown.
+    stated: Stated = UNSTATED  #: How long the file states a video to be.
     words: str = ""
     """Metadata of the file: title and comment of a video, texts in a folder's first image and its README."""
-    flags: list[Flag] = field(default_factory=list)
-    """What was found while reading."""
+    flags: list[Flag] = field(default_factory=list)  #: What was found while reading.
 
     @property
     def stretch(self) -> tuple[float, float]:
@@ -312,10 +296,8 @@ class Video:
 def open_video(
     path: str | Path, frames_per_second: float | None = None, pixel_aspect_ratio: float | None = None
 ) -> Video:
-    """Open a video, a TIFF file of several pages, or a folder of images in their natural order.
-
-    Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
-    """
+    """Open a video, a TIFF file of several pages, or a folder of images in their natural order."""
+    # Pictures are given as they are shown, with square pixels and upright, by what the file states, and a flag says so.
     path = checked_path(path, VIDEO)
     try:
         if path.is_dir():
@@ -374,7 +356,6 @@ def _replaced(given: float | None, own: float) -> list[Flag]:
 
 
 def _images(path: Path, frames_per_second: float | None, aspect: float | None) -> Video:
-    """A folder of images, or a TIFF file."""
     sequence = image_folder(path, aspect) if path.is_dir() else image_stack(path, aspect)
     if frames_per_second is None:
         what = "a folder of images" if path.is_dir() else "a TIFF file"

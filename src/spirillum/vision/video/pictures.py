@@ -17,15 +17,11 @@ from spirillum.files.limits import LARGEST_PICTURE, MOST_IMAGES, MOST_PIXELS
 from spirillum.optional_dependencies import import_optional
 from spirillum.vision.video.display import Display
 
-IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-"""Endings of images."""
-STACKS = (".tif", ".tiff")
-"""Endings of files that may hold several pictures, one a page."""
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")  #: Endings of images.
+STACKS = (".tif", ".tiff")  #: Endings of files that may hold several pictures, one a page.
 _WHAT = "an image (png, jpg, tif, bmp)"
-_USUAL = 1280
-"""Longest side of pictures that are looked at as a whole as they are, pixels."""
-_OPENERS = ("PNG", "JPEG", "TIFF", "BMP")
-"""Formats as Pillow names what opens them; that of JPEG opens MPO too."""
+_USUAL = 1280  # longest side of pictures that are looked at as a whole as they are, pixels
+_OPENERS = ("PNG", "JPEG", "TIFF", "BMP")  # formats as Pillow names what opens them; that of JPEG opens MPO too
 _TOO_DEEP = {"F": "32-bit floating-point numbers", "I": "32-bit whole numbers", "F;16": "16-bit floating-point numbers"}
 """Modes of Pillow whose values have no known white."""
 _ORIENTATIONS = {
@@ -33,25 +29,19 @@ _ORIENTATIONS = {
     6: (True, True, False), 7: (True, True, True), 8: (True, False, True),
 }  # fmt: skip
 """Exif's orientations: whether an image is transposed, and then mirrored across and down."""
-_ORIENTATION = 274
-"""Exif's tag."""
-_SQUARE = 1e-3
-"""Relative difference of two densities that is rounding."""
+_ORIENTATION = 274  # exif's tag
+_SQUARE = 1e-3  # relative difference of two densities that is rounding
 
 
 class Header(NamedTuple):
     """What an image states of itself."""
 
-    size: tuple[int, int]
-    """Width and height as stored, pixels."""
-    display: Display
-    """Its orientation."""
+    size: tuple[int, int]  #: Width and height as stored, pixels.
+    display: Display  #: Its orientation.
     densities: tuple[float, float, bool]
     """Pixels per length across and down, as stored; and whether they are stated without a unit."""
-    pages: int
-    """Number of pictures in the file."""
-    is_tiff: bool
-    """Whether it is a TIFF file."""
+    pages: int  #: Number of pictures in the file.
+    is_tiff: bool  #: Whether it is a TIFF file.
 
     def aspect(self, path: Path, given: float | None) -> float | None:
         """Width of a pixel over its height by the densities; None where they state nothing."""

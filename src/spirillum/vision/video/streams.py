@@ -32,10 +32,8 @@ _OPENING = {
     "max_streams": "100",
 }
 """A video is one file: no playlist that opens other files, or asks a network for them."""
-_FEW = 2
-"""Frames of a stream that is a picture, not a video."""
-_NEAR = 0.02
-"""Least part of a video that is flagged as missing."""
+_FEW = 2  # frames of a stream that is a picture, not a video
+_NEAR = 0.02  # least part of a video that is flagged as missing
 _LOOSE = 0.5
 """Least part of a video that is flagged as missing where its length is that of the whole file, with sound, s."""
 
@@ -43,16 +41,12 @@ _LOOSE = 0.5
 class Stated(NamedTuple):
     """Length of a video as its file states it."""
 
-    duration: float | None
-    """Length in time, s."""
-    frames: int
-    """Number of frames; 0 where it is not stated."""
-    tolerance: float
-    """By how much a video that is read to its end may fall short of that length, s."""
+    duration: float | None  #: Length in time, s.
+    frames: int  #: Number of frames; 0 where it is not stated.
+    tolerance: float  #: By how much a video that is read to its end may fall short of that length, s.
 
 
-UNSTATED = Stated(None, 0, _LOOSE)
-"""Length of a video whose file states none."""
+UNSTATED = Stated(None, 0, _LOOSE)  #: Length of a video whose file states none.
 
 
 def open_container(path: Path) -> Any:
@@ -65,10 +59,8 @@ def open_container(path: Path) -> Any:
 
 
 def film_stream(container: Any) -> tuple[Any, list[Flag]]:
-    """The longest stream of pictures that is no thumbnail, and a flag where several are videos.
-
-    Of streams that are about as long, the largest pictures are taken, else the first.
-    """
+    """The longest stream of pictures that is no thumbnail, and a flag where several are videos."""
+    # Of streams that are about as long, the largest pictures are taken, else the first.
     av = import_optional("av", "measuring a video", "video")
     attached = av.stream.Disposition.attached_pic
     streams = list(container.streams.video)
@@ -94,11 +86,9 @@ def _area(stream: Any) -> int:
 
 
 def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
-    """A function that gives the time of each decoded frame in turn, s; None where nothing states it.
-
-    AVI numbers the frames as they are stored. Where codecs store them in another order than they are shown (B frames),
-    these numbers rise with the decoder's time stamps alone.
-    """
+    """A function that gives the time of each decoded frame in turn, s; None where nothing states it."""
+    # AVI numbers the frames as they are stored. Where codecs store them in another order than they are shown (B
+    # frames), these numbers rise with the decoder's time stamps alone.
     if container.format.name != "avi":
         return lambda frame: frame.time
     step, last = 1.0 / float(stream.average_rate or 30.0), math.nan
@@ -115,10 +105,8 @@ def frame_clock(container: Any, stream: Any) -> Callable[[Any], float | None]:
 
 
 def stated_length(container: Any, stream: Any) -> Stated:
-    """How long a video is by what its file states of it.
-
-    AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
-    """
+    """How long a video is by what its file states of it."""
+    # AVI states frames; its length in time is FFmpeg's guess where the file is cut off.
     av = import_optional("av", "measuring a video", "video")
     rate = float(stream.average_rate or 0.0)
     tight = 3.0 / rate if rate else _LOOSE
@@ -191,20 +179,13 @@ _SAMPLED_IMAGES = 10
 class ImageSequence:
     """Images that are read one by one."""
 
-    files: tuple[Path, ...]
-    """The files of the images, or the one whose pages they are."""
-    pages: int
-    """Number of pages; 0 where each image is a file."""
-    numbers: tuple[int, ...] = field(repr=False)
-    """Numbers of the images from 0, counted as they were recorded."""
-    display: Display
-    """How the images are shown."""
-    header: Header = field(repr=False)
-    """What the first image states."""
-    bits: int
-    """Number of bits that their values fill."""
-    flags: tuple[Flag, ...] = ()
-    """What was done to them."""
+    files: tuple[Path, ...]  #: The files of the images, or the one whose pages they are.
+    pages: int  #: Number of pages; 0 where each image is a file.
+    numbers: tuple[int, ...] = field(repr=False)  #: Numbers of the images from 0, counted as they were recorded.
+    display: Display  #: How the images are shown.
+    header: Header = field(repr=False)  #: What the first image states.
+    bits: int  #: Number of bits that their values fill.
+    flags: tuple[Flag, ...] = ()  #: What was done to them.
 
     def __len__(self) -> int:
         """Number of images."""
@@ -236,11 +217,9 @@ class ImageSequence:
 
 
 def image_folder(path: Path, aspect: float | None) -> ImageSequence:
-    """The images of a folder in their natural order.
-
-    Numbers at the end of the names count the images as they were recorded, if they rise in steps of which the smallest
-    is 1: a number that is missing is an image that was dropped.
-    """
+    """The images of a folder in their natural order."""
+    # Numbers at the end of the names count the images as they were recorded, if they rise in steps of which the
+    # smallest is 1: a number that is missing is an image that was dropped.
     found = (entry for entry in path.iterdir() if entry.suffix.lower() in IMAGES and entry.is_file())
     files = [entry for entry in found if not entry.name.startswith(".")]
     if len(files) > MOST_IMAGES:
