@@ -105,17 +105,17 @@ YAW = Stage(
     up=(0.0, 0.5, 0.85, 1.0),
     down=(0.0, 0.4, 0.85, 1.0),
     upper=(0.45, 0.75, 1.0),
-    phases=((0.0, 7), (0.7, 5), (3.0, 3)),
+    phases=((0.0, 7), (0.5, 5), (3.0, 3)),
     resolutions=_COARSE,
-    seconds=(3.3, 8.0),
+    seconds=(2.7, 7.0),
     held_out=3,
     checks=_COARSE | _TIGHT_CHECKS | {("near", "yawed"): _FINER},
     hardest=((0.08, -0.7), (0.92, 0.97), (0.15, 0.97), (0.98, 0.3)),
     hardest_yawed=((0.01, -0.65, 0.4), (0.98, 0.05, 0.97), (0.13, 0.89, -0.97)),
-    growth=3.0,
+    growth=2.6,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(2.0, 4.5), held_out=4, yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", seconds=(1.4, 3.5), held_out=4, yawed=False, film_yaws=1)
 FINE = Stage(
     "fine",
     up=(0.0, 0.33, 0.66, 0.88, 1.0),
