@@ -409,7 +409,7 @@ function kept(name) {
 
 function warnings(list) {
   if (!list.length) return [];
-  return [element("details", { open: list.length < 3 }, element("summary", { text: `To be careful about (${list.length})` }), ...list.map((text) => element("p", { text: `${capital(text)}.` })))];
+  return [element("details", { open: list.length < 3 }, element("summary", { text: `Cautions (${list.length})` }), ...list.map((text) => element("p", { text: `${capital(text)}.` })))];
 }
 
 function table(rows) {
