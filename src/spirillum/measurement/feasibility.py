@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from spirillum.display import DisplayMixin
 from spirillum.envelope import envelope, quantity
@@ -21,9 +21,7 @@ from spirillum.vision.camera.camera import opened, scale_of
 from spirillum.vision.setup import Setup, load_setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.constants import UNWRAPPING
-
-if TYPE_CHECKING:
-    from spirillum.vision.video.frames import Video
+from spirillum.vision.video.frames import Video
 
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640

@@ -22,9 +22,9 @@ from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot, robot_text
 
 if TYPE_CHECKING:
-    from spirillum.dynamics.plant import Plant, Snapshot
-if TYPE_CHECKING:
     import xarray as xr
+
+    from spirillum.dynamics.plant import Plant, Snapshot
 
 
 _RESOLUTION = 96  # points along the plane

@@ -21,7 +21,6 @@ from spirillum.units import display_unit, shown_in
 
 if TYPE_CHECKING:
     from spirillum.dynamics.plant import Snapshot
-if TYPE_CHECKING:
     from spirillum.swimming.prediction import Prediction
     from spirillum.swimming.released_motion import ReleasedMotion
 

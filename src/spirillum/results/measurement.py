@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -37,10 +37,6 @@ from spirillum.vision.camera.camera import opened
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
-
-if TYPE_CHECKING:
-    from spirillum.measurement.measure import Measurement
-    from spirillum.measurement.trials import Trial
 
 
 def write_measurement_report(

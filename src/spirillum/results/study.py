@@ -9,9 +9,10 @@ import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
@@ -36,9 +37,6 @@ from spirillum.view.figures.release import release_picture
 from spirillum.view.figures.robot import robot_figure, robot_words
 from spirillum.view.figures.sheet import Picture
 from spirillum.worker_pool import pool_of_workers
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:

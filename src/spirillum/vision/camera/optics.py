@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.pictures import pixels_of_points, points_of_pixels
 from spirillum.vision.setup import Setup
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 DIRECTIONS = {"right": 0.0, "left": -np.pi, "up": 0.5 * np.pi, "down": -0.5 * np.pi}
 """Angle by which each direction in the picture lies against the clock from the right, rad."""
