@@ -96,7 +96,7 @@ class Kind:
 
 
 _ROWS = csv.reader(Path(__file__).with_name("kinds.csv").read_text(encoding="utf-8").splitlines()[1:])
-KINDS: dict[str, Kind] = {kind: Kind(*words, also or None) for kind, *words, also in _ROWS}
+KINDS: dict[str, Kind] = {row[0]: Kind(row[1], row[2], row[3], row[4], row[5], row[6] or None) for row in _ROWS}
 
 
 @lru_cache(maxsize=1)
