@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ PACKAGE = SOURCES.parent / "src/spirillum/kernels"
 SUFFIXES = {"win": ".dll", "mac": ".dylib"}
 """Of libraries, by the first letters of a wheel's tag; else .so."""
 FLAGS = (
-    *("-std=c11", "-O3", "-shared", "-fPIC", "-fvisibility=hidden"),
+    *("-std=c11", "-O2", "-fPIC", "-fvisibility=hidden"),
     # The same numbers on every processor: no fused products, no sums in another order; `errno` and traps are not read.
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     "-fopenmp-simd",  # heeds `omp simd`, which needs no library
@@ -60,7 +61,13 @@ def compiler() -> Compiler:
     own = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     if stated := os.environ.get("SPIRILLUM_CC"):
         return Compiler(stated.split(), own)
-    return Compiler([found] if (found := shutil.which("cc")) else ZIG, own)
+    return Compiler([found] if (found := shutil.which("cc")) and _finds_headers(found) else ZIG, own)
+
+
+def _finds_headers(command: str) -> bool:
+    """Whether a compiler works: machines may have its name alone, or no headers of the C library."""
+    line = [command, "-E", "-x", "c", "-include", "math.h", os.devnull]
+    return not subprocess.run(line, capture_output=True, check=False).returncode  # noqa: S603
 
 
 def needs_zig() -> bool:
@@ -83,22 +90,42 @@ def is_current() -> bool:
 
 
 def compile_all(folder: Path = PACKAGE, flags: tuple[str, ...] = (), *, wide: bool = True) -> list[Path]:
-    """Compile csrc/ into a folder, the wide variant too; return the libraries, each replaced as a whole."""
-    command, tag = compiler()
-    files = [str(path) for path in sorted(SOURCES.glob("*.c"))]
+    """Compile csrc/ into a folder; return the libraries, each replaced as a whole.
+
+    Wheels for x86-64 have a baseline and a wide variant. What is built for this machine has the wide one alone, where
+    the processor takes it: its `_core` holds nothing but that question.
+    """
+    every, tag = sorted(SOURCES.glob("*.c")), compiler().tag
+    core, wide_core = (folder / f"_core{name}{compiler().suffix}" for name in ("", "_v3"))
     machine = tag if tag in TARGETS else platform.machine().lower()
-    variants = {"": (), "_v3": WIDE} if wide and machine.endswith(("x86_64", "amd64")) else {"": ()}
-    begun = []
-    for name, more in variants.items():
-        library = folder / f"_core{name}{compiler().suffix}"
-        partial = library.with_name(f"{library.stem}.{os.getpid()}{library.suffix}")
-        names = [*FLAGS, *flags, *more, f'-DCSRC_DIGEST="{digest()}"', "-o", str(partial), *files, "-lm"]
-        begun.append((library, partial, subprocess.Popen([*command, *names])))  # noqa: S603
-    for library, partial, compiling in begun:
-        if compiling.wait():
-            raise subprocess.CalledProcessError(compiling.returncode, compiling.args)
-        partial.replace(library)
-    return [library for library, *_ in begun]
+    if not wide or not machine.endswith(("x86_64", "amd64")):
+        return [_compiled(core, every, flags)]
+    if tag not in TARGETS:
+        asked = _compiled(core, [SOURCES / "core.c"], flags)
+        if not _runs_wide(asked):
+            return [_compiled(core, every, flags)]
+        return [asked, _compiled(wide_core, every, (*flags, *WIDE))]
+    return [_compiled(core, every, flags), _compiled(wide_core, every, (*flags, *WIDE))]
+
+
+def _runs_wide(library: Path) -> bool:
+    question = f"import ctypes; raise SystemExit(not ctypes.CDLL({str(library)!r}).has_wide_vectors())"
+    return not subprocess.run([sys.executable, "-c", question], capture_output=True, check=False).returncode  # noqa: S603
+
+
+def _compiled(library: Path, files: list[Path], flags: tuple[str, ...]) -> Path:
+    """Compile files on all processors and link them."""
+    command = [*compiler().command, *FLAGS, *flags, f'-DCSRC_DIGEST="{digest()}"']
+    shares = [files[n :: os.cpu_count() or 1] for n in range(min(os.cpu_count() or 1, len(files)))]
+    with tempfile.TemporaryDirectory(dir=library.parent) as work:
+        begun = [subprocess.Popen([*command, "-c", *map(str, share)], cwd=work) for share in shares]  # noqa: S603
+        for compiling in begun:
+            if compiling.wait():
+                raise subprocess.CalledProcessError(compiling.returncode, compiling.args)
+        objects = sorted(path.name for path in Path(work).glob("*.o*"))  # .obj for Windows
+        subprocess.run([*command, "-shared", "-o", library.name, *objects, "-lm"], cwd=work, check=True)  # noqa: S603
+        (Path(work) / library.name).replace(library)
+    return library
 
 
 if __name__ == "__main__":

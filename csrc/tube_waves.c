@@ -206,12 +206,13 @@ static Points points_at(const double *points, int64_t at, int64_t n) {
 
 enum { PARTS = 12 }; /* component; even, odd; real, imaginary part */
 
-/* Waves along three axes at a few points, order by order: exp(i p theta), exp(i k x), and the axes along x, rho, theta. */
+/* Waves along three axes at a few points, order by order: exp(i p theta), and exp(i k x) times the axes along x (times
+ * i), rho and theta, real and imaginary. */
 typedef struct {
     Orders orders;
     const Points *points;
     Angle turned[LANES];
-    double real[LANES], imaginary[LANES], along[3][LANES], radial[3][LANES], around[3][LANES];
+    double along[3][2][LANES], radial[3][2][LANES], around[3][2][LANES];
 } Velocities;
 
 /* axes: at each point, by rows (x, y, z); ratios: memory, (end + 2, LANES). */
@@ -222,12 +223,15 @@ static Velocities begin_velocities(const Waves *waves, const Points *points, dou
         const Angle theta = points->theta[l], phase = angle_of(waves->k * points->x[l]);
         found.turned[l]
             = waves->first ? angle_of((double)waves->first * atan2(theta.sin, theta.cos)) : (Angle){1.0, 0.0};
-        found.real[l] = phase.cos;
-        found.imaginary[l] = phase.sin;
         for (int c = 0; c < 3; c++) {
-            found.along[c][l] = axes[c][0][l];
-            found.radial[c][l] = axes[c][1][l] * theta.cos + axes[c][2][l] * theta.sin;
-            found.around[c][l] = axes[c][2][l] * theta.cos - axes[c][1][l] * theta.sin;
+            const double radial = axes[c][1][l] * theta.cos + axes[c][2][l] * theta.sin;
+            const double around = axes[c][2][l] * theta.cos - axes[c][1][l] * theta.sin;
+            found.along[c][0][l] = -axes[c][0][l] * phase.sin;
+            found.along[c][1][l] = axes[c][0][l] * phase.cos;
+            found.radial[c][0][l] = radial * phase.cos;
+            found.radial[c][1][l] = radial * phase.sin;
+            found.around[c][0][l] = around * phase.cos;
+            found.around[c][1][l] = around * phase.sin;
         }
     }
     return found;
@@ -237,23 +241,27 @@ static Velocities begin_velocities(const Waves *waves, const Points *points, dou
  *
  * X and u_rho go as cos(p theta) or -sin(p theta), v as the other; u_x comes times i. */
 static void next_velocities(Velocities *at, double out[PARTS][3][LANES]) {
-    double u[9][LANES];
+    double u[9][LANES], like[2][LANES], other[2][LANES];
     next_extension(&at->orders, u);
+    for (int l = 0; l < LANES; l++) {
+        like[0][l] = other[1][l] = at->turned[l].cos;
+        other[0][l] = at->turned[l].sin;
+        like[1][l] = -at->turned[l].sin;
+    }
     for (int odd = 0; odd < 2; odd++) {
-        double like[LANES], other[LANES];
-        for (int l = 0; l < LANES; l++) {
-            like[l] = odd ? -at->turned[l].sin : at->turned[l].cos;
-            other[l] = odd ? at->turned[l].cos : at->turned[l].sin;
-        }
-        for (int c = 0; c < 3; c++) {
-            for (int w = 0; w < 3; w++) {
-                double *re = out[4 * c + 2 * odd][w], *im = out[4 * c + 2 * odd + 1][w];
-                EACH_LANE {
-                    const double along = at->along[c][l] * u[w][l] * like[l];
-                    const double across
-                        = at->radial[c][l] * u[3 + w][l] * like[l] - at->around[c][l] * u[6 + w][l] * other[l];
-                    re[l] = across * at->real[l] - along * at->imaginary[l];
-                    im[l] = across * at->imaginary[l] + along * at->real[l];
+        for (int w = 0; w < 3; w++) {
+            double x[LANES], rho[LANES], theta[LANES];
+            EACH_LANE {
+                x[l] = u[w][l] * like[odd][l];
+                rho[l] = u[3 + w][l] * like[odd][l];
+                theta[l] = u[6 + w][l] * other[odd][l];
+            }
+            for (int c = 0; c < 3; c++) {
+                for (int part = 0; part < 2; part++) {
+                    const double *along = at->along[c][part], *radial = at->radial[c][part];
+                    const double *around = at->around[c][part];
+                    double *here = out[4 * c + 2 * odd + part][w];
+                    EACH_LANE here[l] = radial[l] * rho[l] - around[l] * theta[l] + along[l] * x[l];
                 }
             }
         }
@@ -309,75 +317,95 @@ EXPORT void circle_waves(double k, double radius, double reference, double offse
     }
 }
 
-/* Velocities (x, y, z) of waves at points.
- *
- * out: point; component; real, imaginary part; even, odd; order from the first one; wall component. */
-EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
-                        int64_t orders) {
-    const int64_t size = 3 * orders;
+/* To one of both arrays, the other one is NULL. */
+static void fill_points(double k, double radius, const double *places, int64_t first, double *out, float *single,
+                        int64_t n, int64_t orders) {
     WallFlows flows[first + orders];
     const Waves waves = {k, k * radius, first, first + orders, flows};
     double ratios[waves.end + 2][LANES], axes[3][3][LANES] = {{{0.0}}}, found[PARTS][3][LANES];
     for (int c = 0; c < 3; c++) EACH_LANE axes[c][c][l] = 1.0;
     fill_wall_flows(waves.wall, waves.end, flows);
-    for (int64_t at = 0; at < n; at += LANES, out += LANES * PARTS * size) {
+    for (int64_t at = 0; at < n; at += LANES) {
         const Points points = points_at(places, at, n);
         Velocities velocities = begin_velocities(&waves, &points, axes, ratios);
         for (int64_t p = 0; p < orders; p++) {
             next_velocities(&velocities, found);
-            for (int l = 0; l < points.some; l++)
-                for (int c = 0; c < 3; c++)
-                    for (int part = 0; part < 4; part++) {
-                        double *here = out + (l * PARTS + 4 * c + part) * size + 3 * p;
-                        for (int w = 0; w < 3; w++) here[w] = found[4 * c + 2 * (part % 2) + part / 2][w][l];
-                    }
+            for (int part = 0; part < PARTS; part++)
+                for (int w = 0; w < 3; w++) {
+                    const int64_t row = 3 * (4 * p + part % 4) + w, place = 3 * (row * n + at) + part / 4;
+                    for (int l = 0; out && l < points.some; l++) out[place + 3 * l] = found[part][w][l];
+                    for (int l = 0; single && l < points.some; l++) single[place + 3 * l] = (float)found[part][w][l];
+                }
         }
     }
 }
 
+/* Velocities (x, y, z) of waves at points.
+ *
+ * out: order from the first one; even, odd; real, imaginary part; wall component; point; component. */
+EXPORT void point_waves(double k, double radius, const double *places, int64_t first, double *out, int64_t n,
+                        int64_t orders) {
+    fill_points(k, radius, places, first, out, NULL, n, orders);
+}
+
+/* The same in single precision. */
+EXPORT void single_point_waves(double k, double radius, const double *places, int64_t first, float *out, int64_t n,
+                               int64_t orders) {
+    fill_points(k, radius, places, first, NULL, out, n, orders);
+}
+
 /* To one of both arrays, the other one is NULL. */
 static void fill_rings(double k, double radius, const double *places, const double *around, const double *rotation,
-                       int64_t first, double *out, float *single, int64_t angles, int64_t n, int64_t orders) {
-    const int64_t size = 3 * orders;
+                       int64_t first, double *out, float *single, int64_t n, int64_t angles, int64_t orders) {
+    const int64_t count = n * angles, ring = 6 * orders * angles;
     WallFlows flows[first + orders];
     const Waves waves = {k, k * radius, first, first + orders, flows};
     double ratios[waves.end + 2][LANES], axes[3][3][LANES], found[PARTS][3][LANES];
     fill_wall_flows(waves.wall, waves.end, flows);
-    for (int64_t at = 0; at < angles * n; at += LANES) {
-        const Points points = points_at(places, at, angles * n);
+    for (int64_t at = 0; at < count; at += LANES) {
+        const Points points = points_at(places, at, count);
+        const bool alike = at / angles == (at + LANES - 1) / angles && points.some == LANES; /* all on one ring */
+        int64_t begin[LANES];
         for (int l = 0; l < LANES; l++) {
-            fill_axes(rotation, angle_of(around[(at + (l < points.some ? l : 0)) / n]), l, axes);
+            const int64_t point = at + (l < points.some ? l : 0);
+            fill_axes(rotation, angle_of(around[point % angles]), l, axes);
+            begin[l] = point / angles * ring + point % angles;
         }
         Velocities velocities = begin_velocities(&waves, &points, axes, ratios);
         for (int64_t p = 0; p < orders; p++) {
             next_velocities(&velocities, found);
-            for (int l = 0; l < points.some; l++)
-                for (int part = 0; part < PARTS; part++) {
-                    const int64_t place = ((part / 2 * angles * n + at + l) * 2 + part % 2) * size + 3 * p;
-                    for (int w = 0; w < 3; w++) {
-                        if (out) out[place + w] = found[part][w][l];
-                        if (single) single[place + w] = (float)found[part][w][l];
-                    }
+            for (int part = 0; part < PARTS; part++) {
+                const int64_t family = (part / 2 % 2 * 3 + part / 4) * n * ring; /* even, odd; component */
+                for (int w = 0; w < 3; w++) {
+                    const int64_t row = family + (6 * p + 3 * (part % 2) + w) * angles;
+                    const double *from = found[part][w];
+                    if (alike && single)
+                        EACH_LANE single[row + begin[0] + l] = (float)from[l];
+                    else if (single)
+                        for (int l = 0; l < points.some; l++) single[row + begin[l]] = (float)from[l];
+                    else
+                        for (int l = 0; l < points.some; l++) out[row + begin[l]] = from[l];
                 }
+            }
         }
     }
 }
 
 /* Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
  *
- * places: on the rings, about the tube's axis, (angles, n, 3); theta: angles about the rings' axis; rotation: from the
+ * places: on the rings, about the tube's axis, (n, angles, 3); theta: angles about the rings' axis; rotation: from the
  * rings' axes to the tube's.
- * out: component; even, odd; angle; ring; real, imaginary part; order from the first one; wall component. */
+ * out: even, odd; component; ring; order from the first one; real, imaginary part; wall component; angle. */
 EXPORT void ring_waves(double k, double radius, const double *places, const double *theta, const double *rotation,
-                       int64_t first, double *out, int64_t angles, int64_t n, int64_t orders) {
-    fill_rings(k, radius, places, theta, rotation, first, out, NULL, angles, n, orders);
+                       int64_t first, double *out, int64_t n, int64_t angles, int64_t orders) {
+    fill_rings(k, radius, places, theta, rotation, first, out, NULL, n, angles, orders);
 }
 
 /* The same in single precision. */
 EXPORT void single_ring_waves(double k, double radius, const double *places, const double *theta,
-                              const double *rotation, int64_t first, float *out, int64_t angles, int64_t n,
+                              const double *rotation, int64_t first, float *out, int64_t n, int64_t angles,
                               int64_t orders) {
-    fill_rings(k, radius, places, theta, rotation, first, NULL, out, angles, n, orders);
+    fill_rings(k, radius, places, theta, rotation, first, NULL, out, n, angles, orders);
 }
 
 /* Subtract a block from rows and columns of a square matrix, times a number for each column of the matrix.

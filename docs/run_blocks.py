@@ -29,7 +29,7 @@ ROOT = Path(__file__).parent.parent
 WIDTH = "80"
 _FENCE = re.compile(r"^(<!-- (?:slow|run) -->\n)?```(console|pycon|python|toml|text)\n(.*?)^```$", re.M | re.S)
 _FILE = re.compile(r"# ([\w-]+\.(?:toml|csv))\b")
-_PROGRESS = re.compile(r".*: \d+(?: of \d+)?, .* elapsed(?:, about .* left)?")
+_PROGRESS = re.compile(r".*, [\d.]+ .* elapsed(?:, about .* left)?")
 """A line of progress, which a slow machine prints and a fast one does not."""
 
 

@@ -1,4 +1,4 @@
-"""Builds the wheels of all platforms on one machine, by the compiler of the wheel `ziglang` (pip install ziglang).
+"""Builds the wheels of all platforms on one machine, by the compiler of the wheel `ziglang`.
 
 python tools/build_wheels.py [FOLDER]
 """
@@ -10,6 +10,7 @@ import runpy
 import subprocess
 import sys
 import tempfile
+import venv
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -17,13 +18,18 @@ ROOT = Path(__file__).parents[1]
 
 def main(folder: str = "dist") -> None:
     """Build one wheel a platform, each from a copy of the sources without what another one left behind."""
-    for tag in runpy.run_path(str(ROOT / "csrc" / "build.py"))["TARGETS"]:
-        with tempfile.TemporaryDirectory() as copy:
+    with tempfile.TemporaryDirectory() as work:
+        venv.create(f"{work}/tools", with_pip=True)
+        pip = [f"{work}/tools/{'Scripts' if os.name == 'nt' else 'bin'}/python", "-m", "pip"]
+        subprocess.run([*pip, "install", "--quiet", "--no-compile", "hatchling", "ziglang"], check=True)
+        for tag in runpy.run_path(str(ROOT / "csrc" / "build.py"))["TARGETS"]:
+            copy = Path(work, tag)
+            copy.mkdir()
             files = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
             subprocess.run(["tar", "-x", "-C", copy], input=files, check=True)
-            command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, copy]
+            command = [*pip, "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, copy]
             subprocess.run(command, check=True, env=os.environ | {"SPIRILLUM_WHEEL": tag})
-        print(next(path for path in Path(folder).glob("spirillum-*.whl") if tag in path.name))
+            print(next(path for path in Path(folder).glob("spirillum-*.whl") if tag in path.name))
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ def _lamps(scene: Scene) -> list[dict[str, Any]]:
         {"centre": (1500.0, 700.0, high), "size": (1200.0, 600.0), "radiance": 2.4, "colour": (1.0, 0.97, 0.92)},
         {"centre": (-1400.0, -900.0, high), "size": (1200.0, 600.0), "radiance": 1.7, "colour": (0.93, 0.97, 1.0)},
     ]
-    if scene.kind == "dark-room":
+    if scene.kind.startswith("dark-room"):
         found = found[:1]
     scale = (2.0 * (scene.eye - scene.oil) + _CEILING) / _focal_pixels(scene)  # mm in the mirrored ceiling a pixel
     for number in range(scene.lamps):

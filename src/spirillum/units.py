@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     import pint
 
 _QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
+    r"\s*(?P<number>[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|nan|inf|infinity))"
+    r"\s*(?P<unit>[^0-9].*)?",
+    re.I | re.S,
 )
 # Letters, products, quotients and one-digit powers: nothing that could be expensive to read.
 _UNIT = re.compile(r"(?:[^\W\d]|[ */().°]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
@@ -94,7 +96,7 @@ class Kind:
 
 
 _ROWS = csv.reader(Path(__file__).with_name("kinds.csv").read_text(encoding="utf-8").splitlines()[1:])
-KINDS: dict[str, Kind] = {kind: Kind(*words, also or None) for kind, *words, also in _ROWS}
+KINDS: dict[str, Kind] = {row[0]: Kind(row[1], row[2], row[3], row[4], row[5], row[6] or None) for row in _ROWS}
 
 
 @lru_cache(maxsize=1)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.calibration.fit_warnings import common_warnings
+from spirillum.calibration.parameters import Estimate
 from spirillum.cli import main
 from spirillum.cli.tables.fits import _friction
 
@@ -48,6 +50,15 @@ def test_answers_say_what_is_taken_as_exact(made: Callable[..., Path], tmp_path:
     stated = fitted(path, assume_uncertainty={"fluid.viscosity": "5%"}).friction_statement
     assert "hold the stated uncertainty of fluid.viscosity (5 %) and take motor.torque_constant" in stated
     assert "effective_friction_statement" not in fitted(path, free="body_drag").to_dict()
+
+
+def test_an_interval_that_reaches_below_zero_says_so(made: Callable[..., Path]) -> None:
+    found = fitted(made(**FOUR, seed=31, friction=TRUTH))
+    sure, unsure = Estimate(TRUTH, 0.9 * TRUTH, 1.1 * TRUTH), Estimate(TRUTH, -TRUTH, 3.0 * TRUTH)
+    assert "friction-negative" not in [note.code for note in common_warnings(found.problem, [sure] * 4)]
+    (said,) = [n for n in common_warnings(found.problem, [sure, unsure] * 2) if n.code == "friction-negative"]
+    assert f"the interval of B_eff of {found.experiment.labels()[1]}, ... reaches below zero" in said
+    assert "effective rotary friction B_eff, eq. (18), of 4 tails" in next(map(str, _friction(found.to_dict())))
 
 
 def test_stated_uncertainties_widen_the_intervals_by_their_share(made: Callable[..., Path]) -> None:

@@ -9,7 +9,12 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli.renderer import progress_bar
+from spirillum.fluid.tube.outer_resistance import NodeSolution, _mixed
 from spirillum.fluid.tube.progress_messages import progress_message
+from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.tube_pose import TubePose
 from spirillum.swimming.preparation import Prepared, preparations_answer
 
 
@@ -79,11 +84,14 @@ def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
 
 
 @pytest.mark.parametrize("quiet", [True, False])
-def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[str], quiet: bool) -> None:
+def test_table_that_nobody_asked_for_is_announced(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, quiet: bool
+) -> None:
     """A line on standard error, also where no progress bar is shown."""
+    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0), raising=False)
     with progress_bar(quiet=quiet) as progress:
         progress(progress_message(60, 2, 0, (10.0, 17.0)), 0, 60)
-        progress("table of the tube", 1, 60)
+        progress("poses of the table", 1, 60)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert " ".join(shown.err.split()).startswith(
@@ -91,7 +99,26 @@ def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[
     )
 
 
-def test_what_an_interrupted_preparation_has_kept_is_announced() -> None:
-    """The time is that of the rest."""
+def test_what_an_interrupted_preparation_has_kept_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time is that of the rest, and longer beside other work."""
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0), raising=False)
     said = progress_message(60, 2, 48, (10.0, 17.0))
-    assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min" in said
+    assert "from 60 poses, 48 of them saved before, 12 remaining, in 60 s to 2 min with 2 processes" in said
+    monkeypatch.setattr("os.getloadavg", lambda: (4.0, 0.0, 0.0), raising=False)
+    busy = progress_message(60, 2, 48, (10.0, 17.0))
+    assert busy.endswith("in 60 s to 5 min with 2 processes beside the other work of this machine")
+
+
+def test_the_time_left_does_not_jump_between_cheap_and_expensive_poses() -> None:
+    """Forty nodes of 1 s and five of 12 s: at any time the mean pace gives the rest within 12 s and a sixth."""
+    pose, geometry = TubePose(0.02, 0.01), RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
+    tail = ((geometry, (0.0,)),)
+    cost = {Fineness("standard", 0.03, 4): 1.0, Fineness("standard", 0.002, 6): 12.0}
+    fine, coarse = sorted(cost, key=lambda one: -cost[one])
+    nodes = [NodeSolution(tail, pose, fine)] * 5 + [NodeSolution(tail, pose, coarse)] * 40
+    seconds = [cost[node.fineness] for _, node in _mixed(list(enumerate(nodes)))]
+    assert sorted(number for number, _ in _mixed(list(enumerate(nodes)))) == list(range(45))
+    for done in range(10, 45):
+        expected, true = sum(seconds[:done]) / done * (45 - done), sum(seconds[done:])
+        assert abs(expected - true) < 12.0 + true / 6.0

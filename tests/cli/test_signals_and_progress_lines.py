@@ -72,7 +72,7 @@ def test_signal_ends_a_command_with_its_code(tmp_path: Path, name: str, group: b
         assert not before
     else:
         assert [
-            line for line in before if not line.startswith(("no table of this tube yet", "table of the tube: "))
+            line for line in before if not line.startswith(("no table of this tube yet", "poses of the table: "))
         ] == []
         places = re.search(r"from (\d+) poses", before[0])
         assert places is not None
@@ -114,6 +114,15 @@ def test_lines_come_at_a_rate_that_can_be_read() -> None:
     assert any(re.search(r"elapsed, about \d min \d\d s left$", line) for line in lines)
     assert 25 < len(lines) < 60  # a line every 15 s, later every twentieth of the time
     assert clock.now == 1200.0
+
+
+def test_piped_work_is_named_after_some_seconds() -> None:
+    clock, lines = _Clock(), list[str]()
+    progress = ProgressLines(lines.append, ("no table",), clock)
+    for _ in range(25):
+        clock.now += 1.0
+        progress.look()
+    assert lines == ["at work, 5 s elapsed", "at work, 20 s elapsed"]
 
 
 def test_short_work_prints_no_line(capsys: pytest.CaptureFixture[str]) -> None:

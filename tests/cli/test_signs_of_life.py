@@ -1,10 +1,14 @@
 """Who waits at a terminal is told what for; pipes and machines get the answer alone."""
 
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from spirillum.cli import renderer
+from spirillum.errors import InputError
 from spirillum.fluid.tube.progress_messages import LEVEL
 
 
@@ -20,6 +24,16 @@ def test_work_is_named_at_a_terminal_only(
     shown = capsys.readouterr()
     assert ("looking at a film" in shown.err) == told
     assert not shown.out
+
+
+def test_piped_work_is_named_where_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for first, told in ((0.0, "looking at a film, 0 s elapsed\n"), (60.0, "")):
+        monkeypatch.setattr(renderer, "_FIRST", first)
+        with renderer.at_work("looking at a film", quiet=False):
+            time.sleep(0.1)
+        assert capsys.readouterr().err == told
 
 
 @pytest.mark.parametrize(("terminal", "told"), [(True, True), (False, False)])
@@ -46,3 +60,26 @@ def test_a_tube_without_a_table_is_named_where_its_answer_takes_a_while(
             progress(f"{LEVEL}; `spirillum prepare` makes further answers immediate", 0, 1)
         time.sleep(0.2)
     assert capsys.readouterr().err.count("no table of this tube: the flow is solved for") == told
+
+
+def test_an_answer_is_printed_though_its_picture_cannot_be_drawn(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise InputError("the disk is full")
+
+    monkeypatch.setattr("spirillum.view.figures.style.save_as", full)
+    outcome = run("predict", "ecoli", "--model", "rft", "--plot", str(tmp_path / "a.png"))
+    assert (outcome.code, "forward velocity" in outcome.out, "disk is full" in outcome.err) == (2, True, True)
+
+
+def test_endings_in_capitals_are_taken(run: Callable[..., Any], tmp_path: Path) -> None:
+    outcome = run("predict", "ecoli", "--model", "rft", "--plot", str(tmp_path / "A.PNG"))
+    assert (outcome.code, (tmp_path / "A.PNG").read_bytes()[:4]) == (0, b"\x89PNG")
+
+
+def test_a_study_without_figures_names_no_earlier_report(run: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text('title = "One"\nrobots = ["biorob2012-wide"]\nmodels = ["rft"]\n')
+    request = ("study", str(tmp_path / "study.toml"), "-o", str(tmp_path / "out"))
+    assert f"open {tmp_path / 'out'}/report.html" in run(*request).out.replace("\n  ", "")
+    assert "open" not in run(*request, "--no-figures").out

@@ -157,6 +157,10 @@ def test_the_trial_of_a_posterior_is_the_run_of_its_median(tmp_path: Path) -> No
     assert run.attrs["friction_coefficient"] == pytest.approx(0.02, rel=0.05)
     assert found.intervals is None
     assert any("the held answer has its median and no interval" in str(note) for note in found.warnings)
+    of_held = posteriors.write_trials(tmp_path / "held.nc", free, answer="held")
+    beside = sp.predict("biorob2012-wide", posterior=of_held, duration="1 s")
+    assert [note.code for note in beside.warnings].count("fit-other-motion") == 1
+    assert any("compare its observations with the column held, not with trial" in note for note in beside.warnings)
     with pytest.raises(sp.InputError, match="which was fitted to trials; allowed: motion 'free'"):
         sp.simulate("biorob2012-wide", posterior=path, motion="held")
 

@@ -136,8 +136,10 @@ def test_waves_at_points_of_the_wall() -> None:
     number = int(np.argmin(np.abs(waves.k - 0.8)))
     found = point_waves(np.array([[0.4, 1.5, 0.0]]), waves, number)
     c, s = np.cos(0.4 * waves.k[number]), np.sin(0.4 * waves.k[number])
-    wanted = np.zeros((3, 2, 2, waves.orders[number], 3))
-    wanted[0, :, 0, :, 0] = np.array([[-s], [c]])
-    wanted[1, :, 0, :, 1] = np.array([[c], [s]])
-    wanted[2, :, 1, :, 2] = np.array([[-c], [-s]])
+    wanted = np.zeros(
+        (waves.orders[number], 2, 2, 3, 3)
+    )  # order; even, odd; real, imaginary; wall component; component
+    wanted[:, 0, :, 0, 0] = -s, c
+    wanted[:, 0, :, 1, 1] = c, s
+    wanted[:, 1, :, 2, 2] = -c, -s
     np.testing.assert_allclose(found, wanted, atol=1e-12)

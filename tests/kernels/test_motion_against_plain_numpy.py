@@ -1,10 +1,5 @@
 """Rates and steps of free robots as csrc/ finds them, against the same balances assembled with NumPy and SciPy."""
 
-import ctypes
-import runpy
-from functools import partial
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -14,13 +9,12 @@ import spirillum as sp
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels import contacts, native, rigid_links, stiff_steps, tube_motion, two_links
+from spirillum.kernels import contacts, rigid_links, stiff_steps, tube_motion, two_links
 from spirillum.kernels.tube_table import resistance_at
 from spirillum.robot.batch import RobotBatch
 
 RADIUS, VISCOSITY, MU, SLOW = 0.02, 0.9, 0.2, 1e-5
 DRIVES = [(kind, fixed) for kind in (0.0, 1.0, 2.0, 3.0) for fixed in (0.0, 1.0) if (kind, fixed) != (0.0, 1.0)]
-WIDE = next(Path(native.__file__).parent.glob("_core_v3.*"), Path("none"))
 CURRENT, JOINT_AXIS, ROBOT_AXIS = rigid_links.CURRENT, np.eye(7)[6], np.eye(7)[3]
 
 
@@ -220,19 +214,3 @@ def test_steps_are_those_of_another_method() -> None:
     assert (end, memory[stiff_steps.ANSWERED], memory[stiff_steps.TIME]) == (stiff_steps.DONE, 8.0, 2.0)
     assert found == pytest.approx(expected, abs=1e-6)
     assert np.abs(expected[-1, 3:7] - case.state[3:7]).max() > 0.1
-
-
-@pytest.mark.skipif(not WIDE.exists(), reason="the library has one build on this machine")
-def test_both_builds_find_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without fused products or sums in another order, so that a run is the same on every processor."""
-    found = []
-    for path in (WIDE.with_stem("_core"), WIDE):
-        monkeypatch.setattr(native, "library", partial(ctypes.CDLL, str(path)))
-        rates = runpy.run_path(stiff_steps.__file__)["rates"]
-        for seed in range(20):
-            case, dy = Case(0.0, 0.0, 1e-3, seed), np.empty(19)
-            none = np.zeros((0, 6))
-            data = two_links.packed(case.drag, case.friction, case.weight, np.full(4, np.inf), none, case.drive)
-            rates(dy, 0.7, case.state, data, none.ravel())
-            found.append(dy)
-    np.testing.assert_array_equal(found[:20], found[20:])

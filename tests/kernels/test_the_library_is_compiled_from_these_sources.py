@@ -1,17 +1,22 @@
 """The library is that of csrc/, compiles without a warning, and its stubs check what they are given."""
 
+import ctypes
 import os
 import runpy
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from spirillum.kernels import native
+from spirillum.fluid.tube.domain import tube_radius
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels import native, rigid_links, stiff_steps, tube_table, two_links
 from spirillum.kernels.tube_table import contact_offset, film_coordinates, spline_weights
 
 BUILD = Path(__file__).parents[2] / "csrc" / "build.py"
@@ -26,10 +31,43 @@ def test_the_library_states_the_digest_of_its_sources(build: dict[str, Any]) -> 
     assert native.sources_digest() == build["digest"]()
 
 
-@pytest.mark.parametrize("level", ["-O1", pytest.param("-O3", marks=pytest.mark.slow)])
-def test_the_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: Path, level: str) -> None:
-    made = build["compile_all"](tmp_path, (*build["STRICT"], level), wide=level == "-O3")
-    assert all(path.stat().st_size > 10_000 for path in made)
+@pytest.fixture(scope="module")
+def strict(build: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The baseline for any processor, without much optimisation."""
+    return build["compile_all"](tmp_path_factory.mktemp("strict"), (*build["STRICT"], "-O1"), wide=False)[0]
+
+
+def test_the_sources_compile_without_a_warning(strict: Path) -> None:
+    assert strict.stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_optimised_sources_compile_without_a_warning(build: dict[str, Any], tmp_path: Path) -> None:
+    assert build["compile_all"](tmp_path, (*build["STRICT"], "-O3"))
+
+
+def test_every_build_finds_the_same_numbers(strict: Path, wide: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without fused products or sums in another order, so that a run is the same on every processor."""
+    packed = find_table(RobotGeometry.of(wide, 0), tube_radius(wide, 0)).packed
+    rng = np.random.default_rng(1)
+    poses = [(*rng.uniform([2e-3, -0.05, -0.03], [6e-3, 0.05, 0.03]), phase) for phase in range(10)]
+    half, other = rng.normal(size=(7, 7)), rng.uniform(size=(7, 7))
+    drive = np.append(np.zeros(rigid_links.DUTY), rng.uniform(0.5, 1.5, rigid_links.DRIVE - rigid_links.DUTY))
+    links = (half @ half.T + np.eye(7), 1e-4 * other, rng.uniform(size=rigid_links.WEIGHT), np.full(4, np.inf))
+    states = rng.normal(size=(10, rigid_links.STATES))
+    found = []
+    for path in (native.library()._name, str(strict)):
+        monkeypatch.setattr(native, "library", partial(ctypes.CDLL, path))
+        resistance_at, rates = (runpy.run_path(module.__file__) for module in (tube_table, stiff_steps))
+        numbers = []
+        for pose, state in zip(poses, states, strict=True):
+            matrix, change = np.empty((8, 8)), np.empty(rigid_links.STATES)
+            resistance_at["resistance_at"](packed, *pose, matrix)
+            data = two_links.packed(*links, np.zeros((0, 6)), drive)
+            rates["rates"](change, 0.7, state, data, np.zeros(0))
+            numbers.append(np.concatenate([matrix.ravel(), change]))
+        found.append(numbers)
+    np.testing.assert_array_equal(*found)
 
 
 @pytest.mark.slow

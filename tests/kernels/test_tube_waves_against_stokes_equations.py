@@ -14,6 +14,7 @@ from spirillum.kernels.stokes_flow import (
     point_waves,
     ring_blocks,
     ring_waves,
+    single_point_waves,
     single_ring_waves,
     subtract_block,
     wall_layers,
@@ -174,11 +175,14 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     theta, rho, x = rng.uniform(-np.pi, np.pi, 6), rng.uniform(0.05, 0.5, 6), rng.uniform(-2, 2, 6)
     y, z = rho * np.cos(theta) - 0.4, rho * np.sin(theta)
     points = np.stack([x, y, z], axis=1)
-    found = np.empty((6, 3, 2, 2, orders, 3))
-    point_waves(k, 1.0, points, 0, found)
-    some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
+    waves = np.empty((orders, 2, 2, 3, 6, 3))
+    point_waves(k, 1.0, points, 0, waves)
+    some = np.empty((orders - 2, 2, 2, 3, 6, 3))  # the orders from 2
     point_waves(k, 1.0, points, 2, some)
-    np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(some, waves[2:], rtol=1e-12, atol=1e-15)
+    single = np.empty(waves.shape, np.float32)
+    single_point_waves(k, 1.0, points, 0, single)
+    np.testing.assert_array_equal(single, waves.astype(np.float32))
     circle = np.empty((6, 2, 3, orders, 3))  # each point lies on a cylinder of its own
     for own, radius, angle in zip(circle, rho, theta, strict=True):
         circle_waves(k, 1.0, radius, 0.4, np.array([angle]), own[:, :, None])
@@ -186,8 +190,8 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     for p in range(orders):
         there, back = wave(k, p, points), wave(k, p, points, turn=-1.0)
         for parity, both in enumerate((0.5 * (there + back), 0.5j * (there - back))):  # cos(p theta), -sin(p theta)
-            np.testing.assert_allclose(found[:, :, 0, parity, p], both.real, atol=1e-13)
-            np.testing.assert_allclose(found[:, :, 1, parity, p], both.imag, atol=1e-13)
+            found = np.moveaxis(waves[p, parity], 1, -1)  # real, imaginary; point; component; wall component
+            np.testing.assert_allclose(found, [both.real, both.imag], atol=1e-13)
             turn = both * np.exp(-1j * k * x)[:, None, None]
             c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
             about = np.stack([-1j * turn[:, 0], turn[:, 1] * c + turn[:, 2] * s, turn[:, 2] * c - turn[:, 1] * s])
@@ -200,12 +204,12 @@ def test_waves_on_rings_about_a_tilted_axis() -> None:
     k, orders, first, rng = 1.3, 5, 2, np.random.default_rng(3)
     theta, rings = rng.uniform(-np.pi, np.pi, 4), 3
     rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    points = rng.uniform(-0.5, 0.5, (4, rings, 3))
-    at_points = np.empty((4 * rings, 3, 2, 2, orders - first, 3))
+    points = rng.uniform(-0.5, 0.5, (rings, 4, 3))
+    at_points = np.empty((orders - first, 2, 2, 3, 4 * rings, 3))
     point_waves(k, 1.0, points.reshape(-1, 3), first, at_points)
     out = np.array([np.zeros(4), np.cos(theta), np.sin(theta)]), np.array([np.zeros(4), -np.sin(theta), np.cos(theta)])
     axes = rotation @ np.stack([np.tile([[1.0], [0.0], [0.0]], 4), *out])  # (component, xyz, angle)
-    wanted = np.einsum("cxt,tnxrpow->cptnrow", axes, at_points.reshape(4, rings, 3, 2, 2, orders - first, 3))
+    wanted = np.einsum("cxt,oprwntx->pcnorwt", axes, at_points.reshape(orders - first, 2, 2, 3, rings, 4, 3))
     found = np.empty(wanted.shape)
     ring_waves(k, 1.0, points, theta, rotation, first, found)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-14 * np.abs(wanted).max())

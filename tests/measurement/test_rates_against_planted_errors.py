@@ -125,6 +125,28 @@ def test_outlying_frames_are_counted_and_do_not_move_the_rate() -> None:
     assert np.isnan(rate.residual[bad]).all()
 
 
+UNDER_HIGHLIGHT = """
+    0.79 0.40 0.18 -0.50 -0.05 -0.05 -0.15 0.00 0.39 1.11 -0.95 -0.74 0.18
+    0.32 0.19 0.41 1.22 1.54 -1.81 -0.77 -0.33 -0.70 -0.41 -0.14 0.50"""
+"""Error of a body's angle on a path-traced video of 25 frames, deg: it climbs and falls as stripes pass a highlight."""
+
+
+def test_errors_that_climb_and_fall_as_stripes_pass_are_no_stray_frames() -> None:
+    time, off = np.arange(25) / 6.0, np.array(UNDER_HIGHLIGHT.split(), dtype=float)
+    assert rate_of(time, -34.5 * time + off, np.full(25, 0.15)).outliers == 0
+    off[12] += 6.0  # a stripe's width is 10 times as much
+    assert outlying_frames(time, -34.5 * time + off).tolist() == [number == 12 for number in range(25)]
+
+
+def test_frames_off_by_their_own_error_are_no_strays_where_others_lie_on_a_line_by_chance() -> None:
+    time, off = np.arange(26) / 1.25, 0.03 * np.cos(2.0 * np.arange(26.0))
+    off[[5, 8, 17, 25]] = 0.76, -0.39, 0.35, -0.41
+    assert rate_of(time, 8.4 * time + off, np.full(26, 0.45)).outliers == 0
+    assert rate_of(time, 8.4 * time + off).outliers >= 3
+    off[5] = 1.5
+    assert rate_of(time, 8.4 * time + off, np.full(26, 0.45)).outliers == 1
+
+
 def test_a_changing_rate_is_seen_and_its_mean_is_from_end_to_end() -> None:
     rng = np.random.default_rng(6)
     span, covered = TIME[-1], 0

@@ -294,3 +294,12 @@ def test_values_of_the_example_are_no_concern_where_a_video_confirms_the_scale(m
     assert remarks(0.998) == []
     assert len(remarks(math.nan)) == 1  # by hand: nothing shows how large the robot looks
     assert len(remarks(1.06, Flag("size-does-not-fit", "too large"))) == 1
+
+
+def test_means_over_two_trials_say_what_their_intervals_rest_on(make_trial: Any, robot: Any) -> None:
+    def said(count: int) -> bool:
+        trials = tuple(make_trial(seed=seed) for seed in range(count))
+        found = Measurement(trials, summary_of(trials), robot, "setup.toml")
+        return any("means over two trials: one difference" in note for note in found.warnings)
+
+    assert [said(count) for count in (1, 2, 3)] == [False, True, False]

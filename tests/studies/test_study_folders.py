@@ -104,3 +104,18 @@ def test_dataset_of_another_version_is_computed_anew(small: dict[str, object], t
     (tmp_path / "b" / "dataset.nc").write_bytes(b"not NetCDF")
     assert sp.study(small, output=tmp_path / "b").identical(sp.study(small, output=tmp_path / "a"))
     assert json.loads((tmp_path / "b" / "study.json").read_text())["title"] == "Four tails"
+
+
+@pytest.mark.parametrize("name", ["ranking.csv", "claims.json", "report.html"])
+def test_a_foreign_file_in_a_folder_of_a_study_is_refused_before_the_work(
+    small: dict[str, object], tmp_path: Path, name: str
+) -> None:
+    sp.study(small, output=tmp_path, figures=False)
+    (tmp_path / "dataset.nc").unlink()
+    (tmp_path / name).write_text("rank;robot\n" if name == "ranking.csv" else "{}")
+    with pytest.raises(sp.InputError, match=f"{name} is there and of unknown origin"):
+        sp.study(small, output=tmp_path)
+    assert not (tmp_path / "dataset.nc").exists()
+    (tmp_path / name).unlink()
+    sp.study(small, output=tmp_path, figures=False)
+    sp.study(small, output=tmp_path, figures=False)

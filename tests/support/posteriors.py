@@ -35,9 +35,9 @@ def attributes() -> dict[str, Any]:
     }
 
 
-def write_trials(path: Path, free: dict[str, float]) -> Path:
+def write_trials(path: Path, free: dict[str, float], answer: str = "trial") -> Path:
     """Write a posterior of trials by `tube`, with draws a tenth about some numbers."""
-    about = attributes() | {"model": "tube", "answer": "trial", "friction": "[]", "free": json.dumps(list(free))}
+    about = attributes() | {"model": "tube", "answer": answer, "friction": "[]", "free": json.dumps(list(free))}
     parameters = [{"label": name, "parameter": name, "channel": None} for name in free]
     rng = np.random.default_rng(4)
     draws = {name: rng.lognormal(np.log(middle), 0.1, (4, 100)) for name, middle in free.items()}

@@ -101,6 +101,34 @@ def test_longer_tenth_lines_are_not_taken_for_the_ruler():
     assert fitted(picture).optics.focal == pytest.approx(370.0, rel=1e-3)
 
 
+def sheet(optics: Optics, sorts: tuple[tuple[float, float, float], ...]) -> np.ndarray:
+    """Printed paper as the camera sees it, in one colour: sorts of lines in both directions, each darker."""
+    fine = (np.arange(3) - 1.0) / 3.0
+    columns, rows = optics.size
+    u, v = ((np.arange(count)[:, None] + fine).ravel() for count in optics.size)
+    x, y, _ = optics.points(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2), 0.0).T
+    grey = np.full(x.size, 220.0)
+    for spacing, width, ink in sorts:
+        near = [np.abs(np.remainder(along / spacing + 0.5, 1.0) - 0.5) * spacing < 0.5 * width for along in (x, y)]
+        grey[near[0] | near[1]] = ink
+    return np.repeat(grey.reshape(rows, 3, columns, 3).mean(axis=(1, 3))[:, :, None], 3, axis=2)
+
+
+def test_stronger_lines_of_millimetre_paper_do_not_break_its_scale():
+    """Beside a line of every fifth or tenth millimetre the fine ones are hidden; the pieces between belong together.
+
+    The strong lines modulate the phase of the fine ones: its slope within a piece between two of them is 0.4 % off.
+    """
+    size = (480, 240)
+    true = optics_of(setup(markers__spacing="1 mm"), size, 775.0).moved({"tilt_y": 0.01})
+    picture = sheet(true, ((1e-3, 0.13e-3, 190.0), (5e-3, 0.22e-3, 150.0), (10e-3, 0.34e-3, 120.0)))
+    picture += np.random.default_rng(3).normal(0.0, 1.0, picture.shape)
+    lines = lines_in(picture, (0, 0, *size))
+    assert lines is not None
+    sight = fitted_camera(setup(markers__spacing="1 mm"), size, lines)
+    assert sight.scale.length_per_pixel == pytest.approx(true.length_per_pixel, rel=3e-4)
+
+
 def test_pictures_without_a_ruler_show_none():
     rng = np.random.default_rng(2)
     noise = np.repeat(rng.normal(150.0, 8.0, (SIZE[1], SIZE[0], 1)), 3, axis=2)

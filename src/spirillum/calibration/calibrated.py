@@ -48,7 +48,6 @@ class Calibrated(DisplayMixin):
     reading: str
     """Reading of the friction under which B_eff follows from (18)."""
     values: dict[str, Estimate]
-    """Free numbers by label."""
     friction: tuple[Estimate, ...]
     """B_eff of every robot, N m s/rad; empty where it was not requested, NaN where no motor rate was observed. Without
     an interval where the error of the model's torque is not known.
@@ -78,7 +77,6 @@ class Calibrated(DisplayMixin):
     folder: Path | None = None
     """Folder of the files that were written, if any were."""
     files: tuple[str, ...] = ()
-    """Files that were written, as seen from the folder."""
 
     @property
     def experiment(self) -> Experiment:

@@ -117,13 +117,10 @@ class Experiment:
     motor_rate: Ratio
     """omega_m, rad/s."""
     tail_rate: Samples
-    """Mean observed tail rate, rad/s; NaN where it was not observed."""
     correlation: float
     """Between the errors of advance and turning within a robot's trials, which share their tail rate."""
     source: str
-    """Name of the file."""
     sha256: str
-    """Hash of the file."""
     synthetic: bool
     """Whether the file states that its numbers are synthetic."""
     outliers: tuple[Note, ...] = ()

@@ -270,6 +270,13 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[Note
         found.append(Note("friction-negative", words, ("friction",)))
         if 2 * len(negative) > len(friction):
             found.append(RATES_IN_RADIANS)
+    open_below = [n for n, item in enumerate(friction) if item.low < 0 <= item.value]
+    if open_below:
+        words = (
+            f"the interval of B_eff of {experiment.labels()[open_below[0]]}{', ...' if len(open_below) > 1 else ''} "
+            "reaches below zero, where friction has no meaning: predictions use zero there; repeat trials"
+        )
+        found.append(Note("friction-negative", words, ("friction",)))
     if problem.interpolation_error > 0:
         where = "at poses between the nodes" if problem.model.placed else "at one wire between the nodes"
         words = (

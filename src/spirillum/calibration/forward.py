@@ -33,7 +33,6 @@ class Predicted:
     """What draws of the parameters predict, (draws, robots)."""
 
     advance: Samples
-    """U/omega, m/rad."""
     turning: Samples
     """Omega/omega."""
     load: Samples
@@ -105,13 +104,9 @@ class Forward:
     def friction(
         self, draws: Draws, motor_rate: Samples, tail_share: Samples | None = None, reading: str = "rotor"
     ) -> Samples:
-        """B_eff of (18) at given motor rates, N m s/rad, (draws, robots).
+        """B_eff of (18) at given motor rates, (draws, robots); `paper`: the body's torque row holds -K_m I.
 
-        Args:
-            draws: parameters.
-            motor_rate: omega_m, rad/s.
-            tail_share: observed omega/omega_m of each robot; None or NaN: as the model turns the body.
-            reading: `rotor`, or `paper`, in which the body's torque row holds -K_m I.
+        `tail_share` is the observed omega/omega_m of each robot; None or NaN: as the model turns the body.
         """
         s = self.balance(draws)
         turning = kinematics(s).turning

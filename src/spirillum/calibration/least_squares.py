@@ -57,9 +57,7 @@ class LeastSquares:
     """The best fit and what it leaves."""
 
     z: Samples
-    """Coordinates."""
     covariance: Samples
-    """Of the coordinates."""
     discrepancy: dict[Quantity, float]
     """Relative misfit from robot to robot beyond the trials' scatter."""
     error: dict[Quantity, float]

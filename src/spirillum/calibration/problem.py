@@ -65,7 +65,6 @@ class Problem:
     experiment: Experiment
     model: SwimmerModel
     free: tuple[str, ...]
-    """Names of the free parameters."""
     coordinates: tuple[Coordinate, ...]
     """Free numbers; friction tail by tail is none, for it follows from the others."""
     forward: Forward

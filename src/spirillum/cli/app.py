@@ -107,9 +107,10 @@ def predict(
         beside = other_tube(result, asked)
         answer, _ = run_together(result.to_dict, lambda: None if beside is None else beside.trial)
         published = published_beside(result, beside)
-        files = {} if plot is None else {"plot": draw(result)}
-    more = {"published": published} if published else {}
-    renderer.show(renderer.with_files({**answer, **more}, **files), json=json, all_of_it=all_of_it)
+    if published:
+        answer = {**answer, "published": published}
+    pictures = {} if plot is None else {"plot": draw}
+    renderer.show_with_pictures(answer, result, json=json, draw=pictures, all_of_it=all_of_it)
 
 
 @from_function("spirillum.dynamics.comparison:compare_models", without=NO_FORM)
@@ -133,8 +134,8 @@ def compare_models(
     check_apart(output, plot)
     with renderer.progress_bar(quiet=json) as progress:
         result = request(calibrated=calibrated or None, progress=progress)
-    files = {"file": draw(result), "plot": draw_effects(result)}
-    renderer.show(renderer.with_files(result.to_dict(), **files), json=json, all_of_it=all_of_it)
+    pictures = {"file": draw, "plot": draw_effects}
+    renderer.show_with_pictures(result.to_dict(), result, json=json, draw=pictures, all_of_it=all_of_it)
 
 
 @from_function(
@@ -204,7 +205,7 @@ def study(
         renderer.show(found, json=json)
     else:
         found = study_answer(dataset, folder)
-        renderer.show(found, json=json, rows=rows)
+        renderer.show(found, json=json, rows=rows, figures=request.arguments.get("figures", True))
     if found["unanswered"] == found["results"]:
         raise typer.Exit(2)
 

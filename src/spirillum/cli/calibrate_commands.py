@@ -208,7 +208,8 @@ def design(
         found = request(
             pairs_of(vary, "--vary"), unknown=pairs_of(unknown or [], "--unknown"), model=model, progress=progress
         )
-    with atomic_write_all([path for path in (picture, printed, target) if path is not None]) as parts:
+    paths = [path for path in (picture, printed, target) if path is not None]
+    with renderer.answer_kept(found.to_dict, json=json), atomic_write_all(paths) as parts:
         if picture is not None:
             from spirillum.view.figures.design import design_figure
             from spirillum.view.figures.style import save_as

@@ -113,17 +113,18 @@ def control(
         files: dict[str, Any] = {"file": None if output is None else str(output)}
         if target is not None:
             write_dataset(found.dataset, target)
-        if picture is not None:
-            from spirillum.view.figures.control import control_figure
-            from spirillum.view.figures.style import save_as
+        with renderer.answer_kept(lambda: renderer.with_files(found.to_dict(), **files), json=json):
+            if picture is not None:
+                from spirillum.view.figures.control import control_figure
+                from spirillum.view.figures.style import save_as
 
-            save_as(control_figure(found), picture)
-            files["plot"] = str(plot)
-        if movie is not None:
-            from spirillum.view.scene3d.film import film
+                save_as(control_figure(found), picture)
+                files["plot"] = str(plot)
+            if movie is not None:
+                from spirillum.view.scene3d.film import film
 
-            film(found.dataset, movie, progress=progress)
-            files["movie"] = str(movie)
+                film(found.dataset, movie, progress=progress)
+                files["movie"] = str(movie)
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
     if found.interrupted:
         raise KeyboardInterrupt("" if output is None else f"the run until then is kept in {output}")

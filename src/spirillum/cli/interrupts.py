@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
 from typing import Any
 
 import typer
 from typer.core import TyperCommand
 
+from spirillum.errors import InputError
+
 _RESUMED = "are kept in {}; the same command resumes"
 _KEPT = {
     "calibrate": "nothing of this fit is kept; earlier results in {} stay",
     "design": "nothing of this search is kept",
-    "prepare": "finished tables and nodes are kept; the same command resumes",
+    "prepare": "finished tables and poses are kept; the same command resumes",
     "study": f"finished robots {_RESUMED}",
     "virtual-experiment": f"finished videos {_RESUMED}",
 }
 """Commands of minutes, with the end of their sentence; braces stand for the folder of results."""
+_PATHS = ("FILE", "DIR", "FOLDER.zarr")
+_NUMBER = re.compile(r"[\d.+-]+")
+"""Also in digits of other scripts."""
 
 
 class InterruptibleCommand(TyperCommand):
-    """A command whose sentence on an interrupt says what is kept, where what was interrupted does not."""
+    """A command whose sentence on an interrupt says what is kept, where what was interrupted does not.
+
+    It refuses an empty name of a file, and a number in other digits than 0 to 9, by the option's name.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return what is left of the arguments after the parameters took theirs."""
+        takes = {name: one for one in self.params if not getattr(one, "is_flag", True) for name in one.opts}
+        split = [part for text in args for part in (text.split("=", 1) if text.startswith("--") else [text])]
+        for name, value in pairwise(split):
+            if name in takes and not value.strip() and (kind := takes[name].metavar) in _PATHS:
+                raise InputError(f"{name} {value!r} is empty; allowed: {name} {kind}")
+            if name in takes and _NUMBER.fullmatch(value) and not value.isascii():
+                raise InputError(f"{name} {value[:40]!r} is not a number; allowed: the digits 0 to 9")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""

@@ -96,7 +96,8 @@ def simulate(
         if target is not None:
             write_dataset(dataset, target)
         look = {"panels": "main", **look}
-        files, warnings = _drawn(dataset, picture, look, movie, progress, written=target is not None)
+        with renderer.answer_kept(lambda: run_answer(dataset), json=json):
+            files, warnings = _drawn(dataset, picture, look, movie, progress, written=target is not None)
     found = run_answer(dataset.assign_attrs(note_attributes([*notes_in(dataset.attrs), *warnings])))
     renderer.show(renderer.with_files(found, file=None if output is None else str(output), **files), json=json)
     if any(event["what"] == INTERRUPTED for event in found["events"]):
@@ -172,8 +173,8 @@ def magnetic_sweep(
     with renderer.progress_bar(quiet=json) as progress:
         dataset = request(progress=progress)
     write_dataset(dataset, target)
-    files = {} if plot is None else {"plot": draw(dataset)}
-    renderer.show(renderer.with_files(sweep_answer(dataset), file=str(output), **files), json=json)
+    answer = renderer.with_files(sweep_answer(dataset), file=str(output))
+    renderer.show_with_pictures(answer, dataset, json=json, draw={} if plot is None else {"plot": draw})
 
 
 @from_function(
@@ -194,4 +195,4 @@ def settle(
     draw = renderer.picture(output, "settling.png", "spirillum.view.figures.release:settling_figure")
     with renderer.progress_bar(quiet=json) as progress:
         found = request(progress=progress)
-    renderer.show(renderer.with_files(found.to_dict(), file=draw(found)), json=json)
+    renderer.show_with_pictures(found.to_dict(), found, json=json, draw={"file": draw})

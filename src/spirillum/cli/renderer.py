@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +25,8 @@ from spirillum.display import counted
 from spirillum.envelope import as_json, with_notes_last
 from spirillum.notes import Note, notes_in_answer, shown_cautions
 
-_PERIOD = 15.0  # least time between two lines, s; shorter work prints none
+_PERIOD = 15.0  # least time between two lines, s
+_FIRST = 5.0  # time after which the first line is printed, s; shorter work prints none
 _SHARE = 0.05  # least time between two lines over the time since the start, so that a long log stays readable
 _AT_ONCE = 1.0  # work that is done within this time from the start of a stage was cached and does not enter the pace, s
 _FEWEST = 2  # steps from which on a time left is stated
@@ -91,12 +92,14 @@ class ProgressLines:
     ) -> None:
         """No work yet."""
         self._write, self._announcements, self._clock, self._lock = write, announcements, clock, Lock()
-        self._begin = self._printed = clock()
+        self._begin = clock()
+        self._printed = self._begin + _FIRST - _PERIOD
         self._pace = StagePace(clock)
 
     def __call__(self, what: str, done: int, total: int | None) -> None:
         """Take note of progress."""
         if what.startswith(self._announcements):
+            self._printed = self._clock()
             self._write(what)
             return
         with self._lock:
@@ -104,15 +107,20 @@ class ProgressLines:
         self.look()
 
     def look(self) -> None:
-        """Print a line if there is work and one is due."""
+        """Print a line if one is due."""
         with self._lock:
             now = self._clock()
-            if self._pace.what and now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
+            if now - self._printed >= max(_PERIOD, _SHARE * (now - self._begin)):
                 self._printed = now
-                pace = self._pace
-                of = f" of {pace.total}" if pace.total else ""
-                left = "" if pace.left is None else f", about {_duration(pace.left)} left"
-                self._write(f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}")
+                self._write(self._line(now))
+
+    def _line(self, now: float) -> str:
+        pace = self._pace
+        of = f" of {pace.total}" if pace.total else ""
+        left = "" if pace.left is None else f", about {_duration(pace.left)} left"
+        if not pace.what:
+            return f"at work, {_duration(now - self._begin)} elapsed"
+        return f"{pace.what}: {pace.done}{of}, {_duration(now - self._begin)} elapsed{left}"
 
 
 _FINE = 10.0  # minutes below which a duration is printed with its seconds
@@ -224,6 +232,27 @@ def picture(path: Path | None, example: str, figure: str) -> Callable[[Any], str
     return draw
 
 
+def show_with_pictures(
+    answer: Answer, source: Any, *, json: bool, draw: Mapping[str, Callable[[Any], str | None]], **options: Any
+) -> None:
+    """Print an answer with the pictures of its source by their entries, also where one of them cannot be drawn."""
+    files: dict[str, str | None] = {}
+    with answer_kept(lambda: with_files(answer, **files), json=json, **options):
+        for name, one in draw.items():
+            files[name] = one(source)
+    show(with_files(answer, **files), json=json, **options)
+
+
+@contextmanager
+def answer_kept(answer: Callable[[], Answer], *, json: bool, **options: Any) -> Iterator[None]:
+    """Print an answer that was computed before the error of the block that writes its files."""
+    try:
+        yield
+    except BaseException:
+        show(answer(), json=json, **options)
+        raise
+
+
 def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:
     """A sign of life while a model solves; its first run on a machine compiles for some seconds."""
     # That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
@@ -237,9 +266,23 @@ def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContex
 
 
 def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
-    """Progress lines on standard error; none for `--json` and where no terminal is attached."""
+    """A sign of life on standard error, where it is no terminal a line after some seconds; none for `--json`."""
     console = Console(stderr=True)
-    return nullcontext() if quiet or not console.is_terminal else console.status(what)
+    if quiet:
+        return nullcontext()
+    return console.status(what) if console.is_terminal else _line_after(_FIRST, what)
+
+
+@contextmanager
+def _line_after(seconds: float, line: str) -> Iterator[None]:
+    """Print a line where the block takes longer."""
+    timer = Timer(seconds, _print_line, (f"{line}, {seconds:.0f} s elapsed",))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _print_line(line: str) -> None:

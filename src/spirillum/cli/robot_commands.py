@@ -153,7 +153,7 @@ def export(
     from spirillum.cli import renderer
     from spirillum.errors import InputError
 
-    if target.suffix == ".mcap":
+    if target.suffix.lower() == ".mcap":
         from spirillum.exports.recording import export_run
 
         refuse_conflicts(context, "recording")

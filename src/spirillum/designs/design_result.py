@@ -33,7 +33,6 @@ class Alternative:
     values: Mapping[str, float]
     """Fields with their values."""
     objective: float
-    """The objective; NaN where it has no answer."""
     beaten: float
     """Share of the draws in which the best design is better; without unknowns 0 or 1."""
     beaten_low: float
@@ -71,7 +70,6 @@ class Uncertainty:
     low: Mapping[str, float]
     """Lower ends of the 95 % intervals of all quantities, SI."""
     high: Mapping[str, float]
-    """Upper ends."""
     probability: tuple[float, float, float] | None
     """Probability that the target is met, with its 95 % interval; None without a target."""
     deciding: Mapping[str, float]

@@ -32,7 +32,6 @@ class SampledRobots(NamedTuple):
     values: Mapping[str, Samples]
     """Unknown to its values, (draws,)."""
     number: int
-    """Number of draws."""
     sets: int = 1
     """Number of sets that fill the ranges evenly, each by itself and independent of the others, one after the other."""
 

@@ -337,12 +337,7 @@ RUNGE_KUTTA = AxialIntegrator("Runge-Kutta, order 4; exact from where the curren
 
 
 def axial_run(prediction: Prediction, timing: Timing, integrator: AxialIntegrator = RUNGE_KUTTA) -> xr.Dataset:
-    """Axial swimming (two degrees of freedom) from rest.
-
-    Returns:
-        Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
-        averages over the last two thirds of the run, while on and while steady as scalars; settings in the attributes.
-    """
+    """Axial swimming (two degrees of freedom) from rest: the Dataset over `time` of `simulate` with motion `held`."""
     batch, robot = prediction.batch, AxialRobot.of(prediction)
     if prediction.tail_rotation_rate == 0:
         raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")

@@ -130,7 +130,6 @@ class ModelComparison(DisplayMixin):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
     robot: Robot
-    """The robot."""
     friction: FrictionReading
     """Friction model, the same for all models."""
     models: tuple[str, ...]

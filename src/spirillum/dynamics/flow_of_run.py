@@ -52,18 +52,14 @@ _THINNEST = 0.02
 
 
 class RunSnapshot(NamedTuple):
-    """A robot in its tube at a moment of a run, in axes of the body that do not roll; nothing is solved for yet."""
+    """A robot in its tube at a moment of a run, in axes of the body that do not roll, SI; not solved for yet."""
 
     prediction: Prediction
     """Its motion as an answer, and the pose."""
     phase: float
-    """Of the tail, rad."""
     body: np.ndarray
-    """Twist of the body, m/s and rad/s, (6,)."""
     rotor: np.ndarray
-    """Twist of the rotor, m/s and rad/s, (6,)."""
     mean_flow: float
-    """Mean flow through the tube, m/s."""
     lifted: float
     """How much further from the wall than in the run it is resolved, m."""
 

@@ -64,9 +64,7 @@ class Release(NamedTuple):
     """Release of a robot in its tube, its drive, and its contact."""
 
     table: TubeTable
-    """Its table."""
     placement: Placement
-    """Initial pose, ends, and a constant flow."""
     in_tube: InTube
     """Requested azimuth and dry friction."""
     roughness: float | None
@@ -93,7 +91,6 @@ class FreeMotion(NamedTuple):
     start_gap: float
     """Smallest distance between body and wall at release, m."""
     release: Release
-    """Initial pose."""
     checked: Checked
     """Whether its table was checked at this pose."""
 

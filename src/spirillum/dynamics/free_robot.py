@@ -285,15 +285,7 @@ def drive_of(batch: RobotBatch) -> Samples:
 
 
 def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
-    """A torque of the order of those that act, N m.
-
-    The largest of the motor's stall torque, m B, a prescribed torque or that of a prescribed rate, and weight's.
-
-    Args:
-        drag: resistance against the seven rates (7, 7).
-        weight: submerged weight and moments (8,).
-        drive: drive and motor (48,).
-    """
+    """The largest of the torques of stall, field, prescribed drive or rate, and weight, N m."""
     kind = drive[rigid_links.KIND]
     field = float(np.linalg.norm(drive[rigid_links.MOMENT : rigid_links.FIELD])) * drive[rigid_links.FIELD]
     given = abs(drive[rigid_links.GIVEN]) * (

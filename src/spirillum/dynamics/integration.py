@@ -36,12 +36,10 @@ Progress = Callable[[str, int, int], None]
 
 
 class Event(NamedTuple):
-    """Something that happened in a run."""
+    """What happened in a run, and when, s."""
 
     time: float
-    """s."""
     what: str
-    """In words."""
 
 
 class Reach(NamedTuple):
@@ -85,7 +83,6 @@ class Trajectory:
     events: tuple[Event, ...]
     """What happened, in the order of time."""
     last: Checkpoint
-    """From where it can be continued."""
 
     def require_completion(self) -> Trajectory:
         """Return the run; raise KeyboardInterrupt or InputError where it was interrupted or could not be followed."""

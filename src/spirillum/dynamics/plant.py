@@ -70,12 +70,10 @@ _TURN = 2.0 * np.pi
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A robot at one moment of its run."""
+    """A robot at one moment of its run, SI."""
 
     time: float
-    """s."""
     pose: RobotPose
-    """Position and attitude."""
     values: dict[str, float]
     """Quantities by name, SI; NaN where one has no value."""
     ended: str
@@ -84,12 +82,10 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class PlantState:
-    """Complete state for the next step of a plant; another plant of the same robot can continue from it."""
+    """Complete state for the next step of a plant, SI; another plant of the same robot can continue from it."""
 
     time: float
-    """s."""
     state: tuple[float, ...]
-    """State of the equations of motion."""
     duty: float
     """Duty of the last step, which the drive has."""
     command: float
@@ -99,7 +95,6 @@ class PlantState:
     field: TurningField | None
     """Field that turns the robot; None for another drive."""
     spent: bool
-    """Whether the battery is empty."""
     ended: str
     """Why the run has ended; empty while it continues."""
     azimuth: float
@@ -107,7 +102,6 @@ class PlantState:
     checkpoint: Checkpoint | None
     """Beginning of the integrator's last step."""
     model: str
-    """Name of the hydrodynamic model."""
 
 
 def uninterrupted(moment: Snapshot) -> Snapshot:

@@ -83,7 +83,6 @@ class ReturnMap:
     """Turns of the tail of one robot with its drive on."""
 
     robot: TubeRobot
-    """The robot, at its duty."""
     sign: float
     """Sense in which the tail turns in the lab."""
     tolerance: float = TubeRobot.tolerance

@@ -75,9 +75,7 @@ class TurningField:
     """A uniform field that turns about an axis, at right angles to it; SI."""
 
     rotation_rate: float
-    """rad/s."""
     strength: float
-    """T."""
     yaw: float = 0.0
     """Of the axis, rad."""
     pitch: float = 0.0

@@ -184,12 +184,10 @@ def rotation_matrix(quaternion: Samples) -> Samples:
 
 @dataclass(frozen=True)
 class Poses:
-    """A robot's trajectory."""
+    """A robot's trajectory: increasing times, s, and poses, m and rad."""
 
     time: Samples
-    """(n,) increasing, s."""
     position: Samples
-    """(n, 3), m."""
     attitude: Samples
     """(n, 4) unit quaternions without jumps of sign."""
     tail_phase: Samples

@@ -136,14 +136,11 @@ _MOST_ALIKE = 4
 
 
 class MergedEvent(NamedTuple):
-    """An event, or the first of many that are alike."""
+    """An event, or the first of many that are alike; times in s."""
 
     time: float
-    """When, s."""
     what: str
-    """What happened."""
     times: int
-    """How often."""
     last: float
     """When for the last time, s."""
 
@@ -176,12 +173,10 @@ STEADY = (
 
 
 class DutyInterval(NamedTuple):
-    """A time at constant duty."""
+    """A time at constant duty, s."""
 
     start: float
-    """s."""
     end: float
-    """s."""
 
 
 def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[DutyInterval]:
@@ -203,18 +198,11 @@ def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> 
 def run_averages(
     time: Samples, integrals: Mapping[str, tuple[Samples, str]], stretches: Sequence[DutyInterval], *, by_turn: bool
 ) -> dict[str, tuple[Any, ...]]:
-    """Averages as scalars of a dataset.
+    """Averages as scalars of a dataset, from integrals of quantities at the samples (and the averages' units).
 
     `mean_...` is over the last two thirds of the run, the final two of the paper's three periods, `..._on` over the
     times at which the drive is on, `..._steady` over those of them at which the motion is steady (see `STEADY`); NaN
-    where there are none.
-
-    Args:
-        time: sample times that contain the ends of all stretches, s, (n,).
-        integrals: name of each average to the integral of its quantity at the samples, (n,), and the average's unit;
-            `mean_forward_velocity` and `mean_tail_rotation_rate` among them.
-        stretches: times at constant duty in which the drive is on.
-        by_turn: whether speed and rate change within a turn of the tail.
+    where there are none. With `by_turn` speed and rate change within a turn of the tail.
     """
     judged = [integrals[name][0] for name in ("mean_forward_velocity", "mean_tail_rotation_rate")]
     steady = [part for stretch in stretches if (part := _steady_part(time, judged, stretch, by_turn=by_turn))]

@@ -73,15 +73,7 @@ def film_at(motion: Prediction, table: TubeTable, gap: float, offset: float) -> 
 
 
 def lubrication_resistance(viscosity: float, length: float, radius: float, tube_radius: float, gap: float) -> float:
-    """S_z of a long cylinder in a thin film at the wall of a round tube, 3 sqrt(2) pi mu L (a_e/h)^(3/2), N s/m.
-
-    Args:
-        viscosity: Pa s.
-        length: of the cylinder, m.
-        radius: a of the cylinder, m.
-        tube_radius: R, m.
-        gap: h, m.
-    """
+    """S_z of a long cylinder in a thin film at the wall of a round tube, 3 sqrt(2) pi mu L (a_e/h)^(3/2), N s/m."""
     curvature = 1.0 / radius - 1.0 / tube_radius
     return float(3.0 * np.sqrt(2.0) * np.pi * viscosity * length * (curvature * gap) ** -1.5)
 
@@ -140,12 +132,7 @@ class Settling(DisplayMixin):
         return float(self._free.robot.tube[kernel.COEFFICIENT])
 
     def way(self, name: str) -> Samples:
-        """Part of the trajectory that was followed, at every step of the run.
-
-        Args:
-            name: `time` (s), `gap` (m), `azimuth`, `pitch`, `yaw` (rad, against the wall), `contact_force` (N), `x` (m)
-                or `roll` (rad).
-        """
+        """The time, gap, azimuth, pitch, yaw, contact_force, x or roll at every step of the run."""
         return self._free.run.path.of(name)
 
     @property

@@ -162,7 +162,6 @@ class InitialPose:
     azimuth: float = 0.0
     """Azimuth of the body's mid-length about +x from the lowest point of the tube."""
     phase: float = 0.0
-    """Phase of the tail relative to the body, which has not rolled since release."""
 
 
 def state_at_release(robot: Robot, links: TubeRobot, start: InitialPose) -> Samples:

@@ -97,17 +97,7 @@ def long_run(
     progress: Progress,
     turns_shown: int = 0,
 ) -> LongRun:
-    """Follow a robot in its tube to where its motion no longer changes.
-
-    Args:
-        robot: the robot at its duty.
-        state: where it is laid down, (19,).
-        sign: sense in which its tail turns.
-        heavy: whether weight or buoyancy tells one azimuth from another.
-        until: gap that the run has to reach before anything is looked for, m; None: no such gap.
-        progress: called with stage, number done, and total.
-        turns_shown: of the path at least, where a steady motion is found.
-    """
+    """Follow a robot in its tube to where its motion no longer changes; not before the gap `until` is reached."""
     turns, path = ReturnMap(robot, sign), Path()
     coarse = replace(turns, tolerance=SEARCHING)
     states, ended = [state], ""

@@ -29,10 +29,9 @@ Window = tuple[float, float]
 
 
 class Switch(NamedTuple):
-    """From a time on, the drive has a duty."""
+    """From a time on, s, the drive has a duty."""
 
     time: float
-    """s."""
     duty: float
     """0 (off) to 1 (full throttle)."""
 

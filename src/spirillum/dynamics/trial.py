@@ -25,7 +25,7 @@ from spirillum.dynamics.timing import TRIAL_DURATION, Timing, duration_of
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.envelope import quantity
 from spirillum.errors import InputError
-from spirillum.fitted.fit import NO_FIT, Fit
+from spirillum.fitted.fit import FITTED_BESIDE, NO_FIT, Fit
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.kernels.native import thread_count
 from spirillum.notes import notes_in
@@ -43,7 +43,7 @@ from spirillum.swimming.drawn_resistance import PosteriorFor
 from spirillum.swimming.model_choice import WALLED, has_table
 from spirillum.swimming.prediction import Prediction, interval_statement, predict
 from spirillum.swimming.preparation import preparation_time, table_for, why_no_table
-from spirillum.swimming.released_motion import SPEED_OF, ReleasedMotion, TrialInterval
+from spirillum.swimming.released_motion import HELD, SPEED_OF, ReleasedMotion, TrialInterval
 from spirillum.swimming.reynolds import without_reynolds_bound
 from spirillum.swimming.steady import STEADY
 from spirillum.units import KINDS, as_given, parse_option, show, speed_unit
@@ -83,13 +83,7 @@ def why_not_released(robot: Robot, model: str, tail_rate: str | float | None, pl
 
 
 def trial_of(held: Prediction, run: Callable[[], xr.Dataset], duration: float) -> ReleasedMotion:
-    """Return the means of a trial.
-
-    Args:
-        held: the robot, held where it is laid down.
-        run: follows the robot, as `spirillum.simulate` does by its defaults.
-        duration: for how long, s.
-    """
+    """Return the means of a trial of a robot from where it is held."""
     turns = abs(held.tail_rotation_rate) * duration / (2.0 * np.pi)
     if turns > _MOST_TURNS:
         return ReleasedMotion(reason=f"its tail turns {turns:.4g} times in {duration:g} s; use `simulate`")
@@ -170,7 +164,6 @@ class TrialUnknown(NamedTuple):
     of: str
     """What the ends are multiples of, or their unit."""
     source: str
-    """Why these ends."""
 
     def at(self, shares: Samples) -> Samples:
         """Values at shares of the distribution, between 0 and 1."""
@@ -249,13 +242,7 @@ class TrialSample(NamedTuple):
 
 
 def open_unknowns(robot: Robot, weight: float, stated: Mapping[str, object]) -> tuple[TrialUnknown, ...]:
-    """Return the unknowns that are open.
-
-    Args:
-        robot: the robot.
-        weight: its weight in the fluid, N; 0 where its masses are not known.
-        stated: `wait`, `roughness` and `friction_coefficient` as they are requested or fitted; None where they are not.
-    """
+    """Return the unknowns of which none is requested or fitted."""
     free = {name for name, value in stated.items() if value is None}
     free |= {"weight"} if weight and robot.body.mass is not None else set()
     free |= {"friction.effective"} if robot.motor is not None and robot.friction.effective is None else set()
@@ -317,14 +304,7 @@ def with_interval(
 ) -> ReleasedMotion:
     """Return the trial at nominal unknowns with its interval over them, and what each of them contributes.
 
-    Args:
-        nominal: the trial at nominal unknowns.
-        samples: settings of the runs.
-        unknowns: what they vary.
-        run: follows the robot of a sample.
-        progress: told how many runs are done.
-        discrepancy: gives the factors of a fitted model's discrepancy on quantities of runs, (runs,) each; only these
-            quantities then have intervals.
+    With the factors of a fitted model's discrepancy only the quantities that it knows have intervals.
     """
     if nominal.reason or not (unknowns or discrepancy):
         return nominal
@@ -369,12 +349,7 @@ def _swims(run: ReleasedMotion) -> bool:
 
 
 def variance_shares(shares: Samples, values: Samples) -> Samples:
-    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share.
-
-    Args:
-        shares: of the distributions, (runs, unknowns), 0 to 1.
-        values: (runs,).
-    """
+    """Return the share of the variance of values that each unknown explains by itself, as a parabola over its share."""
     x = 2.0 * shares - 1.0
     terms = np.stack([x, x**2], axis=-1)
     design = np.column_stack([np.ones(len(x)), terms.reshape(len(x), -1)])
@@ -482,7 +457,9 @@ class TrialRequest:
             return replace(held, released=dict.fromkeys(("trial", "steady"), partial(ReleasedMotion, reason=reason)))
         self._check_length(held)
         self._announce("held", held.forward_velocity, held.tail_rotation_rate)
-        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady})
+        other = held.fitted_by and self.fit.fitted_motion == HELD
+        notes = (*held.warnings, FITTED_BESIDE) if other else held.warnings
+        return replace(held, released={"trial": partial(self.trial, held), "steady": self.steady}, warnings=notes)
 
     def trial(self, held: Prediction) -> ReleasedMotion:
         """Return the trial, with its interval where that is requested."""

@@ -57,16 +57,11 @@ def tube_run(
     wait: float = 0.0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The run of a robot in its tube.
+    """The run of a robot in its tube, as of a free run, with its pose and contacts and a `checkpoint` to continue from.
 
     Time 0 is when the remote may first switch the drive on. A robot that waits before, with its drive off, does so at
-    negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while
-    it waited is among the events. A flow over time has the value of its first row until then.
-
-    Returns:
-        Dataset over `time`, as of a free run, with `offset`, `azimuth` (unwrapped), `wall_pitch`, `wall_yaw`,
-        `wall_gap` (of the body), `tail_gap`, contact forces and energy, mean flow and its work. The attribute
-        `checkpoint` is what it can be continued from.
+    negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while it
+    waited is among the events. A flow over time has the value of its first row until then.
     """
     reach = reach_of(steady.robot)
     before: tuple[Event, ...] = ()

@@ -120,26 +120,26 @@ class ExportFile(NamedTuple):
 
 def check_masses(robot: Robot, target: Path) -> None:
     """Require the masses that a robot description needs."""
-    robot.check_body(target.suffix)
+    robot.check_body(target.suffix.lower())
     for table, name in (("body", "mass"), ("tail", "density")):
         if getattr(getattr(robot, table), name) is None:
             raise InputError(
                 f"{robot.name}: {table}.{name} is missing; allowed: body.mass and tail.density, from which "
-                f"{target.suffix} takes masses and inertias"
+                f"{target.suffix.lower()} takes masses and inertias"
             )
-    if target.suffix != ".urdf":
+    if target.suffix.lower() != ".urdf":
         check_inertia(robot)
 
 
 def contents_of(robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: float) -> dict[str, ExportFile]:
     """Files by name relative to the target's folder, the target first; an STL file is `printable_solid`."""
-    holds = f"{KINDS_OF_FILES[target.suffix]}, in m"
-    if target.suffix == ".glb":
+    holds = f"{KINDS_OF_FILES[target.suffix.lower()]}, in m"
+    if target.suffix.lower() == ".glb":
         return {target.name: ExportFile(glb_bytes(robot.name, pieces, phase), holds)}
-    if target.suffix == ".vtp":
+    if target.suffix.lower() == ".vtp":
         return {target.name: ExportFile(vtp_bytes(pieces, {"robot": robot.name, "phase": phase}), holds)}
     folder, meshes = f"{target.stem}-meshes", mesh_files(pieces)
-    text = urdf_text if target.suffix == ".urdf" else mjcf_text
+    text = urdf_text if target.suffix.lower() == ".urdf" else mjcf_text
     found = {target.name: ExportFile(text(robot, meshes, folder, phase).encode(), holds)}
     for mesh in meshes:
         kind = "closed body of the whole part" if mesh.colour is None else "surface to look at"
@@ -288,7 +288,7 @@ def export(
     with guard_inputs(*inputs, calibration):
         target = output_target(path, KINDS_OF_FILES, "robot.stl")
     angle, of_held = parse_option("phase", phase, KINDS["angle"]), (motion, friction, calibration, placement)
-    if target.suffix == ".fmu":
+    if target.suffix.lower() == ".fmu":
         if angle or fineness != 1.0 or unit is not None or sidecar is not None:
             raise InputError("phase, fineness, unit or sidecar with .fmu; allowed: only for the robot's shape")
         check_choice("motion", motion or "held", ("held", "free"))
@@ -296,13 +296,13 @@ def export(
         return make(target, robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
     if any(given is not None for given in of_held):
         raise InputError(
-            f"motion, friction, calibration or a placement (gap, pitch, flow) with {target.suffix}; allowed: "
+            f"motion, friction, calibration or a placement (gap, pitch, flow) with {target.suffix.lower()}; allowed: "
             "only with .fmu"
         )
-    wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
-    if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
+    wanted = target.suffix.lower() in _DESCRIPTIONS if sidecar is None else sidecar
+    if unit is not None and (unit not in STL_UNITS or target.suffix.lower() != ".stl"):
         raise InputError(
-            f"unit = {unit!r} for {target.suffix}; allowed: mm, um or m, only for .stl (the others are in m)"
+            f"unit = {unit!r} for {target.suffix.lower()}; allowed: mm, um or m, only for .stl (the others are in m)"
         )
     if model is not None and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
@@ -313,16 +313,16 @@ def _shape_of(
     robot: Robot, target: Path, angle: float, fineness: float, unit: str | None, resistance: str | None
 ) -> Export:
     """A file of the robot's shape, written, with the resistance of a model beside it unless that is None."""
-    described = target.suffix in _DESCRIPTIONS
+    described = target.suffix.lower() in _DESCRIPTIONS
     if described:
         check_masses(robot, target)
     # Descriptions and scenes turn the rotor by its joint, so its own shape stays at phase 0.
-    still = described or target.suffix == ".glb"
+    still = described or target.suffix.lower() == ".glb"
     pieces = robot_mesh(robot, phase=0.0 if still else angle, fineness=fineness)
     beside = {} if resistance is None else sidecar_of(robot, resistance, angle if described else 0.0)
     solid: Mapping[str, Any] | None = None
     cautions: list[Note] = []
-    if target.suffix == ".stl":
+    if target.suffix.lower() == ".stl":
         printable, solid, cautions = printable_solid(robot, pieces, unit)
         contents = {target.name: printable}
     else:
@@ -338,7 +338,7 @@ def _shape_of(
         if name.endswith("-solid.stl") and not is_watertight_file(content.data)
     ]
     warnings = [*robot.warnings, *notes_in_answer(beside), *cautions]
-    if target.suffix in (".mjcf", ".xml"):
+    if target.suffix.lower() in (".mjcf", ".xml"):
         warnings.append(FLUID_WARNING)
     return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
 

@@ -54,11 +54,9 @@ class Flow(DisplayMixin):
     """
 
     prediction: Prediction
-    """The motion."""
     field: FluidField = repr_field(repr=False)
     """The flow in the lab frame."""
     phase: float
-    """Phase of the tail, rad."""
     frame: Frame
     """`lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the forward velocity)."""
     held_force: float = 0.0

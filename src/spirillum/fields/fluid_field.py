@@ -95,13 +95,8 @@ def add_tractions(
 ) -> None:
     """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`: `kernels.stokes_flow`.
 
-    Args:
-        points: (n, 3), m.
-        wires: wires with stations.
-        forces: at the stations of all wires, (stations, 3).
-        layer: panels of the solids and modes of the tractions on them, (panels, p, modes, 3).
-        field: velocity and pressure, (n, 4), without the factors 1/(8 pi mu) and 1/(8 pi).
-        moments: first moments of the forces at the stations, (stations, 3, 3).
+    Tractions are those of the panels' modes, (panels, p, modes, 3); velocity and pressure, (n, 4), are without the
+    factors 1/(8 pi mu) and 1/(8 pi).
     """
     from spirillum.kernels.stokes_flow import add_blobs, add_layer, add_moments
 
@@ -120,7 +115,7 @@ def add_tractions(
 
 @dataclass(frozen=True)
 class FlowField(FluidField):
-    """Flow at one instant in fluid that is at rest far away."""
+    """Flow at one instant in fluid that is at rest far away, SI."""
 
     solution: UnitTwistSolution = field(repr=False)
     """Tractions for unit twists, at phase 0."""
@@ -129,9 +124,7 @@ class FlowField(FluidField):
     twists: Samples
     """Velocity and rotation of body, then of rotor, (12,)."""
     phase: float
-    """Phase of the tail, rad."""
     viscosity: float
-    """Pa s."""
 
     def part_at(self, points: Samples) -> np.ndarray:
         """See `FluidField.part_at`."""

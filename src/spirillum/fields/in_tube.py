@@ -53,13 +53,11 @@ class TubeFlowField(FluidField):
     seat: TubePose
     """The tube and the robot's pose in it."""
     solids: tuple[tuple[str, Outline], ...]
-    """Names and outlines of the solids of revolution."""
     twists: Samples
     """Velocity and rotation of body, then of rotor, (12,)."""
     mean_flow: float
     """Mean velocity of the fluid through the tube, m/s."""
     viscosity: float
-    """Pa s."""
 
     def part_at(self, points: Samples) -> np.ndarray:
         """See `FluidField.part_at`."""
@@ -147,14 +145,11 @@ def _density(strengths: Strengths, motion: Samples) -> Amplitudes:
 
 
 class _Sources(NamedTuple):
-    """Point forces in columns along the tube, about its axis."""
+    """Point forces in columns along the tube, about its axis: (c,) places across it, (c, n) along it."""
 
     rho: Samples
-    """Of each column, (c,)."""
     angle: Samples
-    """Of each column, (c,)."""
     x: Samples
-    """(c, n)."""
     forces: Samples
     """Even and odd part, along x, rho and the angle, (c, n, 2, 3)."""
 
@@ -173,7 +168,6 @@ class _Reflection:
     """Reflection at the wall: waves and their amplitudes, see `kernels.stokes_flow`."""
 
     radius: float
-    """Of the tube, m."""
     waves: tuple[Samples, np.ndarray]
     """k, 1/m, and number of orders p of each."""
     classes: tuple[tuple[float, Any], ...]
@@ -186,7 +180,6 @@ class _Reflection:
     reach: float
     """Where, from there, the flow has died out, m."""
     steps: Samples
-    """Of `kernels.stokes_flow.wave_amplitudes`."""
     amplitudes: Samples
     """Of `kernels.stokes_flow.wave_amplitudes`."""
 

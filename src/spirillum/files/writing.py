@@ -205,7 +205,7 @@ def _unwritable(path: Path, error: OSError) -> Exception:
 
 def _finish(part: Path, *, sync: bool) -> None:
     """Mark a file that was made as the program's own, and wait until the disk has it."""
-    mark = _AT_THE_END.get(part.suffix, b"")
+    mark = _AT_THE_END.get(part.suffix.lower(), b"")
     with part.open("r+b") as stream:
         stream.seek(max(stream.seek(0, os.SEEK_END) - len(mark), 0))
         if mark and stream.read() != mark:
@@ -236,7 +236,7 @@ _FEW = 4  # suffixes up to which their meanings are listed in a sentence without
 def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:
     """The path of a file to write, checked before any work is done."""
     path = Path(path)
-    if path.suffix not in kinds:
+    if path.suffix.lower() not in kinds:
         endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
         if len(kinds) > _FEW:
             names = ", ".join(f"{ending} ({what})" for ending, what in kinds.items())
@@ -252,9 +252,11 @@ def writable_target(path: Path, replace: Replace = "own") -> Path:
     folder = real.parent
     if not folder.is_dir():
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{path} cannot be written (permission denied); allowed: a folder you may write to")
-    return path
+    try:
+        with private_folder(folder):  # rights alone do not tell: nobody can write in /proc
+            return path
+    except OSError as error:
+        raise _unwritable(path, error) from error
 
 
 def write_text(path: Path, text: str, *, replace: Replace = "own", begins: str = "") -> None:

@@ -41,6 +41,12 @@ FITTED_TRIAL = Note(
     "the posterior was fitted to trials: the held answer has its median and no interval; --interval gives the trial's",
 )
 """Caution of a held answer with a posterior of trials."""
+FITTED_BESIDE = Note(
+    "fit-other-motion",
+    "the fit is of robots held at a pose: compare its observations with the column held, not with trial; fit robots "
+    "that were released by `calibrate --as trial`",
+)
+"""Caution of a trial beside a held answer with a fit of held robots: it may be many times slower."""
 CALIBRATED_HELD = Note(
     "fit-other-motion",
     "the calibration was fitted to robots held at a pose, and this one moves freely: it need not swim as observed",
@@ -61,9 +67,7 @@ class Fit:
     model: str = ""
     """Model whose torque B_eff was inferred with."""
     posterior: PosteriorFile | None = None
-    """The posterior, whose draws give answers intervals; None without one."""
     file: CalibrationFile | None = None
-    """The calibration file; None without one."""
     name: str = ""
     """Name of the file, with the observations of a posterior."""
     channels: tuple[float, ...] = ()
@@ -81,8 +85,13 @@ class Fit:
     @property
     def of_trials(self) -> bool:
         """Whether it was fitted to trials of released robots."""
+        return self.fitted_motion == "trial"
+
+    @property
+    def fitted_motion(self) -> str:
+        """The motion that was fitted, `held` or `trial`; empty where the file does not state it."""
         source = self.posterior or (None if self.file is None else self.file.provenance)
-        return source is not None and source.answer == "trial"
+        return "" if source is None else source.answer
 
     def central(self, robot: Robot) -> Robot:
         """Return the robot with the fitted values, of a posterior its median, in place of its own."""

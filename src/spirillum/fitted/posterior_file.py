@@ -53,7 +53,6 @@ class PosteriorFile:
     observations: str
     synthetic: bool
     channels: tuple[float, ...]
-    """Channel diameters, m."""
     body: tuple[float, float]
     """Diameter and length of the fitted body, m."""
     draws: Mapping[str, Samples]

@@ -22,11 +22,7 @@ def skew(vector: Vectors) -> Tensors:
 
 
 def transfer(offset: Vectors) -> Matrix6:
-    """H of B' = H' B H: velocity at the old reference point from the twist about the new one.
-
-    Args:
-        offset: old reference point minus new one, m.
-    """
+    """H of B' = H' B H: velocity at the old point, `offset` from the new one, from the twist about the new one."""
     h = np.zeros((*np.shape(offset)[:-1], 6, 6))
     h[..., :3, :3] = h[..., 3:, 3:] = np.eye(3)
     h[..., :3, 3:] = -skew(offset)
@@ -34,12 +30,7 @@ def transfer(offset: Vectors) -> Matrix6:
 
 
 def about_point(matrix: Matrix6, point: Vectors) -> Matrix6:
-    """The matrix about another reference point: eq. (16) with its G, and the E that changes with it.
-
-    Args:
-        matrix: about the present reference point.
-        point: new reference point minus present one, m.
-    """
+    """The matrix about a point, from its reference point: eq. (16) with its G, and the E that changes with it."""
     h = transfer(-np.asarray(point))
     return np.swapaxes(h, -1, -2) @ matrix @ h
 

@@ -29,7 +29,6 @@ class ResistanceModel(ABC):
     name: ClassVar[str]
     """Name on the command line."""
     title: ClassVar[str]
-    """Name in tables and figures."""
     references: ClassVar[tuple[str, ...]]
     """Keys of its references, see `spirillum.citation`."""
     known_error: ClassVar[str]
@@ -80,13 +79,7 @@ class ResistanceModel(ABC):
 
     @abstractmethod
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
-        """Resistance of one part alone in the same fluid, about the origin, never calibrated.
-
-        Args:
-            batch: the robots.
-            part: one of `parts`.
-            phase: phase phi of the tail, rad.
-        """
+        """Resistance of one of `parts` alone in the same fluid, about the origin, never calibrated."""
 
 
 class SwimmerModel(ResistanceModel):

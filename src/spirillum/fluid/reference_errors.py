@@ -32,14 +32,11 @@ _SAME = 1e-6
 
 
 class TailError(NamedTuple):
-    """Errors of one model on one tail, percent."""
+    """Errors of B_11, B_14 and B_44 of one model on one tail, percent."""
 
     drag: float
-    """Of B_11."""
     thrust: float
-    """Of B_14."""
     torque: float
-    """Of B_44."""
 
 
 CHECKED: dict[str, dict[tuple[float, float], TailError]] = {

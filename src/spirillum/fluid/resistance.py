@@ -36,21 +36,17 @@ class Resistance(DisplayMixin):
     """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 
     robot: Robot
-    """The robot."""
     model: ResistanceModel
-    """The hydrodynamic model."""
     part: str
     """The part; `both` for body and rotor, each with a motion of its own."""
     about: str
     """Reference point: the body's mid-length, or the tail's root; both on the motor axis."""
     phase: float
-    """Phase of the tail, rad."""
     placement: dict[str, Any]
     """Assumed pose of the robot."""
     matrix: Samples
     """B, 6x6, or 12x12 for body and rotor in this order, SI; NaN where the model does not know an entry."""
     warnings: tuple[Note, ...]
-    """What to be careful about, a sentence each."""
 
     @property
     def references(self) -> tuple[str, ...]:

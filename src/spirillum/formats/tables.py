@@ -191,7 +191,7 @@ def read_table(
     """Read a CSV file; lines that start with `#` are comments."""
     path = checked_path(path, what)
     comments: list[str] = []
-    if parquet and path.suffix == ".parquet":
+    if parquet and path.suffix.lower() == ".parquet":
         found = parquet_table(path, what, largest)
     else:
         text = read_text(path, what, largest)

@@ -76,7 +76,7 @@ def library() -> ctypes.CDLL:
     """Return the compiled library, in its build for this processor.
 
     Raises:
-        ImportError: It was not built.
+        ImportError: It was not built, or for other processors.
     """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     try:
@@ -86,7 +86,11 @@ def library() -> ctypes.CDLL:
             f"{error}; the compiled loops are built by 'pip install .' or 'python csrc/build.py'"
         ) from error
     wide = Path(__file__).with_name(f"_core_v3{suffix}")
-    return ctypes.CDLL(str(wide)) if core.has_wide_vectors() and wide.exists() else core
+    if core.has_wide_vectors() and wide.exists():
+        return ctypes.CDLL(str(wide))
+    if not hasattr(core, "resistance_at"):
+        raise ImportError("the compiled loops were built for a processor with AVX2; build them on this one")
+    return core
 
 
 def sources_digest() -> str:

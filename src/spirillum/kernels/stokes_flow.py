@@ -163,28 +163,43 @@ def circle_waves(
 
 @native("out")
 def point_waves(
-    k: float, radius: float, places: Float64[Array, "n 3"], first: int, out: Float64[Array, "n 3 2 2 orders 3"]
+    k: float,
+    radius: float,
+    places: Float64[Array, "n 3"],
+    first: int,
+    out: Float64[Array, "orders 2 2 3 n 3"],
 ) -> None:
     """Velocities (x, y, z) of waves at points.
 
     Args:
         k: wave number, above 0.
         radius: of the tube.
-        places: points about the tube's axis.
+        places: points about the tube's axis, in its axes.
         first: the first order p.
-        out: to be filled: point; component; real, imaginary part; even, odd; order; wall component.
+        out: to be filled: order; even, odd; real, imaginary part; wall component; point; component.
     """
+
+
+@native("out")
+def single_point_waves(
+    k: float,
+    radius: float,
+    places: Float64[Array, "n 3"],
+    first: int,
+    out: Float32[Array, "orders 2 2 3 n 3"],
+) -> None:
+    """See `point_waves`; in single precision."""
 
 
 @native("out")
 def ring_waves(
     k: float,
     radius: float,
-    places: Float64[Array, "angles n 3"],
+    places: Float64[Array, "n angles 3"],
     theta: Float64[Array, " angles"],
     rotation: Float64[Array, "3 3"],
     first: int,
-    out: Float64[Array, "3 2 angles n 2 orders 3"],
+    out: Float64[Array, "2 3 n orders 2 3 angles"],
 ) -> None:
     """Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
 
@@ -195,7 +210,7 @@ def ring_waves(
         theta: angles about the rings' axis.
         rotation: from the rings' axes to the tube's.
         first: the first order p.
-        out: to be filled: component; even, odd; angle; ring; real, imaginary part; order; wall component.
+        out: to be filled: even, odd; component; ring; order; real, imaginary part; wall component; angle.
     """
 
 
@@ -203,11 +218,11 @@ def ring_waves(
 def single_ring_waves(
     k: float,
     radius: float,
-    places: Float64[Array, "angles n 3"],
+    places: Float64[Array, "n angles 3"],
     theta: Float64[Array, " angles"],
     rotation: Float64[Array, "3 3"],
     first: int,
-    out: Float32[Array, "3 2 angles n 2 orders 3"],
+    out: Float32[Array, "2 3 n orders 2 3 angles"],
 ) -> None:
     """See `ring_waves`; in single precision."""
 

@@ -149,6 +149,12 @@ class Measurement(DisplayMixin):
         if len(self.trials) == 1:
             words = "one trial: intervals are its own and do not include how trials differ; measure more trials"
             found.append(Note("intervals-incomplete", words))
+        two = [name for name in RATE_NAMES if self.summary.counts.get(name) == 2]
+        if two:
+            words = (
+                "means over two trials: one difference gives their intervals, which may be several times too wide or "
+            )
+            found.append(Note("intervals-incomplete", f"{words}too narrow; measure more trials", two))
         if self.files and TABLE not in self.files:
             free = self.robot.channel is None
             why = f"the robot has no channel, which {TABLE} states" if free else "no trial gives a speed or a rate"

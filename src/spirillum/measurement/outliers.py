@@ -25,9 +25,9 @@ _WINDOW = 9
 """Frames of the running median."""
 _SIGMAS = 6.0
 """Standard deviations beyond which a frame is an outlier."""
-_LEAST = 0.25
+_LEAST = 0.5
 """Least scale of the residuals of the running median, over that of the whole series: a step that is small against the
-series' own scatter is no outlier, however smooth its neighbours are."""
+series' own scatter is no outlier, however smooth its neighbours are, as where stripes pass under a highlight."""
 
 
 def outlying_frames(
@@ -41,8 +41,7 @@ def outlying_frames(
     Args:
         time: times, (n,).
         values: the series, (n,); NaN where it was not measured.
-        error: standard error of frames that are known to be less sure than their neighbours, such as those read by
-            hand, (n,); NaN of others. Such a frame is an outlier only beyond six of it.
+        error: least standard deviation of each frame, (n,); NaN where none is known.
         straight: whether the series may be compared with a line at all; else its neighbours alone show an outlier.
 
     Returns:

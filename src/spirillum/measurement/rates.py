@@ -43,6 +43,9 @@ _END_TO_END = np.array([0.0, 1.0, 0.0, 1.0])
 """The mean rate (p(1) - p(-1))/2 of a series of Legendre polynomials, to which those of odd degree contribute."""
 _ENDS = 5
 """Readings averaged at each end of a series."""
+_OF_STATED = 0.5
+"""Least standard deviation, over the stated standard error of a frame, by six of which an outlier is off: frames that
+happen to lie on a line make no strays of others that are off by their own error."""
 _ROUNDING = 1e-12
 """Relative range of a series below which its variation is rounding error: it counts as steady."""
 
@@ -127,7 +130,8 @@ def rate_of(
     Args:
         time: times, s, (n,), increasing; gaps are allowed.
         values: the series, unwrapped where it is an angle, (n,); NaN where it was not measured.
-        error: standard error of each frame, (n,); only their ratios are used.
+        error: standard error of each frame, (n,); a frame is an outlier only beyond three of its own. Else only their
+            ratios are used.
         periodic: periodic errors.
         level: confidence level.
         read: mask of the frames read by hand, (n,). They are outliers only beyond six of their own standard errors,
@@ -138,7 +142,7 @@ def rate_of(
         The slope; where the rate changes, the mean rate from end to end.
     """
     known = np.isfinite(values) & np.isfinite(time)
-    own = None if read is None or error is None else np.where(read, error, np.nan)
+    own = None if error is None else np.where(False if read is None else read, 1.0, _OF_STATED) * error
     outlier = outlying_frames(time, values, own, straight=not unsteady)
     used = known & ~outlier
     count = int(used.sum())

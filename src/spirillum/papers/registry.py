@@ -31,9 +31,7 @@ class Paper(NamedTuple):
     predictions: Callable[[xr.Dataset], list[Claim]]
     """Its statements with verdicts from released robots."""
     layout: Mapping[str, PaperFigure]
-    """Figures of its channels."""
     figures: Callable[[xr.Dataset], dict[str, Picture]]
-    """Figures of this paper only."""
 
 
 _PAPERS = {"biorob2012": Paper(claims_of_study, predictions_of_study, PAPER_FIGURES, more_figures)}

@@ -52,7 +52,6 @@ class ValidationRow:
     x: float | None
     series: str
     name: str
-    """Name of the quantity in the case."""
     quantity: CaseQuantity
     published: float | None
     """None where only a trend was published."""

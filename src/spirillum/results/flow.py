@@ -28,9 +28,9 @@ def check_targets(plane: Path | None, volume: Path | None) -> None:
 
 def write_flow(flow: Flow, dataset: xr.Dataset, path: Path) -> None:
     """Write a plane or a box in the format of the file's suffix."""
-    if path.suffix == ".nc":
+    if path.suffix.lower() == ".nc":
         write_dataset(dataset, path)
-    elif path.suffix == ".vti":
+    elif path.suffix.lower() == ".vti":
         from spirillum.formats.array_files import write_vti
 
         write_vti(dataset, path)

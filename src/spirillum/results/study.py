@@ -16,7 +16,7 @@ import xarray as xr
 
 from spirillum.envelope import envelope
 from spirillum.errors import InputError
-from spirillum.files import guard_inputs, output_folder, results_folder, write_dataset, write_text
+from spirillum.files import check_replaceable, guard_inputs, output_folder, results_folder, write_dataset, write_text
 from spirillum.formats.templates import rendered
 from spirillum.notes import notes_in
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
@@ -105,9 +105,9 @@ def write_report(dataset: xr.Dataset, folder: Path, on_progress: Callable[[str, 
 def write_tables(dataset: xr.Dataset, folder: Path) -> tuple[list[dict[str, Any]], ...]:
     """Write `claims.json` and `ranking.csv`; return the claims and those decided by released robots."""
     claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
-    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
-    write_text(folder / "claims.json", text + "\n", replace="any")
-    write_text(folder / "ranking.csv", _ranking_rows(ranking_of(dataset)), replace="any")
+    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    write_text(folder / "claims.json", text, begins=text[:_KEY])
+    write_text(folder / "ranking.csv", _ranking_rows(ranking_of(dataset)), begins=_BEGIN["ranking.csv"])
     return claims, predictions
 
 
@@ -127,7 +127,10 @@ _ENDS = ("", "_low", "_high")
 _COLUMN = {"m/s": "m_s", "1": "", "A": "A", "W": "W"}
 
 
-_RESULTS = ("dataset.nc", "figures", "report.html", "claims.json", "ranking.csv")
+_BEGIN = {"report.html": "", "claims.json": "[", "ranking.csv": "rank,robot,"}
+"""Files of a study that are only replaced where they are its own, and how those begin that carry no mark."""
+_KEY = 16  # characters of `claims.json` that name its first key
+_RESULTS = ("dataset.nc", "figures", *_BEGIN)
 """What a folder without the mark of a study may not hold, for it would be replaced."""
 
 
@@ -219,6 +222,9 @@ def study(  # noqa: PLR0913 - the options of the command
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     with guard_inputs(*inputs), results_folder(output, claim=claim) as folder:
+        for name, begin in _BEGIN.items():
+            if figures or name != "report.html":
+                check_replaceable(folder / name, begins=begin.encode())
         make_tables(loaded, pool, on_progress)
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:

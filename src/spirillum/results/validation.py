@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from spirillum.files import results_folder, write_text
+from spirillum.files import check_replaceable, results_folder, write_text
 from spirillum.formats.templates import rendered
 from spirillum.papers.case import case_names, load_case
 from spirillum.papers.validation import CaseResult, Validation, compute_case
@@ -50,16 +50,18 @@ def validate(
     mark = {"schema": "spirillum.validation-folder/1"}
     claim = {"mark": "validated.json", "content": mark, "what": "validation", "results": _RESULTS}
     with results_folder(output, claim=claim) as folder:
+        for result in ("validation.json", "report.html"):
+            check_replaceable(folder / result)
         found = Validation(tuple(compute_case(name, progress, runs=runs) for name in chosen), str(output))
         pictures = {case.name: case_picture(case) for case in found.cases if case.rows}
         embedded = {one.name: one for one in draw_pictures(pictures, folder, lambda _name, _done: None)}
         text = json.dumps(replace(found, folder=None).to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-        write_text(folder / "validation.json", text + "\n", replace="any")
+        write_text(folder / "validation.json", text + "\n")
         cases = [(case, embedded.get(case.name), table_of(case)) for case in found.cases]
         text = rendered(
             "results/validation.html.jinja", escaped=True, cases=cases, header=HEADER, left=len(found.outside)
         )
-        write_text(folder / "report.html", text, replace="any")
+        write_text(folder / "report.html", text)
     return found
 
 

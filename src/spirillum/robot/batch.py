@@ -31,11 +31,8 @@ class Column(NamedTuple):
     optional: bool = False
     """Whether a robot swims without it."""
     zero: bool = False
-    """Whether zero is allowed."""
     signed: bool = False
-    """Whether negative values are allowed."""
     infinite: bool = False
-    """Whether infinity is allowed."""
 
 
 @cache
@@ -169,16 +166,7 @@ class RobotBatch:
     @classmethod
     @validate_arguments
     def of(cls, robots: RobotTables | Sequence[RobotTables], placement: Placement | None = None) -> RobotBatch:
-        """Stack robots that differ in numbers only.
-
-        Args:
-            robots: one robot, or several.
-            placement: where in their channels they lie, all in the same way; None: nothing is known.
-
-        Raises:
-            InputError: for what is no robot, or if they differ in anything that a batch shares; use `batches` for mixed
-                lists.
-        """
+        """Stack robots that differ in numbers only."""
         items = [robots] if isinstance(robots, RobotTables) else list(robots)
         if not items:
             raise InputError("robots = []; allowed: one robot, or several")
@@ -213,14 +201,7 @@ class RobotBatch:
         return tuple(source.path for source in _columns("RobotBatch").values())
 
     def taken(self, rows: Sequence[int] | np.ndarray) -> RobotBatch:
-        """Robots by their numbers, in that order, each as often as it is named.
-
-        Args:
-            rows: numbers of robots, from 0.
-
-        Raises:
-            InputError: for what is no list of such numbers.
-        """
+        """Robots by their numbers, in that order, each as often as it is named."""
         allowed = f"whole numbers from 0 to {self.size - 1}, one after the other"
         chosen = whole_array("rows", rows, allowed)
         if chosen.ndim != 1:
@@ -238,16 +219,7 @@ class RobotBatch:
 
     @validate_arguments
     def with_values(self, values: Mapping[str, np.ndarray | Sequence[float] | float]) -> RobotBatch:
-        """Return the batch with columns replaced, SI.
-
-        Args:
-            values: dotted robot-file field (``tail.wavelength``) to one value, or one for each robot; NaN: not known.
-                A robot without a number that it needs gets no answer.
-
-        Raises:
-            InputError: for a field that is not a number of the batch, values that it cannot have, one that no robot
-                has and each needs, or lengths that do not match.
-        """
+        """Return the batch with columns of dotted fields replaced, SI, by one value or one each; NaN: not known."""
         known = {source.path: (name, source) for name, source in _columns("RobotBatch").items()}
         unknown = [path for path in values if path not in known]
         if unknown:
@@ -268,11 +240,7 @@ class RobotBatch:
 
     @validate_arguments
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
-        """Cut the batch into blocks of at most `size` robots, each with its position in the batch.
-
-        Raises:
-            InputError: for a size below 1.
-        """
+        """Cut the batch into blocks of at most `size` robots, each with its position in the batch."""
         if size < 1:
             raise InputError(f"size = {clipped(size)}; allowed: a whole number from 1")
         return self._blocks(size)

@@ -313,14 +313,7 @@ def arc_length(wavelength: Values, amplitude: Values, length: Values) -> Values:
 
 
 def amplitude_envelope(xi: Values, amplitude: Values, length: Values, taper: Values) -> tuple[Values, Values]:
-    """Local amplitude of eq. (10), r = B_o (1 - exp(-c xi/L_t)), and its slope dr/dxi.
-
-    Args:
-        xi: axial distance from the tail's root, m.
-        amplitude: B_o, m.
-        length: L_t, m.
-        taper: c; infinite for a plain helix.
-    """
+    """Local amplitude of eq. (10), r = B_o (1 - exp(-c xi/L_t)), and its slope; c is infinite for a plain helix."""
     with np.errstate(invalid="ignore"):
         decay = np.where(np.isinf(taper), 0.0, np.exp(-taper * xi / length))
         slope = np.where(np.isinf(taper), 0.0, amplitude * taper / length * decay)

@@ -18,18 +18,7 @@ from spirillum.units import show, show_apart
 
 @dataclass(frozen=True)
 class Limit:
-    """One requirement on a field, for every robot of a batch.
-
-    Attributes:
-        field: the field's name in the robot file, or of a derived quantity.
-        value: its SI value.
-        relation: such as ``more than``.
-        bound: the SI bound.
-        unit: unit in which both are shown.
-        why: the reason, half a sentence.
-        holds: where the requirement holds.
-        flag: short name for datasets.
-    """
+    """One requirement on a field, for every robot of a batch."""
 
     field: str
     value: PerRobot

@@ -65,9 +65,7 @@ class Links(NamedTuple):
     """Both links of a robot."""
 
     body: Link
-    """The body, without the coupling."""
     rotor: Link
-    """Coupling and wire."""
 
 
 def links_of(robot: RobotTables, solids: Mapping[str, HomogeneousSolid] | None = None) -> Links:
@@ -140,18 +138,7 @@ def wire_solid(
     hand: float,
     form: TailForm = PLAIN,
 ) -> HomogeneousSolid:
-    """Round wires along eq. (10) at phase 0, their ends cut square.
-
-    Args:
-        root: x_r, distance of the root behind the origin, m.
-        wavelength: lambda, m.
-        amplitude: B_o, m.
-        length: L_t, m.
-        wire_diameter: D_t, m.
-        taper: c; infinite for a plain helix.
-        hand: h, +1 (right) or -1 (left).
-        form: of the tail.
-    """
+    """Round wires along eq. (10) at phase 0, their ends cut square; arguments as of `centreline`, SI."""
     pieces = max(_PANELS_PER_TURN * length / wavelength, len(form.curve), 8 * len(form.amplitude + form.wavelength))
     panels = np.linspace(0.0, length, 1 + int(np.ceil(pieces)))
     if np.isfinite(taper):

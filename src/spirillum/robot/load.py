@@ -164,6 +164,8 @@ def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelen
         if "\\" in value and value.startswith('"'):
             raise
         return path, value
+    if parsed == {"value": {}}:
+        raise InputError(f"{option} {text[:80]!r} sets no field; for example {option} {example}")
     return path, parsed["value"] if set(parsed) == {"value"} else value
 
 

@@ -101,9 +101,7 @@ class TailLine:
     """The centreline of the tail, dense enough for a swept wire; m, at phase 0."""
 
     points: Samples
-    """(k, 3), m."""
     tangents: Samples
-    """Unit tangents away from the root, (k, 3)."""
     xi: Samples
     """Axial distance from the root, m, (k,)."""
 
@@ -116,13 +114,9 @@ def is_steel(density: float | None) -> bool:
 def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tuple[RobotMesh, ...]:
     """The robot's pieces, each one closed surface by itself; neighbours overlap where they are joined.
 
-    Vertices lie on the true surfaces, so that volumes converge from below with the inverse square of `fineness`.
-    The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards -y.
-
-    Args:
-        robot: a checked robot.
-        phase: phase phi of the tail, rad; all pieces of the rotor turn with it.
-        fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
+    Vertices lie on the true surfaces, so that volumes converge from below with the inverse square of `fineness`, 0.1 to
+    20. The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards
+    -y.
     """
     fineness = _checked_fineness(fineness)
     around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))

@@ -330,15 +330,7 @@ def cylinder_outline(diameter: float, front: float, rear: float) -> Outline:
 def solid_outlines(
     body: Outline | None, body_length: float, coupling_diameter: float, coupling_length: float, clearance: float
 ) -> dict[str, Outline]:
-    """Outlines by part: the body, and the coupling behind it where there is one; lengths in m.
-
-    Args:
-        body: outline of the body; None for a bare tail.
-        body_length: L_b.
-        coupling_diameter: D_c, 0 for a bare gap.
-        coupling_length: L_c, 0 for none.
-        clearance: axial clearance on both sides of the coupling's solid.
-    """
+    """Outlines by part: the body, and the coupling behind it where there is one; lengths in m."""
     outlines = {} if body is None else {"body": body}
     if coupling_diameter > 0 and coupling_length > 2.0 * clearance:
         rear = -0.5 * body_length

@@ -23,9 +23,7 @@ class Surface(NamedTuple):
     """A closed surface of triangles, outward oriented, made of consecutive bands."""
 
     vertices: Samples
-    """(n, 3), m."""
     faces: Faces
-    """(m, 3)."""
     band: Faces
     """Index of each triangle's band, from the first pole to the last, (m,)."""
     sector: Faces
@@ -198,11 +196,6 @@ def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
 
     The mean over the triangles around a vertex, weighted by area, whose normals deviate from the corner's own by no
     more than the crease angle.
-
-    Args:
-        vertices: (n, 3).
-        faces: outward oriented, (m, 3).
-        crease: the angle, rad.
     """
     check_memory("smooth shading", len(faces), "triangles", _SHADED, "as with a smaller fineness")
     a, b, c = np.moveaxis(vertices[faces], 1, 0)

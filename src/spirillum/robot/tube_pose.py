@@ -193,9 +193,8 @@ def _farthest_of_ellipses(
 ) -> tuple[Samples, Samples]:
     """Largest distance from the origin on each ellipse of the cross-section, and the angle at which it is.
 
-    Args:
-        height: its mean and its coefficient of sin(theta), (n,) each.
-        side: its mean and its coefficients of sin(theta) and cos(theta), (n,) each.
+    Heights are a mean and a coefficient of sin(theta), distances to the side a mean and those of sin(theta) and
+    cos(theta).
     """
     (h_0, h_s), (w_0, w_s, w_c) = height, side
     theta = 2.0 * np.pi * np.arange(_AROUND) / _AROUND

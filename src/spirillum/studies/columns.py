@@ -162,17 +162,7 @@ def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str,
 def with_band(
     flat: dict[str, Values], answers: Iterable[tuple[BandTask, Part]], models: tuple[str, ...]
 ) -> dict[str, Values]:
-    """Quantities at all poses, and the least and largest of all poses and the reference pose.
-
-    Args:
-        flat: the answers at the reference pose, (models, robots, friction models).
-        answers: those at the poses of the band.
-        models: names of the models, in their order.
-
-    Returns:
-        `<quantity>_at_place`, (models, robots, friction models, places), `<quantity>_low` and `<quantity>_high`,
-        (models, robots, friction models); NaN for models without a band.
-    """
+    """`<quantity>_at_place` at all poses, `_low` and `_high` of these and the reference pose; NaN without a band."""
     pairs = list(answers)
     poses = max(task.pose for task, _ in pairs) + 1
     banded = {models.index(task.model) for task, _ in pairs}

@@ -73,12 +73,7 @@ def release_coordinates(ranges: LaidDown) -> dict[str, Any]:
 def release_variables(
     answers: Sequence[tuple[ReleaseTask, Part]], robots: Sequence[str], shape: Sequence[int]
 ) -> dict[str, Any]:
-    """Every reading of every run, the least and largest of a robot's, and the main effects of the factors.
-
-    Returns:
-        `<quantity>_at_run` over robots, `run`, `window` (and `inferred_by`), `<quantity>_predicted_low` and
-        `..._predicted_high` over robots, `<quantity>_effect` over robots and `factor`; NaN for robots that were not.
-    """
+    """`<quantity>_at_run`, `_predicted_low`, `_predicted_high` and the factors' `_effect`; NaN without runs."""
     found: dict[str, Any] = {}
     for name in (*AT_RUNS, *INFERRED):
         values = gathered(answers, name, shape)
@@ -346,7 +341,6 @@ class Caution(NamedTuple):
     model: str
     flag: str
     robots: int
-    """How many."""
     sentence: str
     """The first of them in words."""
     refused: bool = False

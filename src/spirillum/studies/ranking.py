@@ -83,7 +83,6 @@ class RankedRobot(NamedTuple):
     """A robot of a study with the quantities that rank it, SI; NaN for what does not apply."""
 
     name: str
-    """Its name, or its channel and tail."""
     place: int
     """Its index in the flat order of the study."""
     values: Mapping[str, float]
@@ -117,9 +116,7 @@ class Best(NamedTuple):
     spread: float
     """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
     known: int
-    """Number of robots that have a value."""
     robots: int
-    """Number of robots in the ranking."""
     ties: tuple[str, ...] = ()
     """Names of the other robots that have the same value, to rounding."""
     lead: float = np.nan
@@ -148,9 +145,7 @@ class StudyRanking:
     """The robots of a study, the fastest first."""
 
     model: str
-    """The model that ranks them."""
     friction: str
-    """The friction model with which it does."""
     walls: bool
     """Whether the walls of a channel that robots are in are left out."""
     held: bool

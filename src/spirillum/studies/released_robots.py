@@ -52,11 +52,9 @@ Levels = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 
 def half_fraction(factors: int) -> Levels:
-    """The levels of a half fraction of all combinations, the last factor's the product of the others'.
+    """Half of all combinations of levels -1 and +1, the last factor's the product of the others', (runs, factors).
 
-    Returns:
-        (2**(factors - 1), factors); -1 low, +1 high. Every column adds up to 0, and any two are orthogonal from three
-        factors on.
+    Every column adds up to 0, and any two are orthogonal from three factors on.
     """
     free = np.array(list(product((-1, 1), repeat=factors - 1)), dtype=np.intp)
     return np.concatenate([free, np.prod(free, axis=1, keepdims=True)], axis=1)

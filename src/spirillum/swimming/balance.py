@@ -127,13 +127,9 @@ def force_free(m: AxialWhole, load: AxialLoad | None = None) -> TorqueBalance:
 
 
 def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
-    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot.
+    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot, (n, 12, 12).
 
-    Args:
-        r: R at phase 0 of the tail, 12x12. For a body of revolution the tail's phase does not matter.
-
-    Returns:
-        The torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
+    Return the torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
     """
     shared = np.swapaxes(_SPINS, 0, 1) @ r @ _SPINS
     rates: Samples = -np.asarray(np.linalg.solve(shared[..., :5, :5], shared[..., :5, 5:]), dtype=np.float64)
@@ -145,9 +141,8 @@ def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
 def body_per_tail(s: TorqueBalance, t: FrictionTorques | None = None) -> tuple[Values, Values]:
     """Kinematics (15), from the sum of both torque rows, in which the joint torque cancels.
 
-    Returns:
-        Omega/omega, and the rate Omega that an imposed flow adds, rad/s. NaN where reading `paper` has a B_eff
-        beyond E_x, which would push the tail backwards.
+    Return Omega/omega, and the rate Omega that an imposed flow adds, rad/s. NaN where reading `paper` has a B_eff
+    beyond E_x, which would push the tail backwards.
     """
     on_body, on_tail = s.bb + s.rb, s.br + s.rr
     if t is not None:

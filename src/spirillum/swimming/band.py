@@ -54,9 +54,7 @@ class Band:
     over: tuple[str, ...]
     """Fields of the placement that it goes over: `gap`, `pitch` or both."""
     gap: PerRobot
-    """Gap of each pose, m."""
     pitch: PerRobot
-    """Pitch of each pose, rad."""
     swimming: Swimming
     """The quantities at each pose; NaN where it has no answer."""
     reference: Swimming

@@ -75,7 +75,6 @@ class AxialTable:
     viscosity: Samples
     """The robots' own, to which the parts belong, Pa s, (robots,) or (1,)."""
     coefficients: Mapping[str, float]
-    """The robots' own coefficients."""
 
     @classmethod
     def of(
@@ -140,7 +139,7 @@ def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tup
 
 @dataclass(frozen=True)
 class TubeResistance:
-    """Resistance in the tube by the robots' tables, over gap, pitch and viscosity, averaged over the tail's phase."""
+    """Resistance in the tube by the robots' tables over gap, pitch and viscosity, not sampled: the robots' own."""
 
     tables: Samples
     """Packed tables, a row for each robot, the shorter ones filled up."""
@@ -150,11 +149,8 @@ class TubeResistance:
     viscosity: PerRobot
     """The robots' own, Pa s."""
     gap: PerRobot
-    """Where it is not sampled, m."""
     pitch: PerRobot
-    """Where it is not sampled, rad."""
     yaw: float = 0.0
-    """Of all robots, rad."""
 
     @classmethod
     def of(cls, batch: RobotBatch, model: TabledTube) -> TubeResistance:

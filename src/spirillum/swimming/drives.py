@@ -41,12 +41,10 @@ def battery_voltage(motor: Electrics, current: Values) -> Values:
 
 
 def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
-    """Steady root of (17): R(I) I = duty V(I) - (back_emf + back_emf_per_current I).
+    """Steady root of (17), R(I) I = duty V(I) - (back_emf + back_emf_per_current I): one while the motor drives.
 
-    Returns:
-        The current, A; negative where the tail drives the motor (back-emf above the voltage), NaN where it
-        does so beyond any root, or beyond what the battery's voltage allows. While the motor drives there is a
-        single root (the robot file is checked for that).
+    Negative where the tail drives the motor (back-emf above the voltage), NaN where it does so beyond any root, or
+    beyond what the battery's voltage allows.
     """
     rows, shape = _rows(motor, motor.duty, back_emf, back_emf_per_current)
     found = np.empty(rows.shape[0])

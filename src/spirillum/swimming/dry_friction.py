@@ -47,14 +47,7 @@ def weights_in_fluid(robots: Sequence[Robot]) -> PerRobot:
 
 
 def with_dry_friction(r: AxialWhole, force: Values, radius: Values, tail_rate: Values) -> Samples:
-    """R of whole robots with the resistance of dry friction at the sliding speed that the tail's rate gives.
-
-    Args:
-        r: R against U, Omega and omega, (..., 3, 3).
-        force: mu_c N, N, (...); none where it is not positive.
-        radius: a, m, (...).
-        tail_rate: omega, rad/s, (...).
-    """
+    """R of whole robots, (..., 3, 3), with dry friction mu_c N at the sliding speed that the tail's rate gives."""
     shape = np.broadcast_shapes(r.shape[:-2], *(np.shape(item) for item in (force, radius, tail_rate)))
     full = np.broadcast_to(r, (*shape, 3, 3)).reshape(-1, 3, 3)
     pressed, radii, rates = (np.broadcast_to(item, shape).ravel() for item in (force, radius, tail_rate))

@@ -40,7 +40,6 @@ class ModelChoice:
     """A hydrodynamic model, and why it was taken."""
 
     model: str
-    """Name of the model."""
     reason: str = ""
     """Its reason, in half a sentence; empty where it was named."""
     fitted: bool = False

@@ -25,7 +25,6 @@ class OtherModel:
     """Speed of a robot by another model."""
 
     model: str
-    """Name of the model."""
     calibrated: bool
     """Whether the robot's calibration factors, which represent the walls, were applied."""
     forward_velocity: float

@@ -53,13 +53,9 @@ class Prediction(DisplayMixin):
     """
 
     robot: Robot
-    """The robot."""
     model: SwimmerModel
-    """The hydrodynamic model."""
     friction: FrictionReading
-    """Reading of the friction."""
     calibrated: bool
-    """Whether calibration factors were applied."""
     batch: RobotBatch = field(repr=False)
     """The robot at its pose, as a batch of one."""
     swimming: Swimming = field(repr=False)
@@ -67,7 +63,6 @@ class Prediction(DisplayMixin):
     error_estimate: float
     """Relative error of the forward velocity, the sum of what is known of it; NaN for a model in closed form."""
     warnings: tuple[Note, ...]
-    """What to be careful about, a sentence each."""
     intervals: Intervals | None = field(default=None, repr=False)
     """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
@@ -156,11 +151,7 @@ class Prediction(DisplayMixin):
         return answer, headline(answer)
 
     def to_dict(self, *, others: bool = True) -> dict[str, Any]:
-        """The answer of `spirillum predict --json`.
-
-        Args:
-            others: what other models predict, trial and steady motion stand in it.
-        """
+        """The answer of `spirillum predict --json`; with `others`, trial and steady motion stand in these."""
         band = self.band
         beside = self.other_models if others else None
         wanted = {name: compute for name, compute in self.released.items() if others and name not in vars(self)}

@@ -110,9 +110,7 @@ class Prepared(DisplayMixin):
     """A robot and the table of its tube; SI."""
 
     robot: Robot
-    """The robot."""
     table: TubeTable = field(repr=False)
-    """Its table."""
 
     @property
     def warnings(self) -> tuple[Note, ...]:
@@ -157,7 +155,7 @@ def _worse(name: str, error: float, allowed: float, *, yawed: bool) -> Note:
     """That a table is further off than one should be; both errors are relative."""
     off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
     where = "at yawed poses between" if yawed else "between"
-    what = f"{name.replace('_', ' ')} is off by up to {off} % {where} the nodes of the table"
+    what = f"{name.replace('_', ' ')} is off by up to {off} % {where} the poses of the table"
     return Note("table-not-checked", f"{what}; at most {most} % is expected", (name,))
 
 

@@ -34,11 +34,9 @@ class Scenario:
     robot: Robot
     """The robot, with fitted values in place of its own."""
     model: SwimmerModel
-    """The hydrodynamic model."""
     batch: RobotBatch
     """The robot in its pose, as a batch of one."""
     friction: FrictionReading
-    """The friction model."""
     tail_rate: float | None
     """Lab rate of the tail, rad/s; None: the robot's drive."""
     calibrated: bool

@@ -326,21 +326,15 @@ class Rates(NamedTuple):
     """Steady motion, torques and powers from which all other quantities follow; SI, signed about +x."""
 
     speed: PerRobot
-    """U_x."""
     body_rate: PerRobot
-    """Omega_x."""
     tail_rate: PerRobot
-    """omega, in the lab."""
     load: PerRobot
     """T_h of (18)."""
     drive: PerRobot
     """Torque that turns the rotor, or the whole of one piece, against the fluid."""
     shaft: PerRobot
-    """Its power."""
     friction: PerRobot
-    """Power lost to friction."""
     dissipated: PerRobot
-    """Power lost to the fluid."""
     current: PerRobot
     """I of the motor; NaN without one."""
     effective: PerRobot

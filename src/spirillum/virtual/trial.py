@@ -83,7 +83,7 @@ def video_writer(
     target: Path, size: tuple[int, int], fps: float, crf: int, tags: Mapping[str, str]
 ) -> Iterator[FrameWriter]:
     """A writer of a video; it appears, complete, when the block ends."""
-    if target.suffix != ".mp4":
+    if target.suffix.lower() != ".mp4":
         with _png_writer(target, tags) as pngs:
             yield pngs
         return
@@ -256,7 +256,7 @@ def render(
             writable_target(names[name])
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
-    degradation = degradation if target.suffix == ".mp4" else degradation.uncompressed()
+    degradation = degradation if target.suffix.lower() == ".mp4" else degradation.uncompressed()
     seed, setup_errors = Seeded.of({"seed": seed}).seed, SetupErrors.of(setup_errors)
     robot, shown = _shown(robot, run, motion, trial, camera, progress)
     tank = tank_of(robot, camera.view, camera.shrunk, grid=troubles.grid_paper)
@@ -291,7 +291,7 @@ def render(
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
     attributes = {"title": tags["title"], "synthetic": "yes", "robot": robot.name}
     truth = truth_dataset(trajectory, kept / camera.fps, kept, attributes)
-    timed, glass = target.suffix == ".mp4", troubles.glass_cover
+    timed, glass = target.suffix.lower() == ".mp4", troubles.glass_cover
     texts = {
         "setup": setup_text(robot_file, camera, lens, tank.spacing, axis, timed=timed, glass=glass),
         "json": truth_text(written.rates, _facts(written, camera, degradation, troubles, lens)),

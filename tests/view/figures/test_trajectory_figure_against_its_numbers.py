@@ -213,7 +213,11 @@ def test_long_run_shows_means_over_a_turn_of_the_tail(tube_run: Any) -> None:
 @pytest.mark.usefixtures("unplaced")
 def test_title_says_how_far_it_came_in_what_time(tube_run: Any) -> None:
     texts = " ".join(text.get_text() for text in trajectory_figure(tube_run).findobj(Text))
-    assert "swims 2 mm in 2 s and goes 20" in " ".join(texts.split())
+    assert "a robot swims 2 mm in 2 s " in " ".join(texts.split()).replace(str(tube_run.attrs.get("robot")), "a robot")
+    fast = tube_run.assign(mean_forward_velocity_on=1.2345e-3).assign_attrs(roughness=9e-7)
+    said = " ".join(" ".join(text.get_text() for text in trajectory_figure(fast).findobj(Text)).split())
+    assert "mean velocity 1.234 mm/s with the drive on" in said
+    assert "roughness 0.9 µm" in said
 
 
 @pytest.mark.usefixtures("unplaced")

@@ -62,8 +62,9 @@ def _friction(answer: Answer) -> Iterator[str | Detail]:
     only = found[0] if len(found) == 1 and found[0].get("low") is not None else {}
     interval = f" ({only['low']:.4g} to {only['high']:.4g})" if only else ""
     yield (
-        f"B_eff of {counted(len(found), 'tail')} (friction model {answer['friction']}): "
-        f"{low if low == high else f'{low} to {high}'}{interval} N m s/rad, tail by tail in predictions.csv"
+        f"effective rotary friction B_eff, eq. (18), of {counted(len(found), 'tail')} (friction model "
+        f"{answer['friction']}): {low if low == high else f'{low} to {high}'}{interval} N m s/rad, "
+        "tail by tail in predictions.csv"
     )
     if answer.get("effective_friction_statement"):
         yield Detail(answer["effective_friction_statement"])

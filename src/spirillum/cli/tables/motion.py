@@ -227,14 +227,14 @@ def simulation(answer: Answer) -> Blocks:
         yield Detail(f"state at the end: {answer['state']} ({END_STATES[answer['state']]})")
     yield from error_of(answer["error_estimate"])
     whole = f"the part from {answer['begins']['value']:.4g} s on" if "begins" in answer else "the run"
-    yield Detail(f"last 2/3: over the last two thirds of {whole}, on or off")
-    yield Detail(f"steady: {answer['steady']}")
+    yield Detail(f"last 2/3 of run: over the last two thirds of {whole}, on or off")
+    yield Detail(f"steady part: {answer['steady']}")
     yield from files_of(answer, plot="plot", movie="movie", file="trajectory")
 
 
 def _averages(title: str, answer: Answer) -> Table:
     """Means over the last two thirds, while the drive is on, and while the motion is steady."""
-    table = grid(title, "mean", "last 2/3", "while on", "while steady", "unit")
+    table = grid(title, "mean over", "last 2/3 of run", "drive on", "steady part", "unit")
     for name in (name.removesuffix("_on") for name in answer if name.endswith("_on")):
         items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
         most = max((abs(item["value"]) for item in items if item["value"] is not None), default=None)
@@ -258,7 +258,8 @@ _NONE: Answer = {"value": None}  # of the time, which has no mean
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for event in merged_events([(event["time"], event["what"]) for event in events]):
         again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
-        yield f"{event.time:.4g} s: {event.what}{again}"
+        before = " before the run, in the wait" if event.time < 0.0 else ""
+        yield f"{abs(event.time):.4g} s{before}: {event.what}{again}"
 
 
 def _final_values(answer: Answer) -> Iterator[tuple[str, Any]]:

@@ -23,7 +23,7 @@ class Detail(str):
 
 Block = str | Table  #: A line, a detail or a table of an answer; the first one is its title, or has it.
 Blocks = Iterator[Block]
-_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady", "held", "trial", "steady")
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3 of run", "drive on", "steady part", "held", "trial", "steady")
 """Columns of numbers, which are never folded: names are."""
 
 

@@ -118,7 +118,7 @@ def _six_by_six(title: str, block: Sequence[Sequence[float | None]]) -> Table:
 
 
 def preparation(answer: Answer) -> Blocks:
-    """Errors of a table at poses between its nodes, and where it holds."""
+    """Errors of a table between its poses, and where it holds."""
     rows = grid(f"{answer['robot']}: error of its table", "quantity", "largest error without yaw, %", "with yaw, %")
     for name, item in answer["error"].items():
         level = answer["error_without_yaw"][name]

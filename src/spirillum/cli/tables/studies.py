@@ -25,7 +25,7 @@ from spirillum.studies.ranking import ENDS, RANKED, STEADY_SPEED, best_in_words,
 from spirillum.units import display_unit, in_unit
 
 
-def study(answer: Answer, *, rows: int = 10) -> Blocks:
+def study(answer: Answer, *, rows: int = 10, figures: bool = True) -> Blocks:
     """The ranking of `study` first, verdicts on a paper's statements last."""
     sizes = answer["dimensions"]
     robots = sizes["robot"] if "robot" in sizes else sizes["channel"] * sizes["wavelength"] * sizes["amplitude"]
@@ -42,7 +42,7 @@ def study(answer: Answer, *, rows: int = 10) -> Blocks:
     if any(answer["claims"].values()):
         counts = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
         yield f"statements of the paper: {counts}"
-    if "report.html" in answer["files"]:
+    if figures:
         yield f"open {answer['folder']}/report.html"
     else:
         yield f"dataset.nc and ranking.csv in {answer['folder']}; without --no-figures a rerun draws figures and report"

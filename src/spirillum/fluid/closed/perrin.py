@@ -33,13 +33,7 @@ class SpheroidDrag(NamedTuple):
 
 
 def spheroid_drag(viscosity: PerRobot, a: PerRobot, b: PerRobot) -> SpheroidDrag:
-    """Resistance of a spheroid in unbounded fluid.
-
-    Args:
-        viscosity: mu, Pa s.
-        a: semi-axis along the axis of revolution, m.
-        b: semi-axis across it, m.
-    """
+    """Resistance of a spheroid in unbounded fluid, of semi-axes a along the axis of revolution and b across it."""
     from scipy.special import elliprd, elliprf
 
     a2, b2 = a * a, b * b

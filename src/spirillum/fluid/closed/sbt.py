@@ -127,7 +127,6 @@ class HelixFunctions(NamedTuple):
     """Lighthill's dimensionless functions of a helix."""
 
     alpha: PerRobot
-    """Axial over arc length."""
     q: PerRobot
     """-1 - log(eps) + A1, the bracket of (1) and (7)."""
     torque: PerRobot

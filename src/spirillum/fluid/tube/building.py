@@ -65,12 +65,7 @@ class OnAxis:
 
     @classmethod
     def of(cls, pitches: Samples, values: Samples) -> OnAxis:
-        """From raised noses.
-
-        Args:
-            pitches: from 0, increasing, rad.
-            values: Fourier coefficients of the factor, (pitches, phases, 36).
-        """
+        """From raised noses: pitches from 0 and Fourier coefficients of the factor, (pitches, phases, 36)."""
         signs = (_HALF_TURN[:, None] * _HALF_TURN)[np.tril_indices(MOTIONS)]
         harmonic = (np.arange(values.shape[1]) + 1) // 2
         lowered = values[1:] * signs * ((-1.0) ** harmonic)[:, None]
@@ -121,13 +116,7 @@ def built_tables(
     workers: int = 2,
     progress: Progress | None = None,
 ) -> list[TubeTable]:
-    """Solve for the flow at every place of a stage, for every robot, and make their tables.
-
-    Raises:
-        InputError: for a robot without a table, such as one whose tail is wider than its body, or whose flow does not
-            fit into memory.
-        KeyboardInterrupt: if it was interrupted; says how many places are kept.
-    """
+    """Solve for the flow at every place of a stage, for every robot, and make their tables."""
     requests = [_Request.of(Places(geometry, radius, stage)) for geometry, radius in robots]
     wanted = [pose for request in requests for pose in request.poses]
     for request in requests:
@@ -138,7 +127,7 @@ def built_tables(
     start = time.perf_counter()
     films = _start_films(requests, workers)
     try:
-        found = iter(solutions(wanted, "table of the tube", progress, workers))
+        found = iter(solutions(wanted, "poses of the table", progress, workers))
         films.join()
         solved = [_definite(one, [next(found) for _ in one.poses], progress, workers) for one in requests]
     except KeyboardInterrupt as error:
@@ -150,13 +139,11 @@ def built_tables(
 
 @dataclass(frozen=True)
 class _Request:
-    """All poses that are solved for to make one table; the most expensive ones first."""
+    """All poses that are solved for to make one table."""
 
     places: Places
     straight: list[NodeSolution]
-    """Check poses without yaw."""
     yawed: list[NodeSolution]
-    """Check poses with yaw."""
     nodes: list[NodeSolution]
 
     @classmethod
@@ -213,7 +200,7 @@ def _definite(
         request.nodes[n]._replace(fineness=places.fineness(nodes[n].t, nodes[n].pose, stage=FINE, check=True))
         for n in weak
     ]
-    again = solutions(finer, "nodes that need a finer resolution", progress, workers)
+    again = solutions(finer, "poses that need a finer resolution", progress, workers)
     solved = dict(zip((first + n for n in weak), again, strict=True))
     return [solved.get(n, answers) for n, answers in enumerate(found)]
 
@@ -351,12 +338,7 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
 
 
 def _powers(middle: Samples, sides: Samples) -> Samples:
-    """Coefficients of the powers of the stretched yaw from the values at `YAW_SHARES`, (`YAW_ORDERS`, phases, 36).
-
-    Args:
-        middle: values without yaw, (phases, 36).
-        sides: values to the left and to the right, (shares, 2, phases, 36).
-    """
+    """Coefficients of the powers of the stretched yaw from values at `YAW_SHARES`, (orders, phases, 36)."""
     odd, even = 0.5 * (sides[:, 0] - sides[:, 1]), 0.5 * (sides[:, 0] + sides[:, 1]) - middle
     found: Samples = np.tensordot(np.linalg.inv(kernel.yaw_parts_at_nodes()), np.concatenate([odd, even]), axes=1)
     return found

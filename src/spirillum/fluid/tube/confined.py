@@ -35,7 +35,6 @@ class Strengths:
     tractions: tuple[Samples, Samples]
     """Modes of the tractions, even and odd, (unknowns, 13)."""
     wires: tuple[Wire, ...]
-    """Wires, in the axes used here."""
     forces: Samples
     """At the wires' stations, in the axes used here, (3 stations, 13)."""
 
@@ -57,13 +56,7 @@ class Held:
 
 
 def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
-    """Resistance of two rigid parts in a tube with no net flux, twists about the origin.
-
-    Args:
-        solids: solids and wall.
-        wires: wires at their phase, in body axes, and the part (0 body, 1 rotor) with which each moves.
-        drop: how far the wires lie below where they turn, m.
-    """
+    """Resistance of two rigid parts in a tube with no net flux, twists about the origin; wires lie `drop` lower."""
     with one_thread():
         if solids.none:
             return _wires_alone(_Link.of(solids, wires, drop))
@@ -152,7 +145,7 @@ class _Link:
         # from forces in robot axes to those in the tube's
         along = np.asarray(np.kron(np.eye(len(points)), pose.rotation), dtype=np.float64)
         mobility = system.mobility.copy()
-        mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
+        mobility[:forces, :forces] -= along.T @ point_reflection(placed, own, solids.fineness.precision) @ along
         start = 0
         for wire in lines:
             here = slice(start, start + wire.points.size)

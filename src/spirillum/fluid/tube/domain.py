@@ -90,21 +90,16 @@ def pose_limits(
 ) -> list[Limit]:
     """Requirements on the pose in the tube for one of `PIECES`, after those that do not depend on it.
 
-    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine
-    for the memory.
-
-    Args:
-        batch: the robots.
-        part: one of `PIECES`.
-        kept: what the robots have to fulfil in unbounded fluid, the number of stations along the tail among it.
-        thinnest_gap: least gap under the body, over its diameter.
-        wire_film: least film between wire and wall, over the wire's radius.
+    No clearance is computed for robots that cannot be built or break one of the former: their wires may be too fine for
+    the memory. The least gap is over the body's diameter, the least film at the wire over the wire's radius.
     """
     fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
     through = f"the tail would pass through the wall ({fields})"
     resolved = f"the clearance of the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, kept, thinnest_gap)
     turned = _turned(batch)
+    share = batch.pose.eccentricity
+    gap = "placement.gap" if share is None else f"placement.eccentricity = {share:g}: gap"
     open_ended = batch.placement.ends == "open"
     thinnest = thinnest_gap * batch.body_diameter
     return [
@@ -145,11 +140,9 @@ def pose_limits(
             "else it cuts into the wall; a smaller placement.pitch or placement.yaw leaves more room",
             "gap-too-wide",
         ),
+        Limit.of(gap, films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"),
         Limit.of(
-            "placement.gap", films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"
-        ),
-        Limit.of(
-            "placement.gap",
+            gap,
             np.where(np.isinf(films.asked), 0.0, films.asked),
             "at most",
             films.largest,

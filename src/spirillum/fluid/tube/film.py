@@ -126,19 +126,7 @@ _STANDARD = _Resolution()
 def film_resistance(
     outline: Outline, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0
 ) -> Matrix6:
-    """Resistance of the lubrication film between a body and a tube's wall, per viscosity, m, m^2 and m^3.
-
-    Args:
-        outline: outline of the body.
-        radius: R of the tube, m.
-        e: offset of the body's middle from the tube's axis, m, at least 0.
-        p: pitch, rad, positive where the nose points away from the wall.
-        psi: yaw, rad, positive where the nose points to +y.
-        fineness: factor of the polynomial degrees, to show their convergence.
-
-    Returns:
-        R in frame F about the body's middle: force and torque on the body are -mu R (U, Omega).
-    """
+    """R/mu of the lubrication film in frame F about the body's middle; p is off the wall, psi to +y."""
     return resistance_of(FilmBody.of(outline), radius, e, p, psi, fineness=fineness)
 
 
@@ -241,17 +229,7 @@ class FilmTable:
         yaws: int = _YAWS,
         step: Callable[[float], None] | None = None,
     ) -> FilmTable:
-        """Tabulate the lubrication film of a body, in half a minute of one core.
-
-        Args:
-            outline: outline of the body.
-            radius: R of the tube, m.
-            yaw: largest yaw, rad; less if the body has not that much room.
-            pitch: largest pitch for which clearances are within the splines, rad.
-            intervals: intervals of the splines, to show their convergence.
-            yaws: polynomials in yaw; one is for a body without yaw.
-            step: called with the share that is done.
-        """
+        """Tabulate the lubrication film of a body up to a yaw and a pitch, rad, in half a minute of one core."""
         body = FilmBody.of(outline)
         head = _head(body, radius, yaw, pitch, intervals)
         head[table.YAWS] = yaws

@@ -54,7 +54,6 @@ class FilmBody:
     """Geometry of a body of revolution for its lubrication film, about its mid-length; lengths in m."""
 
     radius: float
-    """a."""
     half: float
     """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
     rear: tuple[float, float]
@@ -74,11 +73,7 @@ class FilmBody:
 
     @classmethod
     def of(cls, outline: Outline) -> FilmBody:
-        """Read an outline; of a profile what can near the wall, with circles for its ends or a spheroid for all of it.
-
-        Raises:
-            InputError: for a profile that these are not near enough to.
-        """
+        """Read an outline; of a profile what can near the wall, with circles for its ends or one spheroid."""
         if any(isinstance(piece, Smooth) or _is_slanted(piece) for piece in outline.pieces):
             return _of_profile(outline)
         sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Segment) and p.start[1] == p.end[1] > 0]
@@ -179,13 +174,9 @@ class FilmSurface(NamedTuple):
     points: Samples
     normals: Samples
     along: Samples
-    """Derivative of the points by u."""
     across: Samples
-    """Derivative of the points by v."""
     turning_along: Samples
-    """Derivative of the normals by u."""
     turning_across: Samples
-    """Derivative of the normals by v."""
 
 
 class Cuts(NamedTuple):

@@ -130,12 +130,7 @@ _HELD = [0, 1, 3, 4]
 
 
 def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
-    """Rates of a table per U along the tube, rates about the motor axis of body and rotor, and mean flow, (..., 8, 4).
-
-    Args:
-        pitch: nose up, rad, (...).
-        yaw: nose to the left, rad, (...).
-    """
+    """Rates of a table per U along the tube, body and rotor rates and mean flow, (..., 8, 4)."""
     found = np.zeros((*np.shape(pitch), MOTIONS, len(_HELD)))
     found[..., 0, 0] = np.cos(pitch) * np.cos(yaw)
     found[..., 1, 0] = -np.sin(yaw)
@@ -148,14 +143,7 @@ def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
 def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: Samples) -> Samples:
     """Resistance along the tube at poses, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
 
-    Args:
-        tables: packed tables of the robots, one in each row.
-        gap: smallest distances between body and wall, m, (..., robots).
-        pitch: nose up, rad, (..., robots).
-        yaw: nose to the left, rad, (..., robots).
-
-    Returns:
-        Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
+    Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
     """
     found = np.empty((gap.size, MOTIONS, MOTIONS))
     which = np.broadcast_to(np.arange(len(tables)), gap.shape)

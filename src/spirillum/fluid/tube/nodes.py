@@ -68,9 +68,7 @@ class Places:
 
     geometry: RobotGeometry
     radius: float
-    """R of the tube."""
     stage: Stage = FINE
-    """Nodes and resolution."""
 
     @cached_property
     def rings(self) -> Samples:
@@ -136,7 +134,7 @@ class Places:
     def yaw_gaps(self) -> Samples:
         """Coordinates t of the nodes with yaw."""
         last = len(self.gaps) - 1
-        return self.gaps[sorted({0, last // 2, last - 1, last})]
+        return self.gaps[sorted({0, (last - 1) // 2, last - 1, last})]
 
     @property
     def yaw_pitches(self) -> Samples:

@@ -103,17 +103,29 @@ def _solutions(
     """As `solutions`, node by node."""
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
-    numbered, saved = list(enumerate(places)), "; completed nodes are saved"
+    numbered, saved = list(enumerate(places)), "; completed poses are saved"
     known = [number for number, place in numbered if all_kept([place])]  # they take no time, and tell of no pace
     for number in known:
         found[number] = _solve(places[number])
     tell(what, len(known), len(places))
-    missing = [one for one in numbered if one[0] not in known]
+    missing = _mixed([one for one in numbered if one[0] not in known])
     answers = imap_unordered(_solve_numbered, missing, workers, besides=saved, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=len(known) + 1):
         found[number] = answer
         tell(what, done, len(places))
     return found
+
+
+def _mixed(numbered: Sequence[tuple[int, NodeSolution]]) -> list[tuple[int, NodeSolution]]:
+    """Cheap and expensive nodes evenly spread, those of each resolution and tilt in their order.
+
+    The time that is left is then that of the mean pace; it would else be judged by the most expensive ones.
+    """
+    kinds: dict[tuple[Fineness, bool, bool], list[tuple[int, NodeSolution]]] = {}
+    for one in numbered:
+        kinds.setdefault((one[1].fineness, one[1].pose.level, one[1].pose.yaw == 0.0), []).append(one)
+    spread = [((rank + 0.5) / len(kind), one) for kind in kinds.values() for rank, one in enumerate(kind)]
+    return [one for _, one in sorted(spread, key=lambda pair: (pair[0], pair[1][0]))]
 
 
 _LOWER = np.tril_indices(RATES)
@@ -137,10 +149,7 @@ def factor_of(matrix: Samples, where: str) -> Samples:
 def fourier(values: Samples, size: int = 0, starts: int = 1) -> Samples:
     """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0.
 
-    Args:
-        values: (phases, ...), at `even_phases` of a tail with so many starts.
-        size: least number of coefficients: those that so few phases do not give are zero.
-        starts: wires of the tail, by which harmonics of a turn go; those above `size` are left out.
+    A tail with several starts has harmonics of its turn over them only; those that so few phases do not give are zero.
     """
     count = len(values)
     phase = 2.0 * np.pi * np.arange(count) / count
@@ -187,13 +196,7 @@ def seen_in_mirror(matrices: Samples) -> Samples:
 
 
 def outer_resistance(matrices: Samples, film: Samples, t: float) -> Samples:
-    """The outer part of resistances, (phases, 8, 8).
-
-    Args:
-        matrices: (phases, 8, 8).
-        film: of the body at that pose, (6, 6).
-        t: of the place.
-    """
+    """The outer part of resistances, (phases, 8, 8), of which the film's is (6, 6)."""
     rest = matrices.copy()
     rest[:, :6, :6] -= cut_of_film(t) * film
     found: Samples = 0.5 * (rest + np.swapaxes(rest, 1, 2))
@@ -206,14 +209,6 @@ def is_positive_definite(matrices: Samples) -> bool:
 
 
 def rest_at(matrices: Samples, film: Samples, t: float, pose: TubePose, starts: int = 1) -> Samples:
-    """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36).
-
-    Args:
-        matrices: at evenly spread phases from 0, as many as matter there, (phases, 8, 8).
-        film: of the body at that pose, (6, 6).
-        t: of the place.
-        pose: named where the rest is not positive definite.
-        starts: wires of the tail.
-    """
+    """Fourier coefficients of the factor of the outer resistance, (`PHASES`, 36)."""
     where = f"at an offset of {show(pose.offset, 'mm')} and a pitch of {show(pose.pitch, 'deg')}"
     return fourier(factor_of(outer_resistance(matrices, film, t), where), PHASES, starts)

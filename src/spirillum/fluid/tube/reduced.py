@@ -49,7 +49,7 @@ class Answers:
     free: tuple[tuple[int, int, Samples], ...]
     """Parity, mode, and coefficients from ring sources, (fields, sources)."""
     wall: tuple[Samples, ...]
-    """Coefficients from waves at points, for each k, (fields, 2, parities, orders, 3)."""
+    """Coefficients from waves at points, for each k, (orders, parities, 2, 3, fields)."""
     parities: tuple[int, ...]
     """Of those waves."""
 
@@ -67,13 +67,10 @@ class Reduced:
     """Coupling of wires and solids at any phase in the reduced basis."""
 
     sources: Sources
-    """The wires, at any phase."""
     waves: WallWaves
-    """Between wires and solids."""
     away: float
     """Smallest distance of the solids from the wall, m."""
     answers: tuple[Answers, ...]
-    """For each system."""
 
     @classmethod
     def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:
@@ -95,8 +92,10 @@ class Reduced:
         received = solids.rings.received(waves, [system for _, system in picked], away)
         found = []
         for number, (wall, (rows, _)) in enumerate(zip(walls, picked, strict=True)):
-            gather = np.linalg.pinv(wall[rows])
-            fields = [np.tensordot(gather, values[number], axes=1) for values in received]
+            gather = np.linalg.pinv(wall[rows]).T
+            fields = [
+                np.tensordot(values[number], gather, axes=1).astype(solids.fineness.precision) for values in received
+            ]
             found.append(_answers(solids, number, crossing, _sizes(sources), wall, fields))
         edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
         return [
@@ -109,13 +108,7 @@ class Reduced:
         return self.sources.alike(sources)
 
     def coefficients(self, sources: Sources, placed: Samples, along: Samples) -> list[Samples]:
-        """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n).
-
-        Args:
-            sources: the wires at their phase.
-            placed: their stations about the tube's axis, (n, 3), m.
-            along: from forces in the robot's axes to the tube's, (3 n, 3 n).
-        """
+        """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""
         found = []
         for answers, wall in zip(self.answers, self._reflected(placed), strict=True):
             free: list[Samples] = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
@@ -131,17 +124,18 @@ class Reduced:
     def _reflected(self, placed: Samples) -> list[Samples]:
         """Fields that the wall reflects of unit forces at points about its axis, for each system, (fields, 3 n)."""
         points, distances, back = from_the_wall(placed, self.waves.radius)
+        precision = self.answers[0].wall[0].dtype.type
 
         def reflected(numbers: range) -> list[Samples]:
-            found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+            found: list[Samples] = [np.zeros((answers.wall[0].shape[-1], placed.size)) for answers in self.answers]
             for number in numbers:
                 for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
                     here = 3 * there.size
-                    at_points = point_waves(points[: there.size], self.waves, number, low, high)
+                    at_points = point_waves(points[: there.size], self.waves, number, low, high, precision)
                     for total, answers in zip(found, self.answers, strict=True):
-                        matrix = answers.wall[number][:, :, :, low:high]
-                        sent = at_points[:, :, answers.parities, : matrix.shape[3]].reshape(here, -1)
-                        total[:, :here] += matrix.reshape(len(matrix), -1) @ sent.T
+                        matrix = answers.wall[number][low:high]
+                        sent = at_points[: len(matrix), answers.parities].reshape(-1, here)
+                        total[:, :here] += matrix.reshape(-1, len(total)).T @ sent
             return found
 
         shares = summed(reflected, self.waves.k.size)
@@ -226,16 +220,7 @@ def _duals(system: System) -> Samples:
 def _answers(
     solids: Solids, number: int, crossing: list[Samples], sizes: Samples, wall: Samples, coefficients: list[Samples]
 ) -> Answers:
-    """Solids' response of one system.
-
-    Args:
-        solids: solids and wall.
-        number: of the system.
-        crossing: see `_unbounded`.
-        sizes: see `_sizes`.
-        wall: basis of the fields that the wall reflects, (unknowns, fields).
-        coefficients: of those, see `Answers`.
-    """
+    """Solids' response of one system to fields that the wall reflects, (unknowns, fields), and their coefficients."""
     system = solids.systems[number]
     dual = _duals(system)
     root = np.sqrt(dual)[:, None]

@@ -36,11 +36,9 @@ class Fineness:
     """Resolution of the flow in a tube."""
 
     wire: Accuracy = "standard"
-    """Form of the wires."""
     tolerance: float = 1e-4
     """At which Fourier modes are cut off."""
     order: int = 8
-    """Gauss nodes of a panel."""
     panel: float = 2.5
     """Longest panels over the length on which the film's traction varies."""
     growth: float = 0.0
@@ -48,9 +46,7 @@ class Fineness:
     wires: float = 1e-3
     """Coarsest tolerance of waves to and from wires."""
     slack: float = SLACK
-    """See `WallWaves.slack`."""
     crowd: float = CROWD
-    """See `wall.CROWD`."""
 
     @property
     def damping(self) -> float:
@@ -163,12 +159,7 @@ class Solids:
         return TiltedRings(self.panels, self.pose, self.counts, self.fineness.precision)
 
     def waves(self, distance: float, wires: Samples | None = None) -> WallWaves:
-        """The waves that matter between the solids, or solids and wires.
-
-        Args:
-            distance: mean of the smallest distances of both from the wall, m.
-            wires: where along the tube they are, m.
-        """
+        """The waves that matter between the solids, or solids and wires, at a mean distance from the wall."""
         x, fineness = self.panels.x.ravel(), self.fineness
         if wires is None:
             return fineness.waves(self.pose.radius, x, distance, fineness.damping)

@@ -45,7 +45,6 @@ class Stage:
     resolutions: dict[tuple[Where, Tilt], Fineness]
     """Resolution of the flow at nodes."""
     seconds: tuple[float, float]
-    """Time that a node takes one process of a fast and of a slow machine, s."""
     held_out: int
     """Poses without yaw, and with it, from which the table's errors are stated."""
     checks: dict[tuple[Where, Tilt], Fineness]
@@ -60,9 +59,7 @@ class Stage:
     accuracy: float = 2.0
     """Largest relative error that it should have, over that of the finest stage."""
     yawed: bool = True
-    """Whether it has yawed nodes."""
     film_yaws: int = 5
-    """Polynomials in yaw of the film."""
     film_intervals: int = 15
     """Intervals of its splines: with 11 it is within 0.4 %."""
 
@@ -106,19 +103,19 @@ _TIGHT_CHECKS = {place: fineness for place, fineness in _FINEST.items() if place
 YAW = Stage(
     "yaw",
     up=(0.0, 0.5, 0.85, 1.0),
-    down=(0.0, 0.3, 0.8, 1.0),
-    upper=(0.65, 1.0),
-    phases=((0.0, 7), (0.7, 5), (3.0, 3)),
+    down=(0.0, 0.4, 0.85, 1.0),
+    upper=(0.45, 0.75, 1.0),
+    phases=((0.0, 7), (0.5, 5), (3.0, 3)),
     resolutions=_COARSE,
-    seconds=(3.3, 8.0),
+    seconds=(2.7, 7.0),
     held_out=3,
     checks=_COARSE | _TIGHT_CHECKS | {("near", "yawed"): _FINER},
-    hardest=((0.06, -0.93), (0.05, -0.15), (0.94, 0.3), (0.7, 0.0)),
-    hardest_yawed=((0.01, -0.65, 0.42), (0.94, 0.05, 0.95), (0.2, 0.89, 0.92)),
-    growth=3.0,
+    hardest=((0.08, -0.7), (0.92, 0.97), (0.15, 0.97), (0.98, 0.3)),
+    hardest_yawed=((0.01, -0.65, 0.4), (0.98, 0.05, 0.97), (0.13, 0.89, -0.97)),
+    growth=2.6,
     film_intervals=11,
 )
-STRAIGHT = replace(YAW, name="straight", seconds=(2.0, 4.5), held_out=4, yawed=False, film_yaws=1)
+STRAIGHT = replace(YAW, name="straight", seconds=(1.4, 3.5), held_out=4, yawed=False, film_yaws=1)
 FINE = Stage(
     "fine",
     up=(0.0, 0.33, 0.66, 0.88, 1.0),
@@ -161,11 +158,7 @@ RESPONSES = {
 
 
 def response_of(matrix: Samples) -> Samples:
-    """Response to a tail turning at 1 rad/s, constrained laterally and in tilt, closed ends, viscosity 1.
-
-    Returns:
-        Forward velocity, body rate, forces y and z, torques y and z of the fluid, and the normal resistance, (7,).
-    """
+    """Response `RESPONSES` to a tail turning at 1 rad/s, held laterally and in tilt, closed ends, viscosity 1, (7,)."""
     free = [0, 3]
     tail = matrix[:, 6]  # the rotor's lab rate is Omega + omega_m = 1
     a = matrix[np.ix_(free, free)] - np.outer(tail[free], [0.0, 1.0])
@@ -179,11 +172,8 @@ def response_of(matrix: Samples) -> Samples:
 def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None) -> Samples:
     """Errors of `RESPONSES`, over the size of what acts on the robot, sideways force and torques over those in all.
 
-    Args:
-        matrix: the 8x8 judged.
-        true: what it should be.
-        turn: of the place at phases over a turn of the tail, (n, 8, 8): sizes are then root mean squares over them, for
-            a force that nearly vanishes at one phase moves nothing; None: sizes are those of `true`.
+    With matrices over a turn of the tail sizes are root mean squares over them, for a force that nearly vanishes at one
+    phase moves nothing.
     """
     a, b = response_of(matrix), response_of(true)
     sizes = np.stack([response_of(some) for some in (true[None] if turn is None else turn)])

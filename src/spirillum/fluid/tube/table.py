@@ -73,11 +73,7 @@ def _compressed(content: bytes) -> bytes:
 
 
 def _opened(path: Path) -> bytes:
-    """The content of a file of `_compressed`.
-
-    Raises:
-        ValueError: if it is none.
-    """
+    """The content of a file of `_compressed`, or a ValueError."""
     content = unsealed(read_bytes(path, "a table", _LARGEST_FILE))
     if content is None:
         raise ValueError("damaged")
@@ -88,11 +84,7 @@ def _opened(path: Path) -> bytes:
 
 
 def packed_from(path: Path) -> tuple[dict[str, Any], Samples]:
-    """Head and packed table from a file, and from the one beside it that has its film.
-
-    Raises:
-        ValueError: if it is none.
-    """
+    """Head and packed table from a file, and from the one beside it that has its film, or a ValueError."""
     words, _, coded = _opened(path).partition(b"\n")
     head = json.loads(words)
     film = head.pop("film", None)
@@ -187,7 +179,6 @@ class TubeTable:
     """Table of one robot in one tube."""
 
     geometry: RobotGeometry
-    """Everything of the robot that decides the table."""
     radius: float
     """R of the tube, m."""
     packed: Samples = field(repr=False)
@@ -199,11 +190,9 @@ class TubeTable:
     places: int
     """Number of nodes that were solved for."""
     seconds: float
-    """Time that it took."""
     wire: float | None = None
     """Relative error of the forward velocity against the finest form of the wire; None: the largest measured one."""
     stage: StageName = "fine"
-    """Nodes and resolution."""
 
     @property
     def error_against(self) -> str:
@@ -232,19 +221,11 @@ class TubeTable:
         return out, int(left)
 
     def error_at(self, yaw: float) -> Mapping[str, float]:
-        """Largest relative errors at poses with or without a yaw.
-
-        Args:
-            yaw: nose to the side, rad.
-        """
+        """Largest relative errors at poses with or without a yaw."""
         return self.error if yaw else self.error_without_yaw
 
     def speed_error_at(self, yaw: float) -> float:
-        """Relative error of the forward velocity: of the interpolation, the wire and the solids together.
-
-        Args:
-            yaw: nose to the side, rad.
-        """
+        """Relative error of the forward velocity: of the interpolation, the wire and the solids together."""
         known = LARGEST_WIRE_ERROR if self.wire is None else self.wire
         return float(self.error_at(yaw)["forward_velocity"]) + known + FINEST_WIRE_ERROR + SOLIDS_ERROR
 
@@ -297,11 +278,7 @@ def _read(path: Path) -> TubeTable | None:
 
 
 def _checked(table: TubeTable) -> TubeTable:
-    """A table that is whole, with errors that are numbers.
-
-    Raises:
-        ValueError: if it is not.
-    """
+    """A table that is whole, with errors that are numbers, or a ValueError."""
     stated = [mapping[name] for mapping in (table.error, table.error_without_yaw) for name in RESPONSES]
     numbers = (0.0 if table.wire is None else table.wire, table.radius, table.seconds, table.places, *stated)
     if (

@@ -27,12 +27,12 @@ _MOST_VALUES = 500_000
 
 
 def _add_product(left: Samples, right: Samples, total: Samples) -> None:
-    """Add left @ right.T in place to a matrix in column-major order; memory-bound for few columns."""
+    """Add left.T @ right in place to a matrix in column-major order; memory-bound for few columns."""
     from scipy.linalg.blas import dgemm, sgemm
 
     if total.size:
         product = sgemm if total.dtype == np.float32 else dgemm
-        product(1.0, left.T, right.T, 1.0, total, trans_a=True, overwrite_c=True)
+        product(1.0, left.T, right.T, 1.0, total, trans_b=True, overwrite_c=True)
 
 
 class _Tier(NamedTuple):
@@ -46,19 +46,17 @@ class _Tier(NamedTuple):
     """Their nodes."""
     averaged: _Sample
     """More nodes, and averages over them; near the wall only."""
-    rows: tuple[tuple[np.ndarray, ...], ...]
-    """[parity][mode]: which of their 3 nodes bear it."""
+    columns: tuple[np.ndarray, ...]
+    """[system]: where its unknowns stand among the modes on these panels: component, node, family, mode."""
     unknowns: tuple[np.ndarray, ...]
     """[system]: the unknowns that these are."""
 
 
 class _Sample(NamedTuple):
-    """Rings on which waves are evaluated."""
+    """Rings on which waves are evaluated, (panels, q), m."""
 
     x: Samples
-    """(panels, q), m."""
     rho: Samples
-    """(panels, q), m."""
     average: Samples | None
     """From them to the nodes, (panels, p, q); None where they are the nodes."""
 
@@ -91,10 +89,10 @@ class TiltedRings(Rings):
             place = np.full(3 * self.panels.size, -1)
             place[np.repeat(nodes, 3)] = np.arange(3 * np.count_nonzero(nodes))
             modes = int(self.counts[nodes].max())
-            of_mode, unknowns = [], []
+            columns, unknowns = [], []
             for system in systems:
                 local = [[place[bearing] for bearing in family.of_mode] for family in system]
-                of_mode += [tuple(part[part >= 0] for part in family[:modes]) for family in local]
+                columns.append(_columns(local, modes, int(np.count_nonzero(nodes))))
                 unknowns.append(np.flatnonzero(np.concatenate([part for family in local for part in family]) >= 0))
             if bearing is None:
                 sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
@@ -102,7 +100,7 @@ class TiltedRings(Rings):
                 sample = _Sample(self.panels.x.ravel()[nodes, None], self.panels.rho.ravel()[nodes, None], None)
             near = bearing is None and number < _AVERAGED_TIERS
             averaged = _Sample(*(values[here] for values in fine)) if near else sample
-            tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
+            tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(columns), tuple(unknowns)))
         return tiers
 
     def subtract(self, waves: WallWaves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
@@ -141,9 +139,9 @@ class TiltedRings(Rings):
                     far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
                     count = min(count_a, count_b, far)
                     for s in range(len(systems)) if count else ():
-                        left, right = (some[s][..., :count, :] for some in (pressed, sources))
+                        left, right = (some[s][:count].reshape(-1, some[s].shape[-1]) for some in (pressed, sources))
                         with locks[a, b, s]:
-                            _add_product(left.reshape(len(left), -1), right.reshape(len(right), -1), blocks[a, b, s])
+                            _add_product(left, right, blocks[a, b, s])
 
         each(lessen, range(waves.k.size))
         duals = [np.concatenate([family.dual for family in system]) for system in systems]
@@ -161,7 +159,7 @@ class TiltedRings(Rings):
         sizes = [sum(family.dual.size for family in system) for system in systems]
         found: list[Samples] = [np.zeros((size, forces.shape[1])) for size in sizes]
         parities = [[family.parity for family in system] for system in systems]
-        lock = Lock()
+        lock, forces = Lock(), forces.astype(self.precision)
 
         def add(number: int) -> None:
             onto_wall = sent_to_wall(waves, number, points, forces)
@@ -169,8 +167,8 @@ class TiltedRings(Rings):
                 count = waves.orders_between(number, 0.5 * (tier.distance + away))
                 reached = self._on_rings(waves, number, tier.sample, tier, count, away, self.precision) if count else ()
                 for s, target in enumerate(reached):
-                    right = onto_wall[:, :, parities[s], :count].reshape(len(onto_wall), -1).astype(self.precision)
-                    block = target.reshape(len(target), -1) @ right.T
+                    right = onto_wall[:count, parities[s]].reshape(-1, forces.shape[1])
+                    block = target.reshape(-1, target.shape[-1]).T @ right
                     with lock:
                         found[s][tier.unknowns[s]] += block
 
@@ -187,12 +185,12 @@ class TiltedRings(Rings):
 
         def on(number: int) -> list[Samples]:
             counts = [waves.orders_between(number, 0.5 * (tier.distance + away)) for tier in tiers]
-            shapes = [(size, 2, len(system), max(1, *counts), 3) for size, system in zip(sizes, systems, strict=True)]
+            shapes = [(max(1, *counts), len(system), 2, 3, size) for size, system in zip(sizes, systems, strict=True)]
             found = [np.zeros(shape) for shape in shapes]
             for tier, count in zip(tiers, counts, strict=True):
                 fields = self._on_rings(waves, number, tier.sample, tier, count, away) if count else []
                 for values, unknowns, field in zip(found, tier.unknowns, fields, strict=False):
-                    values[unknowns, :, :, :count] = field
+                    values[:count, ..., unknowns] = field
             return [times_layers(values, waves, number) for values in found]
 
         return each(on, range(waves.k.size))
@@ -207,46 +205,40 @@ class TiltedRings(Rings):
         away: float,
         precision: type[np.floating] = np.float64,
     ) -> list[Samples]:
-        """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
+        """Waves of one k on the unknowns of a tier, for each system, (orders, parities, 2, 3, unknowns).
 
         The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
         waves are damped but where a ring nears the wall: they are evaluated on that arc only.
         """
         symmetric = self.pose.yaw == 0
         theta = midpoints(orders, tier.modes, whole=not symmetric)
-        onto = [[part.astype(precision) for part in projectors(theta, tier.modes, parity)] for parity in (0, 1)]
-        sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
+        onto = _onto_modes(theta, tier.modes, precision, symmetric=symmetric)
         panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
-        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3), precision) for waved in sources]
+        modes = np.zeros((orders, 2, 2, 3, 3, panels * order, onto.shape[-1]), precision)
         some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
         for first in range(0, panels, some):
             chunk = slice(first, first + some)
-            nodes = slice(first * order, (first + some) * order)
-            average = None if sample.average is None else sample.average[chunk].astype(precision)
             rings = self._around(sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta)
-            distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=1)
+            distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=0)
             for low, high, arc in waves.bands(number, distances, away, orders):
-                field = self._waves(waves, number, theta[arc], rings[arc], low, high, precision)
-                for family, waved in enumerate(sources):
-                    for column, parity in enumerate(waved):
-                        for component, projector in enumerate(onto[family]):
-                            part = projector[:, arc] @ field[component, parity].reshape(arc.size, -1)
-                            if average is not None:
-                                part = np.matmul(average, part.reshape(tier.modes, *average.shape[::2], -1))
-                            shaped = part.reshape(tier.modes, -1, 2, high - low, 3)
-                            modes[family][:, nodes, component, :, column, low:high] = shaped
-        flat = [values.reshape(tier.modes, -1, *values.shape[3:]) for values in modes]
-        families = [
-            np.concatenate([values[rows] for values, rows in zip(family, of_mode, strict=True)])
-            for family, of_mode in zip(flat, tier.rows, strict=True)
-        ]
-        return families if symmetric else [np.concatenate(families)]
+                field = self._waves(waves, number, theta[arc], rings[:, arc], low, high, precision)
+                values = np.matmul(field.reshape(2, 3, -1, arc.size), onto[:, :, arc])
+                if sample.average is not None:
+                    average = sample.average[chunk].astype(precision)
+                    values = np.matmul(average, values.reshape(2, 3, len(average), average.shape[2], -1))
+                values = values.reshape(2, 3, -1, high - low, 2, 3, onto.shape[-1])
+                there = slice(first * order, (first + some) * order)
+                modes[low:high, :, :, :, :, there] = values.transpose(3, 0, 4, 5, 1, 2, 6)
+        flat = modes.reshape(orders, 2, 2, 3, -1)
+        if symmetric:
+            return [flat[:, p : p + 1].take(columns, axis=-1) for p, columns in enumerate(tier.columns)]
+        return [flat.take(columns, axis=-1) for columns in tier.columns]
 
     def _around(self, x: Samples, rho: Samples, theta: Samples) -> Samples:
-        """Points around rings, about the tube's axis, (angles, rings, 3), m."""
-        shape = theta.size, x.size
-        up, right = np.cos(theta)[:, None] * rho, np.sin(theta)[:, None] * rho
-        points = np.stack([np.broadcast_to(x, shape), up, right], axis=-1)
+        """Points around rings, about the tube's axis, (rings, angles, 3), m."""
+        shape = x.size, theta.size
+        up, right = np.outer(rho, np.cos(theta)), np.outer(rho, np.sin(theta))
+        points = np.stack([np.broadcast_to(x[:, None], shape), up, right], axis=-1)
         return self.pose.placed(points.reshape(-1, 3)).reshape(*shape, 3)
 
     def _waves(
@@ -261,21 +253,34 @@ class TiltedRings(Rings):
     ) -> Samples:
         """Waves of one k and some orders on arcs of rings.
 
-        Args:
-            waves: which.
-            number: of the node in k.
-            theta: angles about the rings' axis, (angles,).
-            placed: points there, about the tube's axis, (angles, rings, 3), m.
-            low: first order.
-            high: order after the last.
-            precision: in which they are kept.
-
-        Returns:
-            component; even, odd; angle; ring; real, imaginary; order; wall component.
+        Over even, odd; component; ring; order; real, imaginary; wall component; angle. `placed`: points on the arcs
+        about the tube's axis, (rings, angles, 3), m.
         """
         from spirillum.kernels.stokes_flow import ring_waves, single_ring_waves
 
-        out = np.empty((3, 2, *placed.shape[:2], 2, high - low, 3), precision)
+        out = np.empty((2, 3, len(placed), high - low, 2, 3, theta.size), precision)
         fill = ring_waves if precision is np.float64 else single_ring_waves
         fill(float(waves.k[number]), waves.radius, placed, theta, self.pose.rotation, low, out)
         return out
+
+
+def _columns(families: Sequence[Sequence[np.ndarray]], modes: int, nodes: int) -> np.ndarray:
+    """Where the unknowns of a system stand among component, node, family and mode; of each mode rows of 3 a node."""
+    width = modes * len(families)
+    places = [
+        ((rows % 3) * nodes + rows // 3) * width + family * modes + mode
+        for family, of_mode in enumerate(families)
+        for mode, borne in enumerate(of_mode[:modes])
+        for rows in [borne[borne >= 0]]
+    ]
+    return np.concatenate(places)
+
+
+def _onto_modes(theta: Samples, modes: int, precision: type[np.floating], *, symmetric: bool) -> Samples:
+    """From even and odd waves around rings to modes: parity of the wave, component, angle, mode.
+
+    Even waves move the even family only where rings and waves are mirror images of themselves, else both families.
+    """
+    even, odd = (np.stack(projectors(theta, modes, parity)).astype(precision) for parity in (0, 1))
+    moved = [even, odd] if symmetric else [np.concatenate([even, odd], axis=1)] * 2
+    return np.stack(moved).swapaxes(2, 3)

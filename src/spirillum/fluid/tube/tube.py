@@ -157,13 +157,7 @@ def is_solved(geometry: RobotGeometry, pose: TubePose, fineness: Fineness, phase
 def solved_together(
     tails: Sequence[tuple[RobotGeometry, tuple[float, ...]]], pose: TubePose, fineness: Fineness
 ) -> list[Samples]:
-    """As `solved`, (phases, 13, 13) for each of some robots that differ in their tails: wall and body are shared.
-
-    Args:
-        tails: robots, and the phases of their tails, rad.
-        pose: where they are.
-        fineness: how finely the flow is resolved.
-    """
+    """As `solved`, (phases, 13, 13) for each of some robots that differ in their tails: wall and body are shared."""
     keys = {_solid_key(g, "robot", pose, fineness) for g, _ in tails}
     if len(keys) != 1:
         raise ValueError("robots that differ in more than their tails")

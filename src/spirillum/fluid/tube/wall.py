@@ -93,16 +93,7 @@ class WaveBand(NamedTuple):
 def waves_between(
     radius: float, reach: float, distance: float, tolerance: float, slack: float = SLACK, crowd: float = CROWD
 ) -> WallWaves:
-    """The waves that matter between things in a tube.
-
-    Args:
-        radius: of the tube, m.
-        reach: largest axial distance between them, m.
-        distance: mean of their smallest distances from the wall, m.
-        tolerance: waves are kept until they are damped by this much, there and back.
-        slack: see `WallWaves.slack`.
-        crowd: see `CROWD`.
-    """
+    """The waves that matter between things in a tube, until they are damped by a tolerance there and back."""
     steepest = -np.log(tolerance) / (2.0 * distance)
     step = 2.0 * np.pi / (reach - np.log(tolerance) / _DECAY * radius)
     lowest = float(np.clip(0.1 * tolerance, _LOWEST, _MOST_LOWEST))
@@ -168,32 +159,29 @@ def weighted_layers(waves: WallWaves, number: int) -> Samples:
     return layers
 
 
-def times_layers(waves_at: Samples, waves: WallWaves, number: int, first: int = 0) -> Samples:
-    """Waves (..., orders, 3) times the wall's single layer; some of the orders, from the first one, will do."""
-    flat = np.moveaxis(waves_at, -2, 0)
-    orders = len(flat)
-    layers = weighted_layers(waves, number)[first : first + orders].astype(waves_at.dtype)
-    product = np.matmul(flat.reshape(orders, -1, 3), layers)
-    pressed: Samples = np.moveaxis(product.reshape(flat.shape), 0, -2)
+def times_layers(values: Samples, waves: WallWaves, number: int, first: int = 0) -> Samples:
+    """Waves (orders, parities, 2, 3, columns) times the wall's single layer, from an order on: it is symmetric."""
+    layers = weighted_layers(waves, number)[first : first + len(values)].astype(values.dtype)
+    pressed: Samples = np.matmul(layers[:, None, None], values)
     return pressed
 
 
-def point_waves(points: Samples, waves: WallWaves, number: int, first: int = 0, last: int | None = None) -> Samples:
-    """Velocities of waves of one k at points, (3 n, 2, 2, last - first, 3): real, imaginary; even, odd.
-
-    Args:
-        points: about the tube's axis, (n, 3), m.
-        waves: which.
-        number: of the node in k.
-        first: the first order.
-        last: the order after the last; None: of all that are kept.
-    """
+def point_waves(
+    points: Samples,
+    waves: WallWaves,
+    number: int,
+    first: int = 0,
+    last: int | None = None,
+    precision: type[np.floating] = np.float64,
+) -> Samples:
+    """Velocities of waves of one k at points, (last - first, 2, 2, 3, 3 n): even, odd; real, imaginary."""
     from spirillum.kernels import stokes_flow
 
     last = waves.orders[number] if last is None else last
-    out = np.empty((len(points), 3, 2, 2, last - first, 3))
-    stokes_flow.point_waves(float(waves.k[number]), waves.radius, points, first, out)
-    return out.reshape(3 * len(points), 2, 2, last - first, 3)
+    out = np.empty((last - first, 2, 2, 3, *points.shape), precision)
+    fill = stokes_flow.point_waves if precision is np.float64 else stokes_flow.single_point_waves
+    fill(float(waves.k[number]), waves.radius, points, first, out)
+    return out.reshape(*out.shape[:4], -1)
 
 
 def components_of(points: np.ndarray) -> np.ndarray:
@@ -218,7 +206,7 @@ def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.
     return points[order], distances[order], components_of(np.argsort(order))
 
 
-def point_reflection(points: Samples, waves: WallWaves) -> Samples:
+def point_reflection(points: Samples, waves: WallWaves, precision: type[np.floating] = np.float64) -> Samples:
     """Velocities at points from forces at the same points, symmetric, (3 n, 3 n); without the minus sign."""
     placed, distances, back = from_the_wall(points, waves.radius)
 
@@ -226,9 +214,9 @@ def point_reflection(points: Samples, waves: WallWaves) -> Samples:
         total = np.zeros((3 * len(points),) * 2)
         for number in numbers:
             for low, high, there in waves.bands(number, distances, float(distances[0]), waves.orders[number]):
-                at_points = point_waves(placed[: there.size], waves, number, low, high)
+                at_points = point_waves(placed[: there.size], waves, number, low, high, precision)
                 onto_wall = times_layers(at_points, waves, number, low)
-                _add_lower(onto_wall.reshape(3 * there.size, -1), at_points.reshape(3 * there.size, -1), total)
+                _add_lower(onto_wall.reshape(-1, 3 * there.size), at_points.reshape(-1, 3 * there.size), total)
         return total
 
     lower = np.tril(sum(summed(reflected, waves.k.size)))
@@ -238,7 +226,8 @@ def point_reflection(points: Samples, waves: WallWaves) -> Samples:
 
 
 def _add_lower(a: np.ndarray, b: np.ndarray, total: Samples) -> None:
-    """Add a b', which is symmetric, to the first rows and columns of `total`, where only the lower half counts."""
-    for first in range(0, len(a), _BLOCK):
-        last = min(first + _BLOCK, len(a))
-        total[first : len(a), first:last] += a[first:] @ b[first:last].T
+    """Add a' b, which is symmetric, to the first rows and columns of `total`, where only the lower half counts."""
+    size = a.shape[1]
+    for first in range(0, size, _BLOCK):
+        last = min(first + _BLOCK, size)
+        total[first:size, first:last] += a[:, first:].T @ b[:, first:last]

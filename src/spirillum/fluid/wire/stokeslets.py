@@ -75,14 +75,7 @@ def station_count(arc_length: PerRobot, radius: PerRobot) -> PerRobot:
 
 
 def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: bool = False) -> Wire:
-    """The wire along a curve.
-
-    Args:
-        curve: points along the centreline, dense against its bends, (k, 3), m; a closed one ends where it starts.
-        radius: a, m.
-        spacing: of the stations, relative to the standard one.
-        closed: whether the wire is a ring without ends.
-    """
+    """The wire of radius a along points of a centreline, dense against its bends; a closed one ends where it starts."""
     line = _checked(curve, radius, spacing, closed=closed)
     wire = stations_along(line, float(radius), float(spacing), closed=closed)
     near = closest_approach(wire, closed=closed)

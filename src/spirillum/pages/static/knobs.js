@@ -45,7 +45,7 @@ export class Knobs {
     const names = [...(scene.own === "own" || lane.source === "own" ? ["own"] : []), ...scene.presets];
     this.preset = element("select", { id: "preset", onchange: () => this.send({ do: "preset", value: this.preset.value, lane: this.lane }) },
       ...names.map((name) => element("option", { value: name, text: name === "own" ? scene.own === "own" ? "the robot it was started with" : "the study\u2019s robot" : name })));
-    const words = { auto: "auto: what knows most", tube: "tube: with walls", slender: "slender: no walls", rft: "rft: the paper\u2019s simplest" };
+    const words = { auto: "auto: the most complete", tube: "tube: with walls", slender: "slender: no walls", rft: "rft: the paper\u2019s simplest" };
     this.model = element("select", { id: "model", onchange: () => this.set("run.model", this.model.value) },
       ...lane.models.map((name) => element("option", { value: name, text: words[name] })));
     this.remoteWord = element("span");
@@ -66,7 +66,7 @@ export class Knobs {
       element("div", { class: "knob", title: "Share of the time for which the battery drives the motor (PWM)." }, element("label", { for: "duty", text: "Duty" }), this.duty, element("span", { class: "field" }, this.dutyWord)),
     );
     this.holder.replaceChildren(
-      element("h2", { text: "Knobs" }),
+      element("h2", { text: "Settings" }),
       element("div", { class: "knob wide" }, element("label", { for: "preset", text: "Robot" }), this.preset),
       element("div", { class: "knob wide" }, element("label", { for: "model", text: "Model" }), this.model),
       this.table,

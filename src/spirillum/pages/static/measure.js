@@ -180,7 +180,7 @@ export class Measure {
     this.pointer = new Pointing(this.stageHolder, (point) => this.clicked(point));
     this.video = element("video", { controls: true, playsinline: true, hidden: true, id: "annotated" });
     this.empty = element("label", { class: "drop inside", for: "film-files" }, element("h2", { text: "Measure a video" }),
-      element("p", { text: "Drop films of a robot here, one a trial, or choose them. They stay on this machine." }), element("span", { class: "plain", text: "Choose films" }));
+      element("p", { text: "Drop videos of a robot here, one a trial, or choose them. They stay on this machine." }), element("span", { class: "plain", text: "Choose videos" }));
     this.stageHolder.append(this.video, this.empty);
     this.slider = element("input", { type: "range", id: "frame-time", min: 0, max: 1, step: 0.01, value: 0, "aria-label": "Time in the video" });
     this.slider.addEventListener("input", () => { this.time = Number(this.slider.value); this.clock.textContent = clock(this.time); clearTimeout(this.soon); this.soon = setTimeout(() => this.frame(), 80); });
@@ -324,7 +324,7 @@ export class Measure {
     const { job, films } = this.state;
     const busy = job && !job.failed;
     this.go.disabled = Boolean(busy) || !films.length || !this.whole;
-    this.go.textContent = films.length > 1 ? `Measure ${films.length} films` : "Measure";
+    this.go.textContent = films.length > 1 ? `Measure ${films.length} videos` : "Measure";
     if (job?.failed) this.tell(job.kind === "calibrate" ? "calibration" : "work", job.failed, true);
     else if (busy && job.kind === "measure") this.tell("work", "");
     this.work.hidden = !busy;
@@ -409,7 +409,7 @@ function kept(name) {
 
 function warnings(list) {
   if (!list.length) return [];
-  return [element("details", { open: list.length < 3 }, element("summary", { text: `To be careful about (${list.length})` }), ...list.map((text) => element("p", { text: `${capital(text)}.` })))];
+  return [element("details", { open: list.length < 3 }, element("summary", { text: `Cautions (${list.length})` }), ...list.map((text) => element("p", { text: `${capital(text)}.` })))];
 }
 
 function table(rows) {

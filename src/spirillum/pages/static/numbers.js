@@ -78,12 +78,12 @@ export class Numbers {
 function words(numbers, lane) {
   const list = element("div", { class: "said" });
   const error = numbers.error === null ? "" : `Error of the speed ${figure(100 * numbers.error, 2)} %${numbers.against ? `, against ${numbers.against}` : ""}. `;
-  list.append(element("p", {}, element("b", { text: "How sure: " }), error + capital(numbers.statement) + (numbers.statement ? "." : "")));
+  list.append(element("p", {}, element("b", { text: "Accuracy: " }), error + capital(numbers.statement) + (numbers.statement ? "." : "")));
   const more = [lane.caution, ...lane.warnings, ...numbers.warnings].filter((text, k, all) => text && all.indexOf(text) === k);
   if (numbers.band) more.push("held and range are for axial motion at a fixed pose; the robot in the picture sinks, tilts and yaws, and may swim outside the range");
   if (numbers.others) more.push(numbers.others);
   if (more.length) {
-    list.append(element("details", {}, element("summary", { text: `To be careful about (${more.length})` }), ...more.map((text) => element("p", { text: sentence(text) }))));
+    list.append(element("details", {}, element("summary", { text: `Cautions (${more.length})` }), ...more.map((text) => element("p", { text: sentence(text) }))));
   }
   return list;
 }

@@ -3,6 +3,7 @@
 import { colourOf, figure, fitted, unitText } from "./format.js";
 
 const MOST = 2400;
+const THIN = 0.05; // mm, below which lengths are read in micrometres
 
 export class Plot {
   constructor(canvas, name, quantity) {
@@ -36,7 +37,7 @@ export class Plot {
     if (width < 30) return;
     const end = to ?? Math.max(time.length ? time[time.length - 1] : 0, 4);
     const start = from ?? Math.max(0, end - this.span);
-    const factor = quantity.factor;
+    let { factor, unit } = quantity;
     let low = Infinity, high = -Infinity;
     for (let k = 0; k < time.length; k++) {
       if (time[k] < start || time[k] > end || values[k] === null) continue;
@@ -53,6 +54,7 @@ export class Plot {
       high = Math.max(high, value * factor);
     }
     if (!Number.isFinite(low)) [low, high] = [0, 1];
+    if (unit === "mm" && Math.max(-low, high) < THIN) [low, high, factor, unit] = [1e3 * low, 1e3 * high, 1e3 * factor, "um"];
     [low, high] = rounded(low, high);
     const box = { left: 44, right: width - 8, top: 24, bottom: height - 18 };
     const x = (t) => box.left + ((t - start) / (end - start)) * (box.right - box.left);
@@ -124,16 +126,21 @@ export class Plot {
     context.textBaseline = "alphabetic";
     context.fillStyle = colourOf("--ink");
     context.font = "600 12px system-ui, sans-serif";
-    context.fillText(capital(quantity.label), 10, 14);
-    const wide = context.measureText(capital(quantity.label)).width;
+    let words = capital(quantity.label), wide = context.measureText(words).width;
+    if (wide > width - 60) {
+      words = words.replace(" under the body", "");
+      wide = context.measureText(words).width;
+    }
+    context.fillText(words, 10, 14);
     context.font = "12px system-ui, sans-serif";
     context.fillStyle = colourOf("--soft");
-    context.fillText(unitText(quantity.unit), 16 + wide, 14);
+    context.fillText(unitText(unit), 16 + wide, 14);
   }
 }
 
+// The name of a field stays as it is.
 export function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
+  return /^\w+[._]\w/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 function label(value, step) {

@@ -6,7 +6,7 @@ const LENS = 64; // radius of the magnifier, pixels of the screen
 
 export class Pointing {
   constructor(holder, added) {
-    this.canvas = element("canvas", { class: "pointing", tabindex: "0", role: "application", "aria-label": "The film\u2019s frame: click, or move the cross with the arrow keys (Shift: farther) and press Enter" });
+    this.canvas = element("canvas", { class: "pointing", tabindex: "0", role: "application", "aria-label": "The video\u2019s frame: click, or move the cross with the arrow keys (Shift: farther) and press Enter" });
     this.told = element("p", { class: "name", "aria-live": "polite" });
     holder.append(this.canvas, this.told);
     Object.assign(this, { points: [], strips: [], marks: [], image: null, cursor: null, added, active: false });

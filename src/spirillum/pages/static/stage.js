@@ -13,6 +13,8 @@ const VIEWS = {
 const SLOWEST_FRAME = 80; // ms from frame to frame; beyond it fewer pixels are drawn
 const PATIENCE = 20; // frames over which that is judged
 
+const HALF = 16; // of a label of the ruler, pixels: it is not cut at the edge
+
 export class Stage {
   constructor(holder, label) {
     this.canvas = element("canvas", { class: "scene", tabindex: "0", role: "img", "aria-label": label });
@@ -145,7 +147,7 @@ export class Stage {
     let last = -1e3;
     for (let k = Math.ceil(ruler.from / (10 * ruler.step)); k * 10 * ruler.step <= ruler.to; k++) {
       const seen = renderer.project([k * 10 * ruler.step, ruler.y - ruler.width * 1.5, level]);
-      if (!seen || seen[0] < 0.02 || seen[0] > 0.98 || seen[1] > 0.985) continue;
+      if (!seen || seen[0] * width < HALF || seen[0] * width > width - HALF || seen[1] > 0.985) continue;
       const x = seen[0] * width;
       if (Math.abs(x - last) < 34) continue;
       last = x;

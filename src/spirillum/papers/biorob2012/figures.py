@@ -129,16 +129,12 @@ _SHADES = ("#4a2410", "#c2763a", "#ffd9b0")
 
 
 class FrenetFrames(NamedTuple):
-    """The wire's centreline and its Frenet-Serret frames, in the frame of the body."""
+    """The wire's centreline in the frame of the body, m, and its Frenet-Serret unit vectors, (n, 3)."""
 
     position: Samples
-    """(n, 3), m."""
     tangent: Samples
-    """(n, 3) unit vectors t away from the root."""
     normal: Samples
-    """(n, 3) unit vectors n towards the centre of curvature."""
     binormal: Samples
-    """(n, 3) unit vectors b = t x n."""
 
 
 def frenet_frames(robot: Robot, xi: Samples) -> FrenetFrames:

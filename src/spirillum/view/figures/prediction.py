@@ -45,7 +45,7 @@ def prediction_figure(prediction: Prediction) -> Figure:
             low, high, speed = (end / scale.factor for end in (row.low, row.high, row.speed))
             axes.plot([low, high], [number, number], color=row.colour, linewidth=6, alpha=0.35, solid_capstyle="butt")
             axes.plot(speed, number, "o", color=row.colour, markersize=6.5)
-            words = f"{speed:.3g}" if np.isnan(low) else f"{speed:.3g} ({low:.3g} to {high:.3g})"
+            words = f"{speed:.4g}" if np.isnan(low) else f"{speed:.4g} ({low:.4g} to {high:.4g})"
             end = np.nanmax([speed, high])
             axes.annotate(
                 words.replace("-", "\N{MINUS SIGN}"),

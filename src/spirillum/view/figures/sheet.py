@@ -13,7 +13,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure, readable, styled
+from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure, readable, styled, with_micro
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _wrap(text: Text) -> None:
         text.set_text(word)
         return text.get_window_extent().width
 
-    wanted = text.get_text().replace(" · ", "\N{NO-BREAK SPACE}· ")  # no line begins with a point
+    wanted = with_micro(text.get_text()).replace(" · ", "\N{NO-BREAK SPACE}· ")  # no line begins with a point
     space = width("n n") - width("nn")
     # Not `split()`: a space that does not break holds a word together.
     widths = {word: width(word) for word in set(wanted.replace("\n", " ").split(" ")) if word}

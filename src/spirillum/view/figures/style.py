@@ -40,6 +40,7 @@ PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}  #: Line that represents
 DPI = 200  #: Of PNG files.
 _NO_DATE: dict[str, dict[str, Any]] = {"png": {"Software": MARK}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
+_MICRO = re.compile(r"(\d )u(?=[mNWgl]\b)")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
 _WITHOUT_PREFIX = ("rad/s", "rad", "1", "%")
 _PREFIXES = (
@@ -165,6 +166,11 @@ def readable(text: str) -> str:
     return " ".join(spelled.replace(r"\$", "$").split())
 
 
+def with_micro(text: str) -> str:
+    """A figure's text with the micro sign of its axes: ``0.9 um`` becomes ``0.9 µm``."""
+    return _MICRO.sub(r"\1µ", text)
+
+
 def _spelled(formula: str) -> str:
     for command, letter in _LETTERS.items():
         formula = formula.replace(command, letter)
@@ -190,7 +196,7 @@ def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
 
 def save_as(figure: Figure, path: Path) -> None:
     """Write one picture whole or not at all, without dates: PNG (200 dpi), PDF or SVG (text as paths)."""
-    kind = path.suffix.removeprefix(".")
+    kind = path.suffix.lower().removeprefix(".")
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
         figure.set_layout_engine(None)  # else the layout is computed once more before it is drawn
     with styled(), atomic_write(path) as temporary:

@@ -21,7 +21,7 @@ from spirillum.dynamics.run_file import check_increasing, robot_of
 from spirillum.errors import InputError, check_choice
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
-from spirillum.units import show_height
+from spirillum.units import show, show_height, speed_unit
 from spirillum.view.figures.run_panels import draw_cross_section, event_words, events_of, mark_events
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, UnitPrefix, plain, styled
@@ -158,23 +158,31 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
         return f"{name}: a run in time"
     time = dataset["time"].values
     span = f"in {float(time[-1]):.4g} s" if time[0] == 0 else f"from {float(time[0]):.4g} to {float(time[-1]):.4g} s"
-    swims = f"swims {1e3 * (path[-1, 0] - path[0, 0]):.3g} mm {span}"
+    return f"{name} swims {1e3 * (path[-1, 0] - path[0, 0]):.4g} mm {span}"
+
+
+def _around(dataset: xr.Dataset) -> str:
+    """Which way a robot went around its tube."""
     azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
     around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
     if swing < _STILL:
-        return f"{name} {swims} and stays at its azimuth"
+        return "stays at its azimuth"
     if abs(around) < _ONE_WAY * swing:
-        return f"{name} {swims} and goes {swing:.2g}° around the tube, to and fro"
+        return f"goes {swing:.2g}° around the tube, to and fro"
     turned = float(dataset["body_angle"][-1] - dataset["body_angle"][0]) if "body_angle" in dataset else 0.0
     sense = (
         "" if turned == 0 else " with its body's rotation" if turned * around > 0 else " against its body's rotation"
     )
-    return f"{name} {swims} and goes {abs(around):.2g}° around the tube{sense}"
+    return f"goes {abs(around):.2g}° around the tube{sense}"
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
     attrs = dataset.attrs
-    found = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
+    found = [_around(dataset)] if in_tube else []
+    if (mean := float(dataset.get("mean_forward_velocity_on", np.nan))) == mean:
+        unit = speed_unit(mean, float(dataset.get("mean_tail_rotation_rate_on", np.nan)))
+        found.insert(0, f"mean velocity {show(mean, unit)} with the drive on")
+    found += [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
     if in_tube:
         found += [
             f"{words} {plain(str(attrs[name]), 40)}"

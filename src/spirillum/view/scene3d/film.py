@@ -18,9 +18,10 @@ from spirillum.errors import InputError, check_choice, check_range
 from spirillum.files import MARK, atomic_write, output_target
 from spirillum.notes import Note
 from spirillum.robot.robot import Robot
+from spirillum.units import display_unit, show
 from spirillum.view.figures.run_panels import silhouette
 from spirillum.view.figures.scene import FAINT, INK
-from spirillum.view.figures.style import COLOURS
+from spirillum.view.figures.style import COLOURS, with_micro
 from spirillum.view.scene3d.rendering import FILMS, film_writer
 from spirillum.view.scene3d.scenery import Margins, SceneCamera, View, checked_view, fitted
 from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
@@ -159,7 +160,7 @@ def film(
     """
     target = output_target(path, FILMS, "run.mp4")
     seen_from, pixels = checked_view(view), _even(checked_size(size))
-    _check_pace(fps, 1.0 if speed is None else speed, target.suffix)
+    _check_pace(fps, 1.0 if speed is None else speed, target.suffix.lower())
     check_choice("camera", camera, CAMERAS)
     if isinstance(dataset, (str, Path)):
         dataset = open_run(dataset)
@@ -180,7 +181,11 @@ def film(
     shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
-        with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
+        about = [f"model {model}"] if model else []
+        if "mean_forward_velocity_on" in dataset:
+            mean = float(dataset["mean_forward_velocity_on"])
+            about.append(f"mean velocity {with_micro(show(mean, display_unit(mean, 'm/s')))} with the drive on")
+        with closing(shots.images(times, ", ".join(about), speed)) as images:
             for number, image in enumerate(images):
                 on_progress("film", number, times.size)
                 writer.add(image)

@@ -110,7 +110,7 @@ class Writer(Protocol):
 
 def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> AbstractContextManager[Writer]:
     """A writer for frames of one size; the file is complete when the block ends."""
-    if path.suffix == ".gif":
+    if path.suffix.lower() == ".gif":
         return _gif(path, fps, words)
     return h264_writer(path, size, Fraction(fps), words, quality=_QUALITY, instead="a .gif", extra="3d")
 

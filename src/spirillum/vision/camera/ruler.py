@@ -22,6 +22,10 @@ _COHERENT = 0.35
 """Least coherence: amplitude of the ruler's wave over the local contrast."""
 _STRONG = 0.6
 """Least amplitude of the wave over that inside the strips: at their ends the phase of slanted lines is biased."""
+_GAP = 12.0
+"""Longest gap of a strip, in lines: a stronger line among fine ones, as every tenth of millimetre paper, hides them."""
+_WIDE = 25.0
+"""Lines that a strip has to span before its phase is extrapolated by more than a straight line."""
 _CLEAR = 8.0
 """Least height of the ruler's spectral peak over the local median of the spectrum."""
 _CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -217,7 +221,9 @@ def _lines_of(part: Samples) -> Lines | None:
     good &= size > _STRONG * np.quantile(size[good], 0.9, method="nearest")
     margin = int(2.5 * sigma) + 1
     good[:, :margin] = good[:, -margin:] = False
-    _, labels = cv2.connectedComponents(good.astype(np.uint8))
+    along = np.ones((1, 2 * int(0.5 * _GAP * distance) + 1), dtype=np.uint8)
+    _, labels = cv2.connectedComponents(cv2.morphologyEx(good.astype(np.uint8), cv2.MORPH_CLOSE, along))
+    labels[~good] = 0
     step = max(1, round(distance))
     rows, cols = (grid.ravel() for grid in np.mgrid[0 : part.shape[0] : 2, 0 : part.shape[1] : step])
     kept = labels[rows, cols] > 0
@@ -277,7 +283,7 @@ def _unwrapped(u: Samples, v: Samples, turns: Samples, distance: float) -> tuple
     number[near] = turns[near] - np.round(turns[near] - centre)
     sure[near] = np.abs(number[near] - centre) < 0.45
     while True:
-        order = 1 if sure.sum() < 60 else 3
+        order = 3 if sure.sum() >= 60 and np.ptp(u[sure]) > _WIDE * distance else 1
         terms = np.stack([a**i * b**j for i in range(order + 1) for j in range(min(order + 1 - i, 3))], axis=1)
         fitted = terms @ np.linalg.lstsq(terms[sure], number[sure], rcond=1e-8)[0]
         number = turns - np.round(turns - fitted)
