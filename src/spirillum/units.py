@@ -58,19 +58,8 @@ _SI: dict[str, float] = {
 """SI values of the units that are shown, and of those that files mostly state."""
 
 
-USUAL = {
-    "m": ("mm", "cm", "um", "nm"),
-    "kg": ("g", "mg"),
-    "kg/m**3": ("kg/m^3",),
-    "Pa s": ("mPa s",),
-    "rad/s": ("Hz",),
-    "rad": ("deg",),
-    "m/s": ("mm/s", "um/s"),
-    "V": ("mV",),
-    "A": ("mA",),
-    "C": ("mA h",),
-    "T": ("mT",),
-}
+_UNITS = list(csv.DictReader(Path(__file__).with_name("shown_units.csv").read_text(encoding="utf-8").splitlines()))
+USUAL = {row["unit"]: tuple(row["read"].split("; ")) for row in _UNITS if row["read"]}
 """Units of a kind's own unit that files mostly state: they are read without pint, which takes a while to load."""
 
 
@@ -310,33 +299,18 @@ def show_apart(one: float, other: float, unit: str, least: int = 4) -> tuple[str
     return first, second
 
 
-_FOR_PEOPLE = {
-    "m/s": "mm/s",
-    "rad/s": "Hz",
-    "m/rad": "mm/turn",
-    "m": "mm",
-    "kg": "g",
-    "N": "mN",
-    "A": "mA",
-    "W": "mW",
-    "N m": "mN m",
-    "rad": "deg",
-    "m^3": "ml",
-}
-"""The unit in which people read values of an SI unit, at the size of a centimetre-scale robot."""
-_LARGE = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
-"""SI unit to the size from which on values are read in another unit, and that unit."""
-_SMALL = {
-    "m/s": ((1e-7, "nm/s"), (1e-4, "um/s")),
-    "m": ((1e-8, "nm"), (1e-5, "um")),
-    "m/rad": ((1e-10, "nm/turn"), (1e-7, "um/turn")),
-    "kg": ((1e-12, "pg"), (1e-9, "ug"), (1e-6, "mg")),
-    "m^3": ((1e-12, "um^3"), (1e-9, "ul")),
-    "N": ((1e-14, "fN"), (1e-11, "pN"), (1e-8, "nN"), (1e-5, "uN")),
-    "N m": ((1e-17, "pN nm"), (1e-14, "pN um"), (1e-11, "pN m"), (1e-8, "nN m"), (1e-5, "uN m")),
-    "W": ((1e-17, "aW"), (1e-14, "fW"), (1e-11, "pW"), (1e-8, "nW"), (1e-5, "uW")),
-}
-"""SI unit to the sizes below which values are read in another unit, least first, and that unit."""
+_FOR_PEOPLE = {row["unit"]: row["shown"] for row in _UNITS if row["shown"]}
+
+
+def _sizes(column: str) -> dict[str, list[tuple[float, str]]]:
+    """SI unit to sizes, least first, and the unit in which values are read from or below them."""
+    found = {row["unit"]: row[column].split("; ") for row in _UNITS if row[column]}
+    pairs = {unit: [part.partition(" ") for part in parts] for unit, parts in found.items()}
+    return {unit: [(float(size), shown) for size, _, shown in parts] for unit, parts in pairs.items()}
+
+
+_LARGE = {unit: sizes[0] for unit, sizes in _sizes("from").items()}
+_SMALL = _sizes("below")
 
 
 def for_people(unit: str) -> str:

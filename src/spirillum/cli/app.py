@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from spirillum.cli.calibrate_commands import calibrate, design, rank_models, suggest
 from spirillum.cli.control_commands import control, remote
-from spirillum.cli.function_command import FunctionCommand, Request, from_function
+from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import check_apart, overrides_from, refuse_conflicts
 from spirillum.cli.measurement_commands import measure, observations_app, render, setup_app, track, virtual_experiment
 from spirillum.cli.motion_commands import magnetic_sweep, settle, simulate
@@ -83,13 +83,7 @@ def _root(
         "in_tube.azimuth": "of the start of a run: settle and simulate",
     },
 )
-def predict(
-    request: Request,
-    *,
-    plot: Path | None = None,
-    all_of_it: All = False,
-    json: Json = False,
-) -> None:
+def predict(request: Request, *, plot: Path | None = None, all_of_it: All = False, json: Json = False) -> None:
     """Predict one robot: held at a pose, in a trial after release in its tube, and in the steady state.
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
@@ -228,7 +222,7 @@ def schema(
     typer.echo(as_json(schema_of(name)))
 
 
-def citation(model: Annotated[str | None, typer.Argument(help="A model, for its references too.")] = None) -> None:
+def citation(model: str | None = None) -> None:
     """Print what to cite: the software, its paper, and a model's references.
 
     Example: `spirillum citation sbt`
@@ -263,7 +257,7 @@ _TASKS: dict[str, tuple[Callable[..., None], ...]] = {
 for _task, _commands in _TASKS.items():
     for _command in _commands:
         _kind = FunctionCommand if hasattr(_command, "source") else NotedCommand
-        app.command(cls=_kind, rich_help_panel=_task)(_command)
+        app.command(cls=_kind, rich_help_panel=_task)(_command if _kind is FunctionCommand else own_options(_command))
 app.add_typer(robot_app, name="robot", rich_help_panel="Files")
 app.add_typer(setup_app, name="setup", rich_help_panel="Files")
 app.add_typer(observations_app, name="observations", rich_help_panel="Files")

@@ -151,12 +151,7 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
 
 
 @from_function("spirillum.interfaces.serial_remote:remote", robot=None)
-def remote(
-    request: Request,
-    *,
-    port: str,
-    json: Json = False,
-) -> None:
+def remote(request: Request, *, port: str, json: Json = False) -> None:
     """Switch a real motor on for a time, through a remote at a serial port. Needs the extra `control`.
 
     Example: `spirillum remote /dev/ttyUSB0 --duty 0.5 --duration 2s`

@@ -244,6 +244,13 @@ def _complete(source: FunctionSource) -> Callable[..., None]:
     return run
 
 
+def own_options(command: Callable[..., None]) -> Callable[..., None]:
+    """A command of no public function, whose options are as `own_options.csv` has them."""
+    hints = get_type_hints(command, include_extras=True)
+    command.__annotations__ = {name: _own(command.__name__, name, hint) for name, hint in hints.items()}
+    return command
+
+
 def _own(command: str, name: str, kind: Any) -> Any:
     """Annotation of what a command takes beside the function's arguments: by `own_options.csv`, or as it is."""
     row = OWN.get((command, name))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from spirillum.cli.function_command import FunctionCommand, Request, from_function
+from spirillum.cli.function_command import FunctionCommand, Request, from_function, own_options
 from spirillum.cli.inputs import overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
     DISTURBANCES_PANEL,
@@ -253,11 +253,8 @@ def propose(
 
 
 @setup_app.command("check", cls=NotedCommand)
-def check_setup(
-    file: Annotated[Path, typer.Argument(help="Setup file (TOML).")],
-    film: Annotated[Path | None, typer.Argument(help="A film that was taken with it, to look at too.")] = None,
-    json: Json = False,
-) -> None:
+@own_options
+def check_setup(file: Path, film: Path | None = None, json: Json = False) -> None:
     """Check a setup file, the effect of its uncertain heights on lengths, and its agreement with a video.
 
     Example: `spirillum setup check setup.toml trial-1.mp4`
@@ -272,10 +269,8 @@ observations_app = typer.Typer(name="observations", help="Files of observed spee
 
 
 @observations_app.command("new", cls=NotedCommand)
-def new_observations(
-    file: Annotated[Path, typer.Argument(help="File to write (.csv).")],
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
-) -> None:
+@own_options
+def new_observations(file: Path, *, force: bool = False) -> None:
     """Write an empty observations file to fill in.
 
     Example: `spirillum observations new observations.csv`
@@ -287,9 +282,8 @@ def new_observations(
 
 
 @observations_app.command("check", cls=NotedCommand)
-def check_observations(
-    file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")], json: Json = False
-) -> None:
+@own_options
+def check_observations(file: Path, json: Json = False) -> None:
     """Check an observations file and count what is in it.
 
     Example: `spirillum observations check observations.csv`
@@ -301,10 +295,8 @@ def check_observations(
 
 
 @observations_app.command("join", cls=NotedCommand)
-def join_observations(
-    files: Annotated[list[Path], typer.Argument(help="Observations files (CSV or Parquet), two or more.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.csv).")],
-) -> None:
+@own_options
+def join_observations(files: list[Path], output: Path) -> None:
     """Join several observations files, such as one of each robot, to one for `calibrate`.
 
     Example: `spirillum observations join measured/*/observations.csv -o all.csv`

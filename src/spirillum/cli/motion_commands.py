@@ -153,13 +153,7 @@ def _after_the_run(what: str, *, written: bool) -> Iterator[None]:
     without={**NO_FORM, **dict.fromkeys(("resolution.tolerance", "resolution.phases"), "of the model tube")},
     complete={"model": complete_models},
 )
-def magnetic_sweep(
-    request: Request,
-    *,
-    output: Path,
-    plot: Path | None = None,
-    json: Json = False,
-) -> None:
+def magnetic_sweep(request: Request, *, output: Path, plot: Path | None = None, json: Json = False) -> None:
     """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.
 
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
@@ -180,12 +174,7 @@ def magnetic_sweep(
 @from_function(
     "spirillum.dynamics.settling:settle", without={**NO_START, "placement.tail_drop": "no rigid tail moves with it"}
 )
-def settle(
-    request: Request,
-    *,
-    output: Path | None = None,
-    json: Json = False,
-) -> None:
+def settle(request: Request, *, output: Path | None = None, json: Json = False) -> None:
     """Follow a robot released in its tube to its steady state: path, gap, azimuth, tilt, speed and body rate.
 
     Example: `spirillum settle biorob2012-wide --gap 0.5mm --roughness 20um`

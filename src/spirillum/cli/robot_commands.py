@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.function_command import Request, from_function
+from spirillum.cli.function_command import Request, from_function, own_options
 from spirillum.cli.inputs import loaded_robot, overrides_from, refuse_conflicts
 from spirillum.cli.shared_options import (
     Json,
@@ -25,12 +25,14 @@ robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot f
 
 
 @robot_app.command("new", cls=NotedCommand)
+@own_options
 def robot_new(
-    path: Annotated[Path, typer.Argument(help="Robot file to write.")],
+    path: Path,
+    *,
     preset: Annotated[
         str, typer.Option("--from", autocompletion=complete_presets, help="Preset or validation robot to start from.")
     ] = "biorob2012-wide",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it is there.")] = False,
+    force: bool = False,
 ) -> None:
     """Write a robot file to edit, with every field of a preset.
 
@@ -77,16 +79,10 @@ def prepare(
         list[str] | None,
         typer.Argument(metavar="[ROBOT]...", autocompletion=complete_robots, help="Presets' names or TOML files."),
     ] = None,
-    study: Annotated[
-        str | None, typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study.")
-    ] = None,
-    stage: Annotated[
-        str | None,
-        typer.Option(
-            help="straight (constrained motion), yaw (motion after release too; the default) or fine (for publication)."
-        ),
-    ] = None,
-    fine: Annotated[bool, typer.Option("--fine", help="Short for --stage fine.")] = False,
+    study: str | None = None,
+    stage: str | None = None,
+    *,
+    fine: bool = False,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
     settings: Settings = None,
     json: Json = False,
@@ -183,12 +179,9 @@ def validate(
         list[str] | None,
         typer.Argument(metavar="[NAME]...", autocompletion=complete_cases, help="Cases that ship; else all."),
     ] = None,
-    runs: Annotated[
-        bool, typer.Option("--runs", help="Make the tables that runs in tubes lack (an hour; it can be resumed).")
-    ] = False,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for a report with figures.")
-    ] = None,
+    *,
+    runs: bool = False,
+    output: Path | None = None,
     json: Json = False,
 ) -> None:
     """Compute published experiments of other groups, with nothing fitted; exit code 1 if a row left its recorded range.

@@ -34,13 +34,7 @@ _View = Annotated[str, typer.Option(autocompletion=_VIEWS, help="perspective, or
 
 
 @from_function("spirillum.view.scene3d.show:show", without={"path": "-o FILE"}, complete={"view": _VIEWS})
-def show(
-    request: Request,
-    *,
-    output: Path | None = None,
-    window: bool = False,
-    json: Json = False,
-) -> None:
+def show(request: Request, *, output: Path | None = None, window: bool = False, json: Json = False) -> None:
     """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
 
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
@@ -54,15 +48,12 @@ def show(
 
 
 def film(
-    run: Annotated[Path, typer.Argument(help="A run (NetCDF), written by `spirillum simulate`.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The film: .mp4 or .gif.")],
+    run: Path,
+    output: Path,
     view: _View = "perspective",
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the film, even numbers.")] = "1280x720",
-    fps: Annotated[int, typer.Option(help="Frames a second.")] = 30,
-    speed: Annotated[
-        float | None,
-        typer.Option(help="Seconds of the run in a second of film; else 1, or slower where the tail turns fast."),
-    ] = None,
+    size: str = "1280x720",
+    fps: int = 30,
+    speed: float | None = None,
     camera: Annotated[
         str,
         typer.Option(

@@ -113,8 +113,14 @@ def _link_masses(link: Link) -> dict[str, Any]:
 
 _PLACES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 _FULL_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def _rgba(colour: Samples) -> str:
+    return numbers([*np.round(colour, 4), 1.0])
+
+
 _FILTERS: dict[str, Callable[..., str]] = {
-    "rgba": lambda colour: numbers((*map(float, np.round(colour, 4)), 1.0)),
+    "rgba": _rgba,
     "inertia": lambda link: numbers(link.inertia[_PLACES[name]] for name in _FULL_INERTIA),
 }
 

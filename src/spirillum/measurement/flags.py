@@ -7,8 +7,10 @@ changes on the way is taken for a part of the speed. Other causes are edges that
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -82,38 +84,8 @@ _MANY_OUTLIERS, _FEW_OUTLIERS = 0.02, 2
 _FEWEST_FRAMES = 4  # fewest measured frames of a video that give a rate
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
-_IMPLIED = {
-    "no-stripes": {"stripes-unreadable"},
-    "stripes-do-not-fit": {
-        "stripes-unreadable",
-        "uneven-stripes",
-        "stripes-of-another-size",
-        "stripes-do-not-pass",
-        "short-turn",
-    },
-    "stripes-do-not-pass": {"stripes-unreadable", "short-turn"},
-    "tail-does-not-fit": {"tail-unreadable"},
-    "outline-alone": {*_FOLLOWING, "does-not-advance", "uneven-stripes"},
-    "not-the-robot": {
-        *_FOLLOWING,
-        "robot-stands-still",
-        "something-else-followed",
-        "stripes-do-not-fit",
-        "stripes-do-not-pass",
-        "tail-does-not-fit",
-    },
-    "nose-on-the-other-side": {
-        "not-the-robot",
-        "size-does-not-fit",
-        "outline-does-not-fit",
-        "scale-does-not-fit",
-        "stripes-do-not-fit",
-        "tail-does-not-fit",
-        "moves-backwards",
-        *_FOLLOWING,
-    },
-    "mirrored": {"stripe-order", "handedness"},
-}
+_TABLE = Path(__file__).with_name("implied_flags.csv").read_text(encoding="utf-8")
+_IMPLIED = {flag: {*implied.split()} for flag, implied in csv.reader(_TABLE.splitlines()[1:])}
 """Flags that are redundant beside another one that withholds a number, by its name; it withholds what they do."""
 _CHANGES = {"stands-for-a-while", "reverses"}
 _OF_CHANGES = {"video-is-cut", "does-not-advance"}

@@ -21,10 +21,8 @@ from spirillum.vision.track.track import Track
 
 GRUBBS_LEVEL = 0.01
 """Significance level of Grubbs' test: the probability that it names one of trials of one distribution."""
-_WINDOW = 9
-"""Frames of the running median."""
-_SIGMAS = 6.0
-"""Standard deviations beyond which a frame is an outlier."""
+_WINDOW = 9  # frames of the running median
+_SIGMAS = 6.0  # standard deviations beyond which a frame is an outlier
 _LEAST = 0.5
 """Least scale of the residuals of the running median, over that of the whole series: a step that is small against the
 series' own scatter is no outlier, however smooth its neighbours are, as where stripes pass under a highlight."""
@@ -96,14 +94,11 @@ def outlying_trial(values: Sequence[float]) -> int | None:
 
 LEADING = 6
 """First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave."""
-_FEWEST = 40
-"""Fewest frames of a track from which they are left out."""
-_BESIDE = 20
-"""Frames that the first one is compared with."""
+_FEWEST = 40  # fewest frames of a track from which they are left out
+_BESIDE = 20  # frames that the first one is compared with
 _AHEAD = 1.5
 """Standard errors by which position and angles together have to lead. Chance alone leaves them out 14 times in 100."""
-_MOST = 4.0
-"""Standard errors that one of them counts at most."""
+_MOST = 4.0  # standard errors that one of them counts at most
 
 
 def without_lead(track: Track) -> Track:

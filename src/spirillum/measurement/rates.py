@@ -21,33 +21,24 @@ from spirillum.measurement.statistics import student_t, student_t_quantile
 
 _MOST_BLOCKS = 100
 """Most blocks into which frames are averaged: a slope is a low-frequency quantity; the cost is cubic in blocks."""
-_SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)
-"""Variance shares of the correlated part on the grid."""
-_TIMES = 8
-"""Correlation times on the grid."""
+_SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)  # variance shares of the correlated part on the grid
+_TIMES = 8  # correlation times on the grid
 _SIZES = (0.25, 1.0)
 """Variances of the periodic errors on the grid, over the expected ones; weighted by their likelihood."""
-_FEWEST_BLOCKS = 24
-"""Fewest blocks from which a change of the rate is detected."""
-_WHITE = 3.0
-"""Prior odds of white noise against all correlated noises."""
-_FEWEST = 8
-"""Fewest frames from which autocorrelation is estimated; errors of fewer frames are taken as independent."""
-_UNSTEADY_P = 1e-3
-"""p-value of a curvature below which a rate is taken to change, two-sided."""
+_FEWEST_BLOCKS = 24  # fewest blocks from which a change of the rate is detected
+_WHITE = 3.0  # prior odds of white noise against all correlated noises
+_FEWEST = 8  # fewest frames from which autocorrelation is estimated; errors of fewer frames are taken as independent
+_UNSTEADY_P = 1e-3  # p-value of a curvature below which a rate is taken to change, two-sided
 _LARGEST_RATIO = 1e6
 """Largest variance of a periodic error over that of the noise; a larger one only adds rounding errors."""
-_UNSTEADY_SHARE = 0.1
-"""Relative change of a rate below which it counts as steady."""
+_UNSTEADY_SHARE = 0.1  # relative change of a rate below which it counts as steady
 _END_TO_END = np.array([0.0, 1.0, 0.0, 1.0])
 """The mean rate (p(1) - p(-1))/2 of a series of Legendre polynomials, to which those of odd degree contribute."""
-_ENDS = 5
-"""Readings averaged at each end of a series."""
+_ENDS = 5  # readings averaged at each end of a series
 _OF_STATED = 0.5
 """Least standard deviation, over the stated standard error of a frame, by six of which an outlier is off: frames that
 happen to lie on a line make no strays of others that are off by their own error."""
-_ROUNDING = 1e-12
-"""Relative range of a series below which its variation is rounding error: it counts as steady."""
+_ROUNDING = 1e-12  # relative range of a series below which its variation is rounding error: it counts as steady
 
 
 @dataclass(frozen=True)
@@ -56,28 +47,20 @@ class PeriodicError:
 
     angle: Samples = field(repr=False)
     """The angle on every frame, rad, (n,); the error has the period 2 pi in it; NaN where unknown."""
-    amplitude: float
-    """Expected amplitude, in the unit of the series; a larger one seen in the series is added."""
+    amplitude: float  #: Expected amplitude, in the unit of the series; a larger one seen in the series is added.
 
 
 @dataclass(frozen=True)
 class Rate:
     """The mean rate of a series, in its unit per second."""
 
-    value: float
-    """Mean rate; NaN with fewer than two frames."""
-    low: float
-    """Lower end of the confidence interval; NaN with two frames."""
-    high: float
-    """Upper end of the confidence interval."""
-    frames: int
-    """Frames that were used."""
-    outliers: int
-    """Outliers, which were left out."""
-    steady: bool
-    """Whether no significant change of the rate was detected."""
-    correlation_time: float
-    """Most likely correlation time of the errors, s; 0 for white noise."""
+    value: float  #: Mean rate; NaN with fewer than two frames.
+    low: float  #: Lower end of the confidence interval; NaN with two frames.
+    high: float  #: Upper end of the confidence interval.
+    frames: int  #: Frames that were used.
+    outliers: int  #: Outliers, which were left out.
+    steady: bool  #: Whether no significant change of the rate was detected.
+    correlation_time: float  #: Most likely correlation time of the errors, s; 0 for white noise.
     residual: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """Residuals of the fit, (n,); NaN where not measured or an outlier."""
     thirds: tuple[float, ...] = ()
@@ -89,11 +72,9 @@ class Rate:
         return bool(np.isfinite(self.value))
 
     def less(self, other: Rate) -> Rate:
-        """The rate of the difference of two series over the same times, both steady.
-
-        Errors of the two are independent but for what their residuals show: where one runs ahead while the other lags
-        behind, the interval is wider.
-        """
+        """The rate of the difference of two series over the same times, both steady."""
+        # Errors of the two are independent but for what their residuals show: where one runs ahead while the other lags
+        # behind, the interval is wider.
         left = self.residual - other.residual if self.measured and other.measured else np.zeros(0)
         both = np.isfinite(left)
         if (count := int(both.sum())) < 2:
@@ -228,10 +209,8 @@ def _from_end_to_end(s: Samples, y: Samples) -> float:
 
 
 def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | None) -> tuple[float, float, float]:
-    """Slope of a few readings with independent errors, with its confidence interval.
-
-    Three readings may lie on a line by chance: known standard errors of the readings add one degree of freedom.
-    """
+    """Slope of a few readings with independent errors, with its confidence interval."""
+    # Three readings may lie on a line by chance: known standard errors of the readings add one degree of freedom.
     design = np.stack([np.ones_like(s), s], axis=1) * np.sqrt(weights)[:, None]
     inverse = np.linalg.inv(design.T @ design)
     beta = inverse @ design.T @ (y * np.sqrt(weights))
@@ -249,17 +228,12 @@ def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | 
 class _Blocks:
     """Block averages of a series, and the noise model's fixed parts."""
 
-    s: Samples
-    """Time, scaled to -1 to 1, (m,)."""
+    s: Samples  # time, scaled to -1 to 1, (m,)
     y: Samples
-    design: Samples
-    """Legendre polynomials of degree 0 to 3, (m, 4)."""
-    white: Samples
-    """Variance of white noise in each block, 1 in the mean, (m,)."""
-    returning: Samples
-    """Covariance of the periodic errors in units of `variance`, (m, m)."""
-    variance: float
-    """Residual variance of a straight line with all periodic errors."""
+    design: Samples  # legendre polynomials of degree 0 to 3, (m, 4)
+    white: Samples  # variance of white noise in each block, 1 in the mean, (m,)
+    returning: Samples  # covariance of the periodic errors in units of `variance`, (m, m)
+    variance: float  # residual variance of a straight line with all periodic errors
 
     @classmethod
     def of(cls, s: Samples, y: Samples, weights: Samples, angles: list[tuple[Samples, float]]) -> _Blocks:
@@ -308,16 +282,11 @@ def _first_fit(line: Samples, waves: list[Samples], total: Samples, height: Samp
 class _Fit:
     """Coefficients of a polynomial, averaged over all noise models: a mixture of Student's t distributions."""
 
-    weights: Samples
-    """Probability of each noise model, (k,)."""
-    betas: Samples
-    """Coefficients for each noise model, (k, c)."""
-    covariances: Samples
-    """Their covariances, (k, c, c)."""
-    free: int
-    """Degrees of freedom."""
-    correlation_time: float
-    """That of the most likely noise model, in half lengths of the series."""
+    weights: Samples  # probability of each noise model, (k,)
+    betas: Samples  # coefficients for each noise model, (k, c)
+    covariances: Samples  # their covariances, (k, c, c)
+    free: int  # degrees of freedom
+    correlation_time: float  # that of the most likely noise model, in half lengths of the series
 
     @property
     def mean(self) -> Samples:
@@ -362,14 +331,10 @@ class _Fit:
 class _Noise(NamedTuple):
     """A noise model on the grid."""
 
-    share: float
-    """Share of the correlated part in the variance."""
-    time: float
-    """Its correlation time, in half lengths of the series."""
-    correlation: Samples
-    """Its correlation matrix, (m, m)."""
-    size: float
-    """Variance of the periodic errors over the expected one."""
+    share: float  # share of the correlated part in the variance
+    time: float  # its correlation time, in half lengths of the series
+    correlation: Samples  # its correlation matrix, (m, m)
+    size: float  # variance of the periodic errors over the expected one
 
 
 def _noises(blocks: _Blocks, shares: Sequence[float], times: Samples, sizes: Sequence[float] = (1.0,)) -> list[_Noise]:
@@ -384,12 +349,9 @@ def _noises(blocks: _Blocks, shares: Sequence[float], times: Samples, sizes: Seq
 class _Solved(NamedTuple):
     """The generalised least squares estimates for all noise models."""
 
-    likelihood: Samples
-    """Restricted log likelihoods, (k,)."""
-    beta: Samples
-    """Coefficients, (k, c)."""
-    covariance: Samples
-    """Covariances of the coefficients, (k, c, c)."""
+    likelihood: Samples  # restricted log likelihoods, (k,)
+    beta: Samples  # coefficients, (k, c)
+    covariance: Samples  # covariances of the coefficients, (k, c, c)
 
 
 def _whitened(blocks: _Blocks, noise: _Noise, most: int) -> tuple[Samples, float] | None:
@@ -447,11 +409,10 @@ def _fitted(blocks: _Blocks, numbers: Sequence[int]) -> list[_Fit]:
 
 
 def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
-    """Whether the rate changes significantly and by more than a tenth.
-
-    The last coefficient of a parabola, which shows a steady change, or of a cubic is tested against 0. As its standard
-    error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no change.
-    """
+    """Whether the rate changes significantly and by more than a tenth."""
+    # The last coefficient of a parabola, which shows a steady change, or of a cubic is tested against 0. As its
+    # standard error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no
+    # change.
     if blocks.s.size < _FEWEST_BLOCKS or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False
     return any(curve.p_value(-1) < _UNSTEADY_P and _bends(curve.mean) for curve in curves)

@@ -9,6 +9,7 @@ import shlex
 from importlib.resources import files
 from typing import Any
 
+from spirillum.formats.templates import rendered
 from spirillum.pages.knobs import Settings
 from spirillum.pages.page_robot import PageRobot
 from spirillum.pages.robot_data import quantity_list
@@ -86,26 +87,10 @@ def replay_page(replay: dict[str, Any]) -> str:
     for name in MODULES:
         text = _IMPORT.sub(r'\1 "spirillum/\2"', asset(name))
         modules[f"spirillum/{name}"] = "data:text/javascript;base64," + base64.b64encode(text.encode()).decode()
-    data = json.dumps({"quantities": quantity_list(), **replay}).replace("<", "\\u003c")
-    policy = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
-    title = re.sub(r"[<>&\"]", "", str(replay["robot"]))[:100]
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}: a run</title>
-<style>{asset("page.css")}</style>
-<script type="importmap">{json.dumps({"imports": modules})}</script>
-</head>
-<body class="alone">
-<main id="replay" class="view"></main>
-<script type="application/json" id="run">{data}</script>
-<script type="module">
-import {{ showReplay }} from "spirillum/replay.js";
-showReplay(document.getElementById("replay"), JSON.parse(document.getElementById("run").textContent));
-</script>
-</body>
-</html>
-"""
+    return rendered(
+        "pages/replay.html.jinja",  # whose parts are no text to be escaped: only the title comes from a user
+        title=re.sub(r"[<>&\"]", "", str(replay["robot"]))[:100],
+        style=asset("page.css"),
+        modules=json.dumps({"imports": modules}),
+        data=json.dumps({"quantities": quantity_list(), **replay}).replace("<", "\\u003c"),
+    )

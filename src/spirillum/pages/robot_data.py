@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import csv
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,55 +86,17 @@ def _linear(colour: Samples) -> Samples:
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
-TABLE = (
-    "forward_velocity",
-    "advance_per_radian",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "drive_torque",
-    "motor_current",
-    "battery_voltage",
-    "electrical_power",
-    "effective_friction",
-    "hydrodynamic_efficiency",
-    "overall_efficiency",
-    "cost_of_transport",
-)
-"""Quantities of the table, in its order."""
-SERIES = (
-    "forward_velocity",
-    "tail_rotation_rate",
-    "body_rotation_rate",
-    "motor_current",
-    "battery_voltage",
-    "drive_torque",
-    "electrical_power",
-    "wall_gap",
-    "tail_gap",
-    "azimuth",
-    "pitch",
-    "yaw",
-    "contact_force",
-    "mean_flow",
-)
-"""Quantities of a run that are displayed or plotted over time."""
+_ROWS = list(csv.DictReader(Path(__file__).with_name("quantities.csv").read_text(encoding="utf-8").splitlines()))
 
-_LABELS = {
-    "forward_velocity": "velocity",
-    "drive_torque": "torque",
-    "motor_current": "current",
-    "battery_voltage": "voltage",
-    "electrical_power": "power",
-    "hydrodynamic_efficiency": "efficiency, fluid",
-    "overall_efficiency": "efficiency, overall",
-    "wall_gap": "lubrication film under the body",
-    "tail_gap": "gap of the tail",
-    "contact_force": "load on asperities",
-    "tail_rotation_rate": "tail rate",
-    "body_rotation_rate": "body rate",
-    "effective_friction": "B_eff",
-    "advance_per_radian": "advance",
-}
+
+def _names(column: str) -> tuple[str, ...]:
+    """Quantities that have a number in a column, in its order."""
+    return tuple(row["name"] for row in sorted(_ROWS, key=lambda row: int(row[column] or 0)) if row[column])
+
+
+TABLE = _names("table")  #: Quantities of the table, in its order.
+SERIES = _names("series")  #: Quantities of a run that are displayed or plotted over time.
+_LABELS = {row["name"]: row["label"] for row in _ROWS if row["label"]}
 
 
 def quantity_list(rows: Mapping[str, Any] | None = None) -> dict[str, dict[str, Any]]:

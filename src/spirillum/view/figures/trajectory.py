@@ -6,7 +6,9 @@ contact; any other its path from the side and from above, current, powers and en
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,89 +54,36 @@ class _Panel:
     mean: bool = False  # whether the mean over a turn of the tail is plotted for the first line of a long run
 
 
-_PANELS = (
-    _Panel("gap to the wall", (("wall_gap", ""),)),
-    _Panel("velocity $U_x$", (("forward_velocity", ""),)),
-    _Panel("rate", (("tail_rotation_rate", "tail"), ("body_rotation_rate", "body"), ("motor_rotation_rate", "motor"))),
-    _Panel("angle", (("pitch", "pitch"), ("yaw", "yaw"))),
-    _Panel("wobble angle", (("wobble_angle", ""),)),
-    _Panel("phase lag", (("phase_lag", ""),)),
-    _Panel("motor current", (("motor_current", ""),)),
-    _Panel(
-        "power",
-        (
-            ("electrical_power", "electrical"),
-            ("shaft_power", "shaft"),
-            ("friction_power", "joint friction"),
-            ("dissipated_power", "dissipated"),
-        ),
-        logarithmic=True,
-    ),
-    _Panel(
-        "energy",
-        (
-            ("electrical_energy", "electrical"),
-            ("drive_energy", "drive"),
-            ("friction_energy", "joint friction"),
-            ("dissipated_energy", "dissipated"),
-        ),
-        logarithmic=True,
-    ),
-)
-_IN_TUBE = (
-    _Panel("gap", (("wall_gap", "under the body"), ("tail_gap", "under the tail")), film=True),
-    _Panel("azimuth", (("azimuth", ""),)),
-    _Panel("angle to wall", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
-    _Panel(
-        "force to wall",
-        (
-            ("weight_load", "weight"),
-            ("film_load", "film"),
-            ("outer_load", "other fluid"),
-            ("contact_load", "asperities"),
-        ),
-        changing=True,
-    ),
-    _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True, mean=True),
-    _Panel("velocity $U_x$", (("forward_velocity", ""),), mean=True),
-    _Panel("body rate", (("body_rotation_rate", ""),), mean=True),
-    _Panel("rotation rate", (("tail_rotation_rate", "tail"), ("motor_rotation_rate", "motor"))),
-    _Panel("mean flow", (("mean_flow", ""),), changing=True),
-)
-_COLOUR_OF = {
-    "tail": COLOURS["blue"],
-    "body": COLOURS["orange"],
-    "motor": COLOURS["green"],
-    "pitch": COLOURS["blue"],
-    "yaw": COLOURS["vermillion"],
-    "under the tail": COLOURS["vermillion"],
-    "weight": COLOURS["black"],
-    "film": COLOURS["blue"],
-    "other fluid": COLOURS["green"],
-    "asperities": COLOURS["vermillion"],
-    "electrical": COLOURS["black"],
-    "shaft": COLOURS["blue"],
-    "drive": COLOURS["blue"],
-    "friction": COLOURS["vermillion"],
-    "joint friction": COLOURS["vermillion"],
-    "dissipated": COLOURS["green"],
-}
-_LINE_OF: dict[str, Any] = {
-    "body": "--",
-    "motor": (0, (1, 1.2)),
-    "yaw": "--",
-    "under the tail": "--",
-    "weight": "--",
-    "other fluid": (0, (1, 1.2)),
-    "asperities": "-.",
-    "shaft": "--",
-    "drive": "--",
-    "friction": (0, (1, 1.2)),
-    "joint friction": (0, (1, 1.2)),
-    "dissipated": "-.",
-}
+def _panels(run: str) -> list[_Panel]:
+    """The rows of `run_panels.csv` for a run: any, or one in a tube."""
+    found = []
+    for row in csv.DictReader(Path(__file__).with_name("run_panels.csv").read_text(encoding="utf-8").splitlines()):
+        lines = [line.partition(" ") for line in row["lines"].split("; ")]
+        if row["run"] == run:
+            kinds = dict.fromkeys(row["kinds"].split(), True)
+            found.append(_Panel(row["label"], tuple((name, label) for name, _, label in lines), **kinds))
+    return found
 
 
+_LOOK_OF: dict[str, tuple[str, Any]] = {
+    "tail": ("blue", "-"),
+    "body": ("orange", "--"),
+    "motor": ("green", (0, (1, 1.2))),
+    "pitch": ("blue", "-"),
+    "yaw": ("vermillion", "--"),
+    "under the tail": ("vermillion", "--"),
+    "weight": ("black", "--"),
+    "film": ("blue", "-"),
+    "other fluid": ("green", (0, (1, 1.2))),
+    "asperities": ("vermillion", "-."),
+    "electrical": ("black", "-"),
+    "shaft": ("blue", "--"),
+    "drive": ("blue", "--"),
+    "friction": ("vermillion", (0, (1, 1.2))),
+    "joint friction": ("vermillion", (0, (1, 1.2))),
+    "dissipated": ("green", "-."),
+}
+"""Colour and line of a quantity by its label in the legend."""
 _MAIN = ("velocity $U_x$", "gap", "gap to the wall", "rate")  # panels of the short figure, the first two that a run has
 PANELS = ("main", "all")  #: Which panels a figure has: speed and gap, or everything.
 
@@ -146,7 +95,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double", panels: str =
     time = _time_of(dataset)
     path = _path_of(dataset, time)
     tube = _tube_robot(dataset, path)
-    shown = [panel for panel in (_PANELS if tube is None else _IN_TUBE) if _has(dataset, panel, time)]
+    shown = [panel for panel in _panels("any" if tube is None else "in a tube") if _has(dataset, panel, time)]
     if short := panels == "main":
         shown = sorted((one for one in shown if one.label in _MAIN), key=lambda one: _MAIN.index(one.label))[:2]
     if path is None and not shown:
@@ -321,13 +270,8 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
     steep = panel.logarithmic and min(largest) > 0 and max(largest) > _SPREAD * min(largest)
     for words, line in lines:
         drawn = np.where(line > 0, line, np.nan) if steep else line
-        axes.plot(
-            time,
-            scale(drawn),
-            color=_COLOUR_OF.get(words, COLOURS["blue"]),
-            linestyle=_LINE_OF.get(words, "-"),
-            label=words or None,
-        )
+        colour, style = _LOOK_OF.get(words, ("blue", "-"))
+        axes.plot(time, scale(drawn), color=COLOURS[colour], linestyle=style, label=words or None)
     if panel.mean and turn:
         middle, mean = (np.convolve(of, np.ones(turn) / turn, mode="valid") for of in (time, lines[0][1]))
         axes.plot(middle, scale(mean), color=COLOURS["black"], linewidth=1.0)

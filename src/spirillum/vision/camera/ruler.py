@@ -10,24 +10,17 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.optional_dependencies import import_optional
 
-_SHORTEST = 3.0
-"""Shortest resolved distance of lines, pixels."""
-_FEWEST = 8
-"""Fewest lines of a ruler."""
-_WINDOW = 1.5
-"""Standard deviation along the rows of the window of a local phase, over the lines' distance."""
-_ROWS = 2.0
-"""Standard deviation of the window of a local phase across the rows, pixels."""
-_COHERENT = 0.35
-"""Least coherence: amplitude of the ruler's wave over the local contrast."""
+_SHORTEST = 3.0  # shortest resolved distance of lines, pixels
+_FEWEST = 8  # fewest lines of a ruler
+_WINDOW = 1.5  # standard deviation along the rows of the window of a local phase, over the lines' distance
+_ROWS = 2.0  # standard deviation of the window of a local phase across the rows, pixels
+_COHERENT = 0.35  # least coherence: amplitude of the ruler's wave over the local contrast
 _STRONG = 0.6
 """Least amplitude of the wave over that inside the strips: at their ends the phase of slanted lines is biased."""
 _GAP = 12.0
 """Longest gap of a strip, in lines: a stronger line among fine ones, as every tenth of millimetre paper, hides them."""
-_WIDE = 25.0
-"""Lines that a strip has to span before its phase is extrapolated by more than a straight line."""
-_CLEAR = 8.0
-"""Least height of the ruler's spectral peak over the local median of the spectrum."""
+_WIDE = 25.0  # lines that a strip has to span before its phase is extrapolated by more than a straight line
+_CLEAR = 8.0  # least height of the ruler's spectral peak over the local median of the spectrum
 _CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 """Channels in which a ruler is searched, as weights of red, green and blue: brightness, then single colours."""
 _ROLLS = tuple(math.radians(sign * angle) for angle in (7.0, 14.0, 21.0, 28.0, 35.0, 42.0) for sign in (1.0, -1.0))
@@ -37,23 +30,17 @@ _UPRIGHT = math.radians(6.0)
 _PROFILES, _NEAR, _HELD = 8, 0.06, 0.25
 """Profiles along each strip that show whether a reduced picture has lines at their true distance; the relative range
 of a spatial frequency in which its power is looked for; and the least power there over that of finer lines."""
-_MOST_ROWS = 500
-"""About as many rows determine the distance of the lines in large pictures."""
-_BAND = 16
-"""Rows sorted at once, so that they stay in the cache."""
+_MOST_ROWS = 500  # about as many rows determine the distance of the lines in large pictures
+_BAND = 16  # rows sorted at once, so that they stay in the cache
 
 
 class Lines(NamedTuple):
     """Points in the ruler's strips with their unwrapped phase in lines."""
 
-    pixels: Samples
-    """Pixels (u, v) of the points, (n, 2)."""
-    number: Samples
-    """Phase in lines from an arbitrary origin of each strip, rising with u, (n,)."""
-    strip: np.ndarray
-    """Label of each point's strip, (n,)."""
-    distance: float
-    """Distance of neighbouring lines, pixels."""
+    pixels: Samples  #: Pixels (u, v) of the points, (n, 2).
+    number: Samples  #: Phase in lines from an arbitrary origin of each strip, rising with u, (n,).
+    strip: np.ndarray  #: Label of each point's strip, (n,).
+    distance: float  #: Distance of neighbouring lines, pixels.
 
     def enlarged(self, factor: int) -> Lines:
         """The lines in the full picture, if they were seen in one that was reduced by a factor."""
@@ -93,10 +80,8 @@ def still_picture(images: list[np.ndarray]) -> Samples:
 
 
 def _sorting(count: int) -> list[tuple[int, int]]:
-    """Comparators of a sorting network for `count` values: Batcher's odd-even merge sort.
-
-    K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
-    """
+    """Comparators of a sorting network for `count` values: Batcher's odd-even merge sort."""
+    # K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
     pairs, run = [], 1
     while run < count:
         step = run
@@ -110,16 +95,9 @@ def _sorting(count: int) -> list[tuple[int, int]]:
 
 
 def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:
-    """Detect a ruler in a static picture; None if there is none.
-
-    The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
-    unwrapped from the middle of each strip outwards.
-
-    Args:
-        picture: 0 to 255, (h, w, 3).
-        bounds: region of interest: left, top, right, bottom; the last two are exclusive.
-        turn: angle of the channel to the rows, positive downwards to the right, rad, to some degrees.
-    """
+    """Detect a ruler in a static picture; None if there is none."""
+    # The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
+    # unwrapped from the middle of each strip outwards.
     left, top, right, bottom = bounds
     colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32, copy=False)
     back = None
@@ -134,16 +112,9 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
 
 
 def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
-    """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones.
-
-    Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
-    1 / factor. The full picture shows at which of these it holds the larger part of its power.
-
-    Args:
-        lines: in pixels of the full picture.
-        image: a full picture, 8-bit RGB, (h, w, 3).
-        factor: by which the other one was reduced.
-    """
+    """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones."""
+    # Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
+    # 1 / factor. The full picture shows at which of these it holds the larger part of its power.
     cv2 = import_optional("cv2", "measuring a video", "video")
     way = np.array([math.cos(lines.roll), math.sin(lines.roll)])
     side = np.array([-way[1], way[0]])
