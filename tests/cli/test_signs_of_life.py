@@ -30,7 +30,7 @@ def test_piped_work_is_named_where_it_takes_long(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for first, told in ((0.0, "looking at a film, 0 s elapsed\n"), (60.0, "")):
-        monkeypatch.setattr(renderer, "_FIRST", first)
+        monkeypatch.setattr(renderer, "FIRST", first)
         with renderer.at_work("looking at a film", quiet=False):
             time.sleep(0.1)
         assert capsys.readouterr().err == told
