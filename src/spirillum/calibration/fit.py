@@ -117,7 +117,9 @@ def fit_model(
         raise InputError(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
-    _check_answer(answer, method)
+    check_choice("answer", answer, (HELD, RELEASED))
+    if answer == RELEASED and method == "paper":
+        raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
     if model != AUTO:
         free_names(free, find_swimmer_model(model, AUTO).name, released=answer == RELEASED)
     if prepare and not is_fitted_in_tube(model, free, method):
@@ -137,13 +139,6 @@ def fit_model(
     inertia_warnings(experiment)
     found = _fitted_by(method, problem, friction, sampling, progress)
     return replace(found, model_reason=choice.reason)
-
-
-def _check_answer(answer: str, method: str) -> None:
-    """Refuse a fit of trials by the method that inverts held motion."""
-    check_choice("answer", answer, (HELD, RELEASED))
-    if answer == RELEASED and method == "paper":
-        raise InputError("answer = 'trial' with method 'paper', which inverts held motion; allowed: another method")
 
 
 def _fitted_by(

@@ -216,9 +216,11 @@ def run_averages(
         for name, (values, unit) in integrals.items():
             words = f"{name.replace('_', ' ')}, {note}"
             source = "Section III of BioRob 2012" if not ending else "integrals of the run"
+            length = _length(over)
+            gained = sum(float(np.diff(np.interp(stretch, time, values))[0]) for stretch in over)
             found[name + ending] = (
                 (),
-                _average(time, values, over),
+                (gained / length if length > 0 else float("nan")),
                 {"units": unit, "long_name": words, "source": source},
             )
     found["time_on"] = ((), _length(stretches), attributes("time_on"))
@@ -228,12 +230,6 @@ def run_averages(
 
 def _length(stretches: Sequence[DutyInterval]) -> float:
     return float(sum(end - start for start, end in stretches))
-
-
-def _average(time: Samples, values: Samples, stretches: Sequence[DutyInterval]) -> float:
-    length = _length(stretches)
-    gained = sum(float(np.diff(np.interp(stretch, time, values))[0]) for stretch in stretches)
-    return gained / length if length > 0 else float("nan")
 
 
 def _steady_part(

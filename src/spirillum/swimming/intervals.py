@@ -231,7 +231,13 @@ def _with_discrepancy(
     with np.errstate(divide="ignore", invalid="ignore"):
         if batch.joint != "fixed":
             values |= _torques_and_powers(swum, values, batch, pace, own_drive=own_drive, friction=friction)
-        return values | _over_speed(swum, values, speed)
+        shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
+        spent = np.where(np.isnan(electrical), shaft, electrical)
+        return values | {
+            "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
+            "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
+            "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
+        }
 
 
 def _pace_at(swum: Swimming, batch: RobotBatch, turning: Samples) -> Samples:
@@ -293,14 +299,3 @@ def _torques_and_powers(
             found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
     torques = friction_torques(friction_reading(friction), effective, rotor)
     return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}
-
-
-def _over_speed(swum: Swimming, values: dict[str, Samples], speed: Samples) -> dict[str, Samples]:
-    """Efficiencies and the cost of transport: powers over powers, or over weight times speed."""
-    shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
-    spent = np.where(np.isnan(electrical), shaft, electrical)
-    return {
-        "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
-        "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
-        "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
-    }
