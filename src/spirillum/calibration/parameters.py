@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.envelope import interval
 from spirillum.errors import InputError, check_choice, did_you_mean
 from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.model_options import CALIBRATED
@@ -342,3 +343,8 @@ class Estimate:
     value: float
     low: float
     high: float
+
+    @property
+    def interval(self) -> dict[str, Any]:
+        """Its interval in JSON."""
+        return interval(self.low, self.high, LEVEL)

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.argument_validation import number_array
 from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.display import DisplayMixin
-from spirillum.envelope import envelope, quantity
+from spirillum.envelope import envelope, interval, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
@@ -121,9 +121,7 @@ class Intervals:
 
     def of(self, name: str) -> dict[str, Any]:
         """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
-        if not np.isfinite(self.low[name]):
-            return {}
-        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
+        return interval(self.low[name], self.high[name], LEVEL)
 
 
 _MORE = ("wobble_angle", "path_radius", "step_out_rate", "phase_lag", "plug_velocity")
