@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.cli.tables.motion import _events
 from spirillum.robot.load import preset_names, shipped_robots
 
 KEYS = (
@@ -196,3 +197,8 @@ def test_completion_offers_presets(monkeypatch, capsys: pytest.CaptureFixture[st
     assert shared_options.complete_parts("ro") == ["robot", "rotor"]
     assert shared_options.complete_auto_models("") == ["auto", *sorted(SWIMMER_MODELS)]
     assert shared_options.complete_resistance_models("p") == ["perrin"]
+
+
+def test_events_in_the_wait_have_no_negative_times() -> None:
+    events = [{"time": -52.52, "what": "touches"}, {"time": 1.0, "what": "duty 0"}]
+    assert list(_events(events)) == ["52.52 s before the run, in the wait: touches", "1 s: duty 0"]

@@ -2,6 +2,7 @@
 
 import os
 import re
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -332,7 +333,14 @@ def test_a_closed_folder_is_refused_before_the_work(
     def closed(path: str, mode: int, **more: bool) -> bool:
         return access(path, mode, **more) and not (mode & os.W_OK and Path(path).resolve() in shut)
 
+    def made(suffix: str | None = None, prefix: str | None = None, dir: str | None = None) -> str:  # noqa: A002
+        if dir is not None and Path(dir).resolve() in shut:
+            raise PermissionError(13, "permission denied", dir)
+        return make(suffix, prefix, dir)
+
     monkeypatch.setattr(os, "access", closed)
+    make = tempfile.mkdtemp
+    monkeypatch.setattr(tempfile, "mkdtemp", made)
     monkeypatch.chdir(tmp_path)
     for work in ("study.computed_study", "study.make_tables", "study_store.make_tables"):
         monkeypatch.setattr(f"spirillum.results.{work}", None)

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import spirillum as sp
 from spirillum.dynamics.run_file import poses_of
+from spirillum.view.scene3d.film import _about
 from spirillum.view.scene3d.scene import DrawnRobot
 from spirillum.view.scene3d.scenery import fitted
 
@@ -154,3 +156,10 @@ def test_wrong_option_is_named(
         sp.film(run_of(free_robot), tmp_path / "run.mp4", **options)
     assert words in str(error.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_says_how_fast_the_robot_swims() -> None:
+    run = xr.Dataset({"mean_forward_velocity_on": 1.53456e-4})
+    assert _about(run, "tube") == "model tube, mean velocity 0.1535 mm/s with the drive on"
+    assert _about(run / 10.0, "") == "mean velocity 15.35 µm/s with the drive on"
+    assert _about(xr.Dataset(), "tube") == "model tube"

@@ -257,9 +257,13 @@ _NONE: Answer = {"value": None}  # of the time, which has no mean
 
 def _events(events: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for event in merged_events([(event["time"], event["what"]) for event in events]):
-        again = f", {event.times} times until {event.last:.4g} s" if event.times > 1 else ""
-        before = " before the run, in the wait" if event.time < 0.0 else ""
-        yield f"{abs(event.time):.4g} s{before}: {event.what}{again}"
+        again = f", {event.times} times until {_when(event.last)}" if event.times > 1 else ""
+        yield f"{_when(event.time)}: {event.what}{again}"
+
+
+def _when(time: float) -> str:
+    """A time from the start of the run, s, negative in the wait before it."""
+    return f"{time:.4g} s" if time >= 0.0 else f"{-time:.4g} s before the run, in the wait"
 
 
 def _final_values(answer: Answer) -> Iterator[tuple[str, Any]]:

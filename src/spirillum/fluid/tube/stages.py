@@ -103,7 +103,7 @@ _TIGHT_CHECKS = {place: fineness for place, fineness in _FINEST.items() if place
 YAW = Stage(
     "yaw",
     up=(0.0, 0.5, 0.85, 1.0),
-    down=(0.0, 0.4, 0.85, 1.0),
+    down=(0.0, 0.35, 0.85, 1.0),
     upper=(0.45, 0.75, 1.0),
     phases=((0.0, 7), (0.5, 5), (3.0, 3)),
     resolutions=_COARSE,
@@ -112,7 +112,7 @@ YAW = Stage(
     checks=_COARSE | _TIGHT_CHECKS | {("near", "yawed"): _FINER},
     hardest=((0.08, -0.7), (0.92, 0.97), (0.15, 0.97), (0.98, 0.3)),
     hardest_yawed=((0.01, -0.65, 0.4), (0.98, 0.05, 0.97), (0.13, 0.89, -0.97)),
-    growth=2.6,
+    growth=3.0,
     film_intervals=11,
 )
 STRAIGHT = replace(YAW, name="straight", seconds=(1.4, 3.5), held_out=4, yawed=False, film_yaws=1)

@@ -103,7 +103,7 @@ export function sectionWords(shape, values) {
   const film = `film ${length(values.wall_gap)}`;
   const load = values.contact_force;
   if (load === undefined || load === null) return film;
-  return load > 0 ? `${film}, asperities ${(1e3 * load).toPrecision(2)} mN` : `${film}, nothing touches`;
+  return load > 0 ? `${film}, contact ${(1e3 * load).toPrecision(2)} mN` : `${film}, no contact`;
 }
 
 // Circles about the body's axis as seen along x.

@@ -181,16 +181,21 @@ def film(
     shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_centre(dataset), inset=inset)
     on_progress = progress or (lambda _what, _done, _total: None)
     with atomic_write(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
-        about = [f"model {model}"] if model else []
-        if "mean_forward_velocity_on" in dataset:
-            mean = float(dataset["mean_forward_velocity_on"])
-            about.append(f"mean velocity {with_micro(show(mean, display_unit(mean, 'm/s')))} with the drive on")
-        with closing(shots.images(times, ", ".join(about), speed)) as images:
+        with closing(shots.images(times, _about(dataset, model), speed)) as images:
             for number, image in enumerate(images):
                 on_progress("film", number, times.size)
                 writer.add(image)
         on_progress("film: writing", times.size, times.size)
     return Film(target, robot, model, times.size, pixels, fps, speed, follows, turn, warnings)
+
+
+def _about(dataset: xr.Dataset, model: str) -> str:
+    """Line below the title: the model, and how fast the robot swims."""
+    found = [f"model {model}"] if model else []
+    if "mean_forward_velocity_on" in dataset:
+        mean = float(dataset["mean_forward_velocity_on"])
+        found.append(f"mean velocity {with_micro(show(mean, display_unit(mean, 'm/s')))} with the drive on")
+    return ", ".join(found)
 
 
 class _Shots:
