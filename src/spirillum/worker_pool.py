@@ -29,8 +29,7 @@ from spirillum.errors import InputError
 from spirillum.optional_dependencies import import_optional
 from spirillum.version import own_version, versions
 
-AHEAD = 3
-"""Tasks that wait or are answered for each process: what is sent ahead and what is not yet taken stays in memory."""
+AHEAD = 3  #: Tasks that wait or are answered for each process: what is sent ahead or not yet taken stays in memory.
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _Task = TypeVar("_Task")
@@ -118,14 +117,12 @@ def _start_of_processes() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-ESTIMATE = "estimate: "
-"""Prefix of a progress message that estimates the work: a command prints it as a line of its own."""
+ESTIMATE = "estimate: "  #: Prefix of a progress message that estimates the work: a command prints it on its own line.
 _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss|inproc)://\S{1,200}")
 _PATIENCE = 5.0  # time in which a scheduler has to answer, s
 _LOOK = 1.0  # time between two looks whether the scheduler is still there, s
 _LONGEST_TRANSFER = 120.0  # time in which an answer has to come from the worker that has it, s
-_MOST_DEATHS = 100
-"""Tasks that may be given up because several workers ended at them, before the tasks are taken for the cause."""
+_MOST_DEATHS = 100  # tasks given up because several workers ended at them before the tasks are taken for the cause
 _MOST_WORKERS = 64
 _alone = Lock()
 Tell = Callable[[str], None]

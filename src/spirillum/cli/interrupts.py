@@ -21,8 +21,7 @@ _KEPT = {
 }
 """Commands of minutes, with the end of their sentence; braces stand for the folder of results."""
 _PATHS = ("FILE", "DIR", "FOLDER.zarr")
-_NUMBER = re.compile(r"[\d.+-]+")
-"""Also in digits of other scripts."""
+_NUMBER = re.compile(r"[\d.+-]+")  # also in digits of other scripts
 
 
 class InterruptibleCommand(TyperCommand):

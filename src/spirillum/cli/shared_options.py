@@ -148,5 +148,4 @@ class NotedCommand(InterruptibleCommand):
             self.params.insert(self.params.index(json) + 1, notes)
 
 
-every_note: ContextVar[bool] = ContextVar("every_note", default=False)
-"""Whether the command that runs was given `--notes`."""
+every_note: ContextVar[bool] = ContextVar("every_note", default=False)  #: Whether the running command has `--notes`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,11 @@ from spirillum.cli.function_command import Request, from_function
 from spirillum.cli.inputs import refuse_conflicts
 from spirillum.cli.shared_options import NO_FORM, Json, choices, optional_robot, starting
 from spirillum.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spirillum.fields.flow import Flow
 
 
 @from_function(
@@ -121,10 +126,9 @@ def flow(
     from spirillum.fields.flow import box_around, flow_answer, plane_around, seat_in_tube
     from spirillum.files import guard_inputs
     from spirillum.fluid.tube.domain import pose_of
-    from spirillum.results.flow import check_targets, write_flow
 
     with guard_inputs(run):
-        check_targets(output, volume)
+        _check_targets(output, volume)
     model = request.typed.get("model", "auto")
     states = {"no plane": output is None, "no volume": volume is None, "run": run is not None}
     states["run with another model"] = run is not None and model not in ("auto", "tube")
@@ -159,5 +163,37 @@ def flow(
         if volume is not None:
             written[volume] = found.volume(extent=extent, resolution=volume_resolution, progress=progress)
         for path, dataset in written.items():
-            write_flow(found, dataset, path)
+            _write_flow(found, dataset, path)
     renderer.show(flow_answer(found, written), json=json)
+
+
+def _check_targets(plane: Path | None, volume: Path | None) -> None:
+    """Check the files before any work is done."""
+    from spirillum.files import PICTURES, output_target
+
+    netcdf = {".nc": "a NetCDF file"}
+    if plane is None and volume is None:
+        raise InputError("no file is requested; allowed: -o flow.png for a plane, --volume flow.vti for a box, or both")
+    if plane is not None:
+        output_target(plane, {**PICTURES, **netcdf}, "flow.png")
+    if volume is not None:
+        output_target(volume, {".vti": "a VTK image file", **netcdf}, "flow.vti")
+    if plane is not None and volume is not None and plane.resolve() == volume.resolve():
+        raise InputError(f"{plane} is requested as plane and as box; allowed: two files")
+
+
+def _write_flow(flow: Flow, dataset: xr.Dataset, path: Path) -> None:
+    """Write a plane or a box in the format of the file's suffix."""
+    if path.suffix.lower() == ".nc":
+        from spirillum.files import write_dataset
+
+        write_dataset(dataset, path)
+    elif path.suffix.lower() == ".vti":
+        from spirillum.formats.array_files import write_vti
+
+        write_vti(dataset, path)
+    else:
+        from spirillum.view.figures.flow import flow_figure
+        from spirillum.view.figures.style import save_as
+
+        save_as(flow_figure(flow, dataset), path)

@@ -57,8 +57,7 @@ class Paths:
 
     time: Samples  #: s, (n,).
     members: Samples  #: Tail's phase and body's angle, rad, current, A, and voltage, V, (friction, gap, 4, n).
-    sensitivity: Samples
-    """Relative change of each quantity per relative one of voltage and viscosity, (friction, 2, 4, n)."""
+    sensitivity: Samples  #: Relative change of a quantity per that of voltage and viscosity, (friction, 2, 4, n).
 
 
 class Bank:
@@ -130,8 +129,7 @@ def _quantities(moment: Snapshot) -> list[float]:
     return [moment.pose.tail_phase, values["body_angle"], values["motor_current"], values["battery_voltage"]]
 
 
-_SPEED_WALK = 0.15
-"""sigma_s over the predicted speed, 1/sqrt(s): the film under the robot thins within some ten seconds."""
+_SPEED_WALK = 0.15  # sigma_s over the predicted speed, 1/sqrt(s): the film under the robot thins in some ten seconds
 _DRIFT = 3e-4  # sigma_w, m/s: of the size of a pulse
 _DRIFT_MEMORY = 2.0  # tau, s
 _STRAY = 6.0  # sights further away than so many standard deviations are left out...

@@ -39,8 +39,7 @@ Chosen on 120 seeds, checked on others, see `docs/control-background.md`."""
 _BANK_MEMORY = 4.0  # correlation time of the bank's errors, s
 _ANYWHERE = 1e2  # standard deviation of where an angle began, rad
 _COARSE, _FINE = 41, 61
-_NEGLIGIBLE = 15.0
-"""Points whose log posterior is lower than the maximum by more than this are left out of the finer grid."""
+_NEGLIGIBLE = 15.0  # points whose log posterior is below the maximum by more than this are left out of the finer grid
 _UNINFORMED = 0.8  # a factor counts as not learnt where its 95 % interval is at least this share of the prior's
 
 

@@ -68,8 +68,7 @@ class Message:
 class Controller(Protocol):
     """Decides once in a period of the remote; new for each run."""
 
-    blind: bool = False
-    """Whether it continues without a camera; else the drive is switched off when the camera is silent."""
+    blind: bool = False  #: Whether it goes on without a camera; else the drive is off when the camera is silent.
     knowing: bool = False  #: Whether it is given the truth.
 
     def decide(self, news: Message) -> float | Command:

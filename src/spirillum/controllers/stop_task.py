@@ -104,8 +104,7 @@ class KnowingStop(Controller):
 
 
 _STEP = 0.2  # step in which the open loop's time is looked for, s
-_PATIENCE = 10.0
-"""Multiple of the time that the robot of the file needs at its steady speed, within which it has to arrive."""
+_PATIENCE = 10.0  # multiple of the time that the robot of the file needs at steady speed, within which it has to arrive
 _SPARE, _SETTLING = 2.5, 5.0  # A run lasts so many times as long as the robot of the file needs, and s
 
 

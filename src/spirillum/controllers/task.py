@@ -199,8 +199,7 @@ class ControllerScore:
     good: tuple[float, float, float]  #: Share of good runs.
     error: tuple[float, float, float]  #: Mean size of the task's error, SI.
     energy: tuple[float, float, float]  #: Mean energy, J.
-    against: tuple[float, float, float]
-    """Mean of this controller's size of the error less that of the task's own, run by run."""
+    against: tuple[float, float, float]  #: Mean size of this controller's error less that of the task's own, by runs.
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """Files: the one way to read and the one way to write; what is promised of both is on the page `docs/promises.md`."""
 
-from spirillum.files.folders import claim_folder, results_folder
 from spirillum.files.limits import checked_path, file_name, is_text, text_cell
 from spirillum.files.locks import scratch_folder
 from spirillum.files.netcdf import loaded_netcdf, netcdf_file, open_netcdf, write_dataset
@@ -21,12 +20,14 @@ from spirillum.files.writing import (
     atomic_write,
     atomic_write_all,
     check_replaceable,
+    claim_folder,
     guard_inputs,
     holds_own_only,
     netcdf_target,
     new_file,
     output_folder,
     output_target,
+    results_folder,
     writable_target,
     write_text,
     written_by_us,

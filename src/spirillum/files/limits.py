@@ -10,8 +10,7 @@ from pathlib import Path
 from spirillum.errors import InputError
 
 LARGEST_TEXT = 1 << 20  #: Robot, study, setup and calibration files, and marks of folders, bytes.
-MOST_LEVELS = 24
-"""Parts of a dotted key in a TOML file: tables within tables. The files of this program have at most five."""
+MOST_LEVELS = 24  #: Parts of a dotted key in a TOML file: tables in tables. Files of this program have at most five.
 LARGEST_TABLE = 128 << 20  #: Tables in CSV or Parquet, bytes.
 MOST_ROWS = 1_000_000  #: Rows of a table.
 MOST_COLUMNS = 500  #: Columns of a table.

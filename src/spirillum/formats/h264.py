@@ -14,8 +14,7 @@ from spirillum.errors import InputError
 from spirillum.kernels.rendering import film_colours
 from spirillum.optional_dependencies import import_optional
 
-ENCODERS = ("libx264", "libopenh264", "h264")
-"""Encoders of H.264, best first; which are available depends on the build of PyAV."""
+ENCODERS = ("libx264", "libopenh264", "h264")  #: Encoders of H.264, best first, as far as the build of PyAV has them.
 _BT709 = 1
 _LIMITED_RANGE = 1
 

@@ -88,8 +88,7 @@ _MOTION_HEADERS = (
     "cavitation.h",
     "lanes.h",
 )
-_REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100
-"""Value references, which the C source knows too."""
+_REMOTE, _DUTY, _FLOW, _FIRST_OUTPUT, _FIRST_PARAMETER = 1, 2, 3, 10, 100  # value references, also in the C source
 
 
 class FmuVariable(NamedTuple):

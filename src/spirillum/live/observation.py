@@ -34,7 +34,7 @@ class Observation(DisplayMixin):
     body_angle: float = math.nan
     """Angle by which the body has turned about +x, continuous, rad; all of it may be off by `body_period`."""
     tail_phase: float = math.nan
-    """Phase of the tail about +x in the lab, continuous, rad; all of it may be off by whole turns."""
+    """Phase of the tail about +x in the lab, continuous, rad; it may be off by whole turns."""
     position_error: float = math.nan  #: Standard error of x, m.
     heading_error: float = math.nan  #: Standard error of the heading, rad.
     body_angle_error: float = math.nan  #: Standard error of the body's angle, rad.

@@ -19,8 +19,7 @@ from spirillum.measurement.statistics import student_t_quantile
 from spirillum.robust import mad_scale, repeated_median_line, running_median
 from spirillum.vision.track.track import Track
 
-GRUBBS_LEVEL = 0.01
-"""Significance level of Grubbs' test: the probability that it names one of trials of one distribution."""
+GRUBBS_LEVEL = 0.01  #: Significance level of Grubbs' test: the probability that it names a trial of one distribution.
 _WINDOW = 9  # frames of the running median
 _SIGMAS = 6.0  # standard deviations beyond which a frame is an outlier
 _LEAST = 0.5
@@ -92,12 +91,10 @@ def outlying_trial(values: Sequence[float]) -> int | None:
     return int(known[worst]) if distance[worst] > bound else None
 
 
-LEADING = 6
-"""First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave."""
+LEADING = 6  #: First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave
 _FEWEST = 40  # fewest frames of a track from which they are left out
 _BESIDE = 20  # frames that the first one is compared with
-_AHEAD = 1.5
-"""Standard errors by which position and angles together have to lead. Chance alone leaves them out 14 times in 100."""
+_AHEAD = 1.5  # standard errors by which position and angles together lead. Chance leaves them out 14 times in 100.
 _MOST = 4.0  # standard errors that one of them counts at most
 
 

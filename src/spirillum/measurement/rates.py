@@ -23,14 +23,13 @@ _MOST_BLOCKS = 100
 """Most blocks into which frames are averaged: a slope is a low-frequency quantity; the cost is cubic in blocks."""
 _SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)  # variance shares of the correlated part on the grid
 _TIMES = 8  # correlation times on the grid
-_SIZES = (0.25, 1.0)
-"""Variances of the periodic errors on the grid, over the expected ones; weighted by their likelihood."""
+_SIZES = (0.25, 1.0)  # variances of periodic errors on the grid, over the expected ones; weighted by likelihood
 _FEWEST_BLOCKS = 24  # fewest blocks from which a change of the rate is detected
 _WHITE = 3.0  # prior odds of white noise against all correlated noises
 _FEWEST = 8  # fewest frames from which autocorrelation is estimated; errors of fewer frames are taken as independent
 _UNSTEADY_P = 1e-3  # p-value of a curvature below which a rate is taken to change, two-sided
 _LARGEST_RATIO = 1e6
-"""Largest variance of a periodic error over that of the noise; a larger one only adds rounding errors."""
+"""Largest variance of a periodic error over that of the noise; larger ones only add rounding errors."""
 _UNSTEADY_SHARE = 0.1  # relative change of a rate below which it counts as steady
 _END_TO_END = np.array([0.0, 1.0, 0.0, 1.0])
 """The mean rate (p(1) - p(-1))/2 of a series of Legendre polynomials, to which those of odd degree contribute."""

@@ -53,16 +53,13 @@ def mean_with_interval(values: Sequence[float], level: float = 0.95) -> Mean:
     return Mean(float(measured.mean()), student_t_quantile(0.5 + 0.5 * level, count - 1) * spread, count)
 
 
-PIXEL_ERROR = 0.03
-"""Least expected amplitude of periodic errors of the position, by an angle or by the pixel grid, pixels."""
+PIXEL_ERROR = 0.03  #: Least expected amplitude of periodic errors of the position, by angles or the pixel grid, pixels.
 AMPLITUDE_ERROR = 0.12
 """Relative standard error of a lateral amplitude: static edges of the glass beside the body bias it towards zero.
 
 On rendered videos from the side, with the body within a few pixels of the tube's edge, the bias was 12 to 20 %."""
-STRIPE_ERROR = math.radians(0.2)
-"""Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
-PHASE_ERROR = math.radians(1.0)
-"""Least expected amplitude of errors of the tail's phase that repeat once or twice a turn, rad."""
+STRIPE_ERROR = math.radians(0.2)  #: Least expected amplitude of the body's angle errors that repeat with stripes, rad.
+PHASE_ERROR = math.radians(1.0)  #: Least expected amplitude of the phase's errors that repeat once or twice a turn, rad
 DRIFT_PIXELS = 0.01  #: Drift of the position error from end to end, by light and perspective, pixels.
 DRIFT_BARE = 0.1  #: Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered videos.
 DRIFT_ANGLE = math.radians(0.1)

@@ -42,8 +42,7 @@ WOBBLES = (
     "heading_wobble_at_body_rate",
 )
 """Amplitudes of lateral motion and heading at the rotation rates of tail and body."""
-MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
-"""All quantities of a trial, and of a summary over trials."""
+MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)  #: All quantities of a trial and of a summary.
 _FEW_TURNS = 2.0  # fewest turns over which a wobble is fitted
 _DEGREE = 5  # degree of the polynomial that smooths an angle
 _FEWEST = 12  # fewest frames for that polynomial

@@ -97,8 +97,7 @@ class Settings:
     """Settings of one robot of the page; frozen, so that undo is a list of them."""
 
     source: Any  #: Preset's name, file or checked robot that it starts from.
-    overrides: Mapping[str, str] = field(default_factory=dict)
-    """Fields of the robot that were changed, with their unit."""
+    overrides: Mapping[str, str] = field(default_factory=dict)  #: Changed fields of the robot, with their unit.
     run: Mapping[str, str] = field(default_factory=dict)  #: `gap`, `pitch`, `flow` where they are set, with their unit.
     model: str = "auto"  #: Requested model.
 

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 ROBOT_FILE, _SETUP = "robot.toml", "setup.toml"
 _START: Mapping[str, Any] = {"robot.file": "biorob2012-wide", "robot.direction": "right", "camera.view": "top"}
-_SIZE_APART = 0.06
-"""Relative difference between a clicked body's length and that of its file above which it is reported."""
+_SIZE_APART = 0.06  # relative difference of a clicked body's length from that of its file above which it is reported
 _MOST_STILLS = 4
 
 

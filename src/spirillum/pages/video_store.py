@@ -37,8 +37,7 @@ def plain_names(folder: Path) -> Iterator[None]:
         raise InputError(plain(str(error), folder), [plain(one, folder) for one in error.problems]) from error
 
 
-_LARGEST_TOGETHER = 128 << 20
-"""Bytes of all files and messages that are in memory at once. Videos are written to the disk."""
+_LARGEST_TOGETHER = 128 << 20  # bytes of all files and messages in memory at once. Videos are written to the disk.
 
 
 class TooLargeError(InputError):

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 
 _MARK = "study.json"
 _NOTES = "notes"
-_GOLDEN = 0.618
-"""Share of all regions between one and the next that is computed, so that any number of them is spread evenly."""
+_GOLDEN = 0.618  # share of all regions between one and the next that is computed, so that any number spreads evenly
 
 Tell = Callable[[str, int, int], None]
 

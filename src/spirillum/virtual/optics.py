@@ -41,8 +41,7 @@ class VirtualLens:
     tilt: tuple[float, float] = (0.0, 0.0)  #: Angle of the optical axis to the vertical about x, then about y, rad.
     distortion: tuple[float, float] = (0.0, 0.0)
     """Coefficients k1, k2 of radial distortion, r -> r (1 + k1 r^2 + k2 r^4), r over the focal length."""
-    turn: Samples = field(init=False, repr=False, compare=False)
-    """Rotation from the frame to the tilted camera, (3, 3)."""
+    turn: Samples = field(init=False, repr=False, compare=False)  #: Rotation from frame to tilted camera, (3, 3).
 
     def __post_init__(self) -> None:
         (cx, sx), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in self.tilt)

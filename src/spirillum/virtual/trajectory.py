@@ -34,8 +34,7 @@ class TrialTrajectory:
 
     time: Samples = field(repr=False)  #: (n,) increasing, s.
     position: Samples = field(repr=False)  #: The body's mid-length, m, (n, 3).
-    heading: Samples = field(repr=False)
-    """Angle of the motor axis to x in the plane of the picture, about +z, rad, (n,)."""
+    heading: Samples = field(repr=False)  #: Angle of the motor axis to x in the picture's plane, about +z, rad, (n,).
     pitch: Samples = field(repr=False)  #: Angle by which the nose points towards the camera, rad, (n,).
     body_angle: Samples = field(repr=False)  #: Angle of the body about +x, unwrapped, rad, (n,).
     tail_phase: Samples = field(repr=False)  #: Phase of the tail about +x in the lab, unwrapped, rad, (n,).

@@ -90,7 +90,7 @@ def truth_dataset(
         "x": ("m", "the body's mid-length along the channel, from below the lens"),
         "y": ("m", "the body's mid-length across, y = z x x with z towards the camera"),
         "z": ("m", "height of the body's mid-length above the reference plane"),
-        "heading": ("rad", "angle of the motor axis to x in the plane of the picture, about +z"),
+        "heading": ("rad", "angle of the motor axis to x in the picture's plane, about +z"),
         "body_angle": ("rad", "angle of the body about +x, unwrapped; the first stripe is on +z at 0"),
         "tail_phase": ("rad", "phase of the tail about +x, unwrapped"),
     }

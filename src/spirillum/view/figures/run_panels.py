@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 
 _MOST_EVENTS = 12  # events that are named
-_WIDE = (0.04, 0.08)
-"""Width of a label with one number and with two, over that of the axis: events without room share one."""
+_WIDE = (0.04, 0.08)  # width of a label with one number and with two, over the axis's: events without room share one
 _LETTER = 0.07  # share of a time axis above which the panel's letter is placed
 
 

@@ -48,8 +48,7 @@ class _Panel:
     label: str
     lines: tuple[tuple[str, str], ...]  # variable and its legend label
     logarithmic: bool = False  # whether a logarithmic axis may be used
-    film: bool = False
-    """Whether the axis is logarithmic over the whole range of the lines, with the roughness as a level."""
+    film: bool = False  # whether the axis is logarithmic over the whole range of the lines, with the roughness marked
     changing: bool = False  # whether a panel whose lines are constant is left out
     mean: bool = False  # whether the mean over a turn of the tail is plotted for the first line of a long run
 

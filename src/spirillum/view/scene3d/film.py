@@ -86,8 +86,7 @@ CAMERAS = ("auto", "fixed", "follow")
 _ALONG = ("front", "rear")  # views that show the cross-section themselves
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
-_LARGEST_TURN = 0.25
-"""Largest part of a turn of the tail between two frames at which its sense can still be seen (aliasing)."""
+_LARGEST_TURN = 0.25  # largest part of a tail's turn between two frames at which its sense can be seen (aliasing)
 
 
 @dataclass(frozen=True, repr=False)

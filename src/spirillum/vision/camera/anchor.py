@@ -23,8 +23,7 @@ from spirillum.vision.video.pictures import reduced, reduction
 
 _COARSE = 160  # width of the reduced picture whose coarse structure is compared, pixels
 _REACH = 10  # largest shift that is looked for there, pixels
-_BLUR = 12.0
-"""Standard deviation of the widest blur, pixels; wider ones are made on a reduced picture, as they take long."""
+_BLUR = 12.0  # standard deviation of the widest blur, pixels; wider ones take long and are made on a reduced picture
 _SWAYS = 0.15  # scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels
 _STEPS, _STILL = 12, 0.005  # most Gauss-Newton steps, and the step below which they end, pixels
 _STEEP = 0.85  # share of the picture with the smallest gradients, which is not used

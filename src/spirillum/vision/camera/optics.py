@@ -50,8 +50,7 @@ class Optics:
     tilt_x: float = 0.0  #: Tilt about x, rad.
     tilt_y: float = 0.0  #: Tilt about y, rad.
     rotation: float = 0.0  #: Rotation about the optical axis, rad.
-    k1: float = 0.0
-    """Radial distortion: r, the tangent of the angle to the optical axis, becomes r (1 + k1 r^2 + k2 r^4)."""
+    k1: float = 0.0  #: Radial distortion: r, the tangent of the angle to the axis, becomes r (1 + k1 r^2 + k2 r^4).
     k2: float = 0.0  #: Radial distortion of fourth order.
     direction: str = "right"  #: Where in the picture x points: one of `DIRECTIONS`.
 

@@ -15,10 +15,8 @@ _FEWEST = 8  # fewest lines of a ruler
 _WINDOW = 1.5  # standard deviation along the rows of the window of a local phase, over the lines' distance
 _ROWS = 2.0  # standard deviation of the window of a local phase across the rows, pixels
 _COHERENT = 0.35  # least coherence: amplitude of the ruler's wave over the local contrast
-_STRONG = 0.6
-"""Least amplitude of the wave over that inside the strips: at their ends the phase of slanted lines is biased."""
-_GAP = 12.0
-"""Longest gap of a strip, in lines: a stronger line among fine ones, as every tenth of millimetre paper, hides them."""
+_STRONG = 0.6  # least amplitude of the wave over that inside the strips: at their ends slanted lines bias the phase
+_GAP = 12.0  # longest gap of a strip, in lines: a stronger line, as each tenth of millimetre paper, hides fine ones
 _WIDE = 25.0  # lines that a strip has to span before its phase is extrapolated by more than a straight line
 _CLEAR = 8.0  # least height of the ruler's spectral peak over the local median of the spectrum
 _CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

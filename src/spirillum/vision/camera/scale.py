@@ -110,8 +110,7 @@ class Scale:
     sources: dict[str, float]  #: Contributions to it by source, such as `robot.axis_height`; they add in quadrature.
     markers: int  #: Number of detected lines of the ruler; 0 where the scale was given.
     residual: float  #: Root mean square residual of the lines, pixels; NaN without a ruler.
-    apparent_size: float = math.nan
-    """Apparent size of the body over that of its file at this scale; NaN where not measured."""
+    apparent_size: float = math.nan  #: Apparent size of the body over its file's at this scale; NaN where not measured.
 
 
 class CalibratedCamera(NamedTuple):
@@ -120,8 +119,7 @@ class CalibratedCamera(NamedTuple):
     optics: Optics
     scale: Scale
     flags: tuple[Flag, ...] = ()
-    reduction: int = 1
-    """Factor by which pictures may be reduced that are looked at as a whole: the ruler is resolved in them."""
+    reduction: int = 1  #: Factor by which pictures may be reduced to be looked at as a whole: the ruler is resolved.
 
 
 def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> CalibratedCamera:

@@ -25,8 +25,7 @@ class ColourConstants:
 
     pairs: int = 3  #: Kinds of neighbouring stripes that have to be seen before their order is judged.
     whole_samples: int = 4  #: Fewest angles of a stripe, and of those beside it, when its width is taken.
-    blurred_width: float = 0.3
-    """Width over that of a stripe below which a colour between two others is their blurred edge."""
+    blurred_width: float = 0.3  #: Width over a stripe's below which a colour between two others is their blurred edge.
     glare: float = 240.0  #: Brightness of glare to begin with, of 255.
     pale: float = 0.7  #: Ratio of the weakest to the strongest channel from which on a bright colour is glare.
     seen: float = 0.03  #: Share of the samples from which on a class is seen.

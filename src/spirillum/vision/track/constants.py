@@ -25,8 +25,7 @@ class OutlineConstants:
     learning_rounds: int = 5
     """Rounds of learning, in which mean profiles of the edges and places of the frames are renewed in turn."""
     smoothed_rounds: int = 2  #: Rounds after which outlying poses are still replaced by a smooth path.
-    neighbours: int = 2
-    """Edge points on either side whose frames are pooled with those of a point to learn its profile."""
+    neighbours: int = 2  #: Edge points on each side whose frames are pooled with those of a point to learn its profile.
     least_strength: float = 0.2  #: Contrast of an edge on a frame over its usual one below which it is left out.
     least_share: float = 0.3  #: Share of the edges that have to fit.
     trusted_error: float = 0.6
@@ -47,8 +46,7 @@ class SealConstants:
     clear_share: float = 0.7  #: Least share of the frames on which it is found and its edges fit.
     beside: float = 3.0  #: Distance from an edge from which on colours are those of one side, pixels.
     edge_blur: float = 1.2  #: Standard deviation of the blur of an edge to begin with, pixels.
-    floors: tuple[float, float] = (0.1, 0.3)
-    """Least standard error of an edge at the ends and at the silhouettes, pixels."""
+    floors: tuple[float, float] = (0.1, 0.3)  #: Least standard error of an edge at ends and silhouettes, pixels.
     noise: float = 6.0  #: Standard deviation of the noise of a colour, of 255.
     ground: float = 12.0
     """Distance from a silhouette up to which the colours of the ground are learnt, pixels: a period of a grid."""
@@ -105,8 +103,7 @@ class InitialDetectionConstants:
     stands out the other way round is one thing that goes along."""
     faint: float = 0.4
     """Score over that on the best frames below which a frame is not learnt from: the robot is partly out of view."""
-    doubtful: float = 0.6
-    """Score over that on the best frames below which a frame is looked at again where the others suggest."""
+    doubtful: float = 0.6  #: Score over the best frames' below which a frame is looked at again where others suggest.
     clearer: float = 1.2  #: Score there over the first one from which on it is taken.
     whole_frames: int = 4  #: Frames in full view that are enough to learn stripes and tail from.
     relearning: int = 3  #: Most times that a body is learnt again at the size and place at which its outline lies.
@@ -185,10 +182,8 @@ class SetupFreeConstants:
     paper: float = 0.15  #: Width of a ruler's paper beside its lines, over the body's diameter.
     faintest: float = 0.3  #: Least usual step of the brightness from row to row, of 255.
     clear: float = 4.0  #: Step at a wall over the usual one.
-    off_axis: float = 0.35
-    """Largest distance of the robot from the middle between two walls, twice, over the body's diameter."""
-    changing_width: int = 640
-    """Largest width of the reduced pictures in which is looked whether anything moves, pixels."""
+    off_axis: float = 0.35  #: Twice the largest distance from the middle between two walls, over the body's diameter.
+    changing_width: int = 640  #: Largest width of the reduced pictures in which motion is looked for, pixels.
     changing: float = 6.0  #: Difference from the static background over its noise from which on a pixel changes.
     changing_least: float = 6.0  #: Least such difference, of 255.
     changing_share: float = 1e-4  #: Least share of the pixels of all frames that change where something moves.
@@ -213,8 +208,7 @@ class StandingConstants:
 class StripeConstants:
     """Angle of the body from its stripes (`stripes`)."""
 
-    reach: float = radians(78.0)
-    """Largest angle from the direction towards the camera up to which the surface is sampled, rad."""
+    reach: float = radians(78.0)  #: Largest angle from the direction to the camera at which the surface is sampled, rad
     step: float = radians(1.5)  #: Spacing of the samples, rad.
     margin: float = 0.12  #: Share of the seal's length that is left out at either end.
     lamp_tint: float = 3.0  #: Weight of the prior that the lamp's three channels change together within a frame.
@@ -237,8 +231,7 @@ class StripeConstants:
     pixel_locking: float = 0.05  #: Standard error of an edge by where it lies within a pixel, pixels.
     unreadable: float = 0.6  #: Loss over that of one even colour above which nothing is read.
     good: float = 0.3  #: Loss over that of a uniform colour below which the named colours are not tried as initial ones
-    faces: float = radians(60.0)
-    """Largest angle from the direction towards the camera at which an edge is surely read, rad."""
+    faces: float = radians(60.0)  #: Largest angle from the direction to the camera at which an edge is surely read, rad
     fits: float = 0.25
     """Loss over that of one even colour from which on the stripes are not those that are stated.
 
@@ -282,15 +275,13 @@ class TailConstants:
     phases: int = 40  #: Phases that are tried on every frame.
     row_stride: int = 3  #: Every how many rows of the strip one is used there.
     row_spacing: float = 1.2  #: Distance of the rows along the tail, pixels.
-    column_spacing: float = 0.25
-    """Distance of the columns across the tail over the wire's diameter, within 0.4 to 1 pixel."""
+    column_spacing: float = 0.25  #: Distance of columns across the tail over the wire's diameter, 0.4 to 1 pixel.
     border: float = 3.0  #: Width of the strip beyond the amplitude, over the wire's apparent diameter.
     least_share: float = 0.4  #: Least share of the wire that has to be where it should be.
     largest_rival: float = 0.85  #: Largest score of another phase over the best one.
     seen_share: float = 0.5
     """Share of the frames on which a tail of another shape has to be readable, so that it counts as detected."""
-    halves_agree: float = 0.13
-    """Largest difference of the wavelength of either half of a tail from that of the whole, over it."""
+    halves_agree: float = 0.13  #: Largest difference of a half tail's wavelength from that of the whole, over it.
     stretch_frames: int = 4  #: Fewest frames from which the apparent wavelength is taken.
     stretch_error: float = 0.006
     """Largest standard error of the apparent wavelength over that of the file that constrains the scale.
@@ -339,8 +330,7 @@ class LostFramesConstants:
     """Frames lost while the times go on evenly (`lost_frames`)."""
 
     fewest: int = 20  #: Fewest steps of a series for its usual step.
-    windows: tuple[int, ...] = (1, 3, 5, 9)
-    """Frames before and after a step whose medians are compared, one after the other."""
+    windows: tuple[int, ...] = (1, 3, 5, 9)  #: Frames before and after a step whose medians are compared in turn.
     rounds: int = 30  #: Most rounds of correcting times and looking again, for each of them.
     around: int = 60  #: Frames through which the local slope is taken.
     most: int = 40  #: Most frames that may be lost in a row; beyond it, the video is cut.
@@ -359,8 +349,7 @@ class LostFramesConstants:
     body_error: float = radians(0.1)  #: Least standard error of a step of the body, rad.
     place_error: float = 0.02  #: Least standard error of a step of the place, pixels.
     half: float = 0.5  #: Standard error of a loss that one series alone shows, over the loss.
-    repeats: float = 16.0
-    """Chi-square by which a step of no motion has to fit better than any other for a repeated frame."""
+    repeats: float = 16.0  #: Chi-square by which no motion has to fit better than any other step for a repeated frame.
     repeats_power: float = 25.0  #: Chi-square of the loss of one frame below which noise looks like repeated frames.
     stands: int = 5  #: Most repeated frames within as many steps to both sides; beyond it, the robot stands.
     standing: int = 12
@@ -396,8 +385,7 @@ class VisibilityConstants:
     second_clear: float = 1.3  #: Score of a second robot over that of the next best place.
     maybe_turned: float = 0.85
     """Score of a robot the other way round over that of the stated direction from which on more frames are tested."""
-    turned: float = 1.05
-    """Score of a robot the other way round over that of the stated direction from which on it is flagged."""
+    turned: float = 1.05  #: Score of a robot the other way round over the stated direction's from which it is flagged.
     often: float = 0.6  #: Share of the frames on which a second robot has to be seen.
     asked: int = 3  #: Stride of the frames on which the body turned by 180 degrees is tried first.
     lost: float = 0.03  #: Share of frames without the robot that is flagged.

@@ -35,12 +35,10 @@ class CutConstants:
     angle: float = 0.12  #: Least jump of an angle, rad.
     persists: float = 0.5  #: Share of a jump below which a series goes on after it as before.
     gap: float = 3.0  #: Time between two frames over the usual one from which on it is a gap, and no line goes across.
-    long_window: int = 30
-    """Readings before and after a gap through which lines are fitted that show whether time has passed."""
+    long_window: int = 30  #: Readings before and after a gap whose fitted lines show whether time has passed.
     clock_place: float = 0.3  #: Distance of these lines below which they meet, pixels.
     clock_angle: float = 0.05  #: Distance of these lines below which they meet, rad.
-    clock_errors: float = 5.0
-    """Distance over its standard error below which they meet; errors of readings are not independent."""
+    clock_errors: float = 5.0  #: Distance over its standard error below which they meet: errors are not independent.
     unseen: int = 20  #: Frames without the robot over which lines go on: it may be lost where it jumps.
     advance: float = 0.5  #: Least advance of a robot that turns, pixels.
     tail_turns: float = 1.0  #: Turns of the tail in which it has to advance by that.

@@ -29,8 +29,7 @@ class _Plane(NamedTuple):
 
     x: Samples  # positions along, m, (c,)
     y: Samples  # positions across, m, (r,)
-    columns: Samples
-    """Pixel column of each of its points, (r, c); outside of the picture where the point is not looked at."""
+    columns: Samples  # pixel column of each of its points, (r, c); outside of the picture where it is not looked at
     rows: Samples  # pixel row of each of its points, (r, c)
 
 
@@ -103,19 +102,16 @@ _ALLOWED = "allowed: one that is in view, with the right robot.file, heights and
 class Start:
     """Result of the initial detection."""
 
-    body: BodyFinder = field(repr=False)
-    """The body, which has learnt, in front of a camera that shows it as large as it looks."""
+    body: BodyFinder = field(repr=False)  #: The trained body before a camera that shows it as large as it looks.
     size: float  #: How large it looks, over the body that was looked for.
     off: tuple[float, float]
     """From where its edges were learnt to where its outline lies, (x, y), m: the search takes a lit side and a shadow
     for a part of the body, by some tenths of a pixel, and edges are learnt where it has found them."""
-    seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
-    """Frames on which the robot was found, 8-bit RGB, and where."""
+    seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)  #: Frames with the robot, 8-bit RGB, and where it is.
     path: list[tuple[float, BodyPose]]  #: When it was where.
     score: float  #: How clear its edges usually are, grey per pixel.
     clearness: float  #: How clearly it stands out: `spirillum.vision.track.size.clearness`.
-    rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
-    """Frames with a false detection that is as clear, and where."""
+    rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)  #: Frames with a false detection as clear, and where.
     flags: tuple[Flag, ...]
     search: SealSearch | None = field(default=None, repr=False)
     """What looks for the seal in whole pictures, where the robot was found by it."""

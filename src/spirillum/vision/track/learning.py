@@ -49,11 +49,9 @@ class GlareConstants:
 
     On path-traced videos it was 60 there, and 17 at most where grids, shadows and caustics made one."""
     sharp: float = 0.4  #: Least share of the step within four pixels on either side of it.
-    slant: int = 8
-    """Largest distance along the path of the step on one side of the body from that on the other, pixels."""
+    slant: int = 8  #: Largest distance along the path of the steps on both sides of the body, pixels.
     in_view: float = 0.5  #: Least share of the path that has to be in the picture.
-    veil_drift: float = 0.5
-    """Standard error of the displacement from end to end under a mirrored lamp, pixels. Assumed."""
+    veil_drift: float = 0.5  #: Standard error of the total displacement under a mirrored lamp, pixels. Assumed.
 
 
 GLARE = GlareConstants()

@@ -113,8 +113,7 @@ class LoneOutlineConstants:
     across: float = 0.8  #: Half its width, over the body's radius.
     lines: int = 15  #: Lines along it.
     in_view: float = 0.5  #: Least share of it that has to be in the picture.
-    flat: float = 0.12
-    """Half the width of the running mean along the lines that is subtracted, over the body's diameter."""
+    flat: float = 0.12  #: Half the width of the subtracted running mean along the lines, over the body's diameter.
     texture: float = 4.0
     """Texture of the background from which on it is not plain, of 255; a single cable or speck makes none.
 
@@ -138,8 +137,7 @@ class OutlineCheck(NamedTuple):
 
     drift: float = 0.0  #: Standard error of the displacement from end to end by the outline alone, pixels.
     flags: tuple[Flag, ...] = ()  #: A flag that names the cue and a frame, where the outline alone gives the pose.
-    suspect: str = ""
-    """What the outline may follow in place of the body; empty for an opaque body over a plain background."""
+    suspect: str = ""  #: What the outline may follow in place of the body; empty for opaque bodies on plain ground.
 
 
 def check_outline(

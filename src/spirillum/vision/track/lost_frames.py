@@ -53,8 +53,7 @@ class _Change(NamedTuple):
 class _Jumps(NamedTuple):
     """Jumps of one series at each step, against the straight line through its neighbourhood."""
 
-    jump: Samples
-    """Median of some frames after the step minus that of as many before it, modulo the period, (m,); NaN: unknown."""
+    jump: Samples  # median of frames after the step minus that of as many before, modulo the period, (m,); NaN: unknown
     usual: Samples  # usual step in the time of one frame, (m,)
     error: float  # robust standard error of a jump
     period: float

@@ -55,8 +55,7 @@ class SetupFreeDetection(NamedTuple):
     stripes: tuple[str, ...]  #: Colours of its stripes in the order seen; empty where they could not be read.
     walls: Walls | None  #: Walls of its channel; None where none were found.
     frames: list[Frame]  #: Frames that were looked at.
-    reduction: int
-    """Factor by which they may be reduced where they are looked at as a whole: the ruler is resolved in them."""
+    reduction: int  #: Factor by which they may be reduced to be looked at as a whole: the ruler is resolved in them.
 
     @property
     def optics(self) -> Optics:

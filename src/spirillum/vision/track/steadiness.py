@@ -227,8 +227,7 @@ class PictureSteps(NamedTuple):
     """Evidence of the pictures about each step from a frame to the next."""
 
     jumps: np.ndarray  #: Mask of the steps on which the picture changes as if a frame or more were missing, (n - 1,).
-    rests: np.ndarray
-    """Mask of the steps on which it hardly changes, as on a frame that repeats the one before, (n - 1,)."""
+    rests: np.ndarray  #: Mask of the steps on which it hardly changes, as on a repeated frame, (n - 1,).
 
     def jump_near(self, step: int) -> bool:
         """Whether the picture jumps at a step or beside it."""

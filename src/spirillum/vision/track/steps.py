@@ -28,8 +28,7 @@ class FollowingConstants:
     search_interval: int = 15  #: Frames between two searches of the whole picture for a robot that was lost.
     memory: int = 12  #: Frames from which the next place is predicted.
     largest_jump: float = 4.0  #: Largest accepted distance from the predicted position, pixels.
-    gap: float = 3.0
-    """Time between two frames over the usual one from which on the robot may have left its predicted path."""
+    gap: float = 3.0  #: Time between frames over the usual one from which the robot may have left its predicted path.
     sure_step: float = 1.0
     """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
     usual_edges: int = 200  #: Frames with the body in view whose median is the usual share of the edges that fit.

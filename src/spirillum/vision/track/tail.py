@@ -22,8 +22,7 @@ _COARSE = 13  # stations along the tail at which the optics are evaluated
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
 """First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)  # candidate wavelengths, over that of the robot file
-_NEAR = np.linspace(0.84, 1.16, 17)
-"""Wavelengths over that of the robot file among which the apparent one is interpolated."""
+_NEAR = np.linspace(0.84, 1.16, 17)  # wavelengths over the robot file's among which the apparent one is interpolated
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
 """Candidate amplitudes where the tail does not fit, over that of the robot file."""
 _PHASES = 2.0 * np.pi * np.arange(TAIL.phases) / TAIL.phases
@@ -35,8 +34,7 @@ class _Strip(NamedTuple):
 
     middle: Samples  # pixel of the tail's axis in each row, (rows, 2)
     across: Samples  # step from one column to the next, pixels, (rows, 2)
-    tilt: Samples
-    """Derivatives with height of the shift along (e) and across (f) and of the magnification (g), (rows, 3)."""
+    tilt: Samples  # derivatives with height of the shifts along (e) and across (f) and the magnification (g), (rows, 3)
 
 
 class _SeenShape(NamedTuple):

@@ -26,8 +26,7 @@ class CueConstants:
 
     fewest: int = 5  #: Fewest edges of a cue on a frame.
     frames: int = 8  #: Fewest frames with outline and seal for a comparison of their motions.
-    apart: float = 0.4
-    """Standard error of the displacement from end to end by cues that disagree that is flagged, pixels."""
+    apart: float = 0.4  #: Flagged standard error of the displacement from end to end by cues that disagree, pixels.
     colour_drift: float = 0.1
     """Standard error of the displacement from end to end where colours locate the edges, pixels; at most a half
     of this way.
@@ -121,15 +120,12 @@ class Track:
     frame: Samples = field(repr=False)
     """Number of each frame in the video, counted as it was recorded where that is known, (n,)."""
     position: Samples = field(repr=False)  #: The body's mid-length (x, y), m, (n, 2).
-    heading: Samples = field(repr=False)
-    """Angle of the motor axis to the x axis in the plane of the picture, rad, (n,)."""
+    heading: Samples = field(repr=False)  #: Angle of the motor axis to x in the plane of the picture, rad, (n,).
     body_angle: Samples = field(repr=False)  #: Angle by which the body has turned about +x, unwrapped, rad, (n,).
     tail_phase: Samples = field(repr=False)  #: Phase phi of the tail about +x in the lab, unwrapped, rad, (n,).
     position_error: Samples = field(repr=False)  #: Estimated standard error of the x position on each frame, m, (n,).
-    body_angle_error: Samples = field(repr=False)
-    """Estimated standard error of the body's angle on each frame, rad, (n,)."""
-    tail_phase_error: Samples = field(repr=False)
-    """Estimated standard error of the tail's phase on each frame, rad, (n,)."""
+    body_angle_error: Samples = field(repr=False)  #: Standard error of the body's angle on each frame, rad, (n,).
+    tail_phase_error: Samples = field(repr=False)  #: Standard error of the tail's phase on each frame, rad, (n,).
     picture: Samples = field(repr=False)  #: For drawing: pixel (u, v) of the body's mid-length and of its nose, (n, 4).
     size: tuple[int, int]  #: Width and height of the picture, pixels.
     scale: Scale  #: Scale of lengths.
@@ -138,7 +134,7 @@ class Track:
     flags: tuple[Flag, ...] = ()  #: What to know about it.
     words: str = ""  #: Metadata of the video's file, such as that it is synthetic.
     drift: float = 0.0
-    """Standard uncertainty of the velocity by a camera that drifted along the channel, and by glare, m/s."""
+    """Standard uncertainty of the velocity by drift of the camera along the channel and by glare, m/s."""
     body_angle_drift: float = 0.0
     """Standard uncertainty of the body's angle from end to end, by glare on its stripes or their widths, rad."""
     tail_phase_drift: float = 0.0

@@ -25,8 +25,7 @@ class WidthConstants:
 
     reach: float = radians(14.0)  #: Largest shift of an edge that is tried, rad: a third of a stripe of eight.
     step: float = radians(0.5)  #: Steps between the shifts that are tried, rad.
-    steepest: float = radians(52.0)
-    """Largest angle from the direction towards the camera at which an edge is located, rad."""
+    steepest: float = radians(52.0)  #: Largest angle from the direction to the camera at which an edge is located, rad.
     around: float = 0.42  #: Half width over that of a stripe of the surroundings through which an edge is located.
     contrast: float = 40.0  #: Least difference of the colours on either side, of 255.
     fewest: int = 8  #: Fewest samples along the angle.
@@ -34,8 +33,7 @@ class WidthConstants:
     rounds: int = 4  #: Rounds in which stray edges are left out.
     stray: float = 4.0  #: Residual over the usual one from which on an edge of a frame is left out.
     seen: int = 10  #: Fewest frames of an edge.
-    linked: int = 4
-    """Fewest frames on which two edges are seen together from which on they determine the distance of these."""
+    linked: int = 4  #: Fewest frames with two edges together that determine their distance.
     uneven: float = radians(2.0)
     """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring-reference.md`."""
     clear: float = 10.0
@@ -47,19 +45,16 @@ class WidthConstants:
     """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
     painted: float = 0.2 / sqrt(3.0)
     """Standard deviation of the widths of stripes by hand, over an even one: evenly spread up to a fifth."""
-    other_size: float = 0.015
-    """Standard deviation of what wrong scale, diameter and heights add to all widths alike. Assumed."""
+    other_size: float = 0.015  #: Standard deviation of all widths by wrong scale, diameter and heights. Assumed.
     size: float = 0.005
     """Standard uncertainty of what wrong sizes and heights add to widths learnt from a part of a turn. Assumed."""
-    printed: float = 0.01
-    """Standard deviation of what noise, lens and printing add to each width, over an even one. Assumed."""
+    printed: float = 0.01  #: Standard deviation of widths by noise, lens and printing, over an even one. Assumed.
     together: float = 2.5
     """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
 
 
 WIDTHS = WidthConstants()
-_TRIED = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
-"""Shifts of an edge that are tried, rad."""
+_TRIED = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)  # tried shifts of an edge, rad
 
 
 class Evened(NamedTuple):

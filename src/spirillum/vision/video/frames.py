@@ -80,8 +80,7 @@ _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
 """Most and fewest frames that wait between two threads, and the bytes that they may take between."""
 _SAME_RATE = 0.01  # relative difference from which on two rates are not the same
 _BATCH = 16  # most pages of a TIFF file that are decoded at a time
-_FEW, _MISSING = 2, 0.02
-"""Number and share of frames, and share of the length, that a video may lack of what its file states."""
+_FEW, _MISSING = 2, 0.02  # number and share of frames, and share of the length, that a video may lack of those stated
 _NEAR = 10.0  # seconds that are rather decoded through than jumped over
 
 
@@ -117,8 +116,7 @@ class Video:
     images: ImageSequence | None = None  #: The images of a folder or stack; None for a video.
     display: Display = AS_STORED  #: How the stored pictures of a video or its images are shown.
     stated: Stated = UNSTATED  #: How long the file states a video to be.
-    words: str = ""
-    """Metadata of the file: title and comment of a video, texts in a folder's first image and its README."""
+    words: str = ""  #: Metadata of the file: title and comment of a video, texts of a folder's first image and README.
     flags: list[Flag] = field(default_factory=list)  #: What was found while reading.
 
     @property

@@ -34,8 +34,7 @@ _OPENING = {
 """A video is one file: no playlist that opens other files, or asks a network for them."""
 _FEW = 2  # frames of a stream that is a picture, not a video
 _NEAR = 0.02  # least part of a video that is flagged as missing
-_LOOSE = 0.5
-"""Least part of a video that is flagged as missing where its length is that of the whole file, with sound, s."""
+_LOOSE = 0.5  # least missing part that is flagged where a video's length is that of the whole file, with sound, s
 
 
 class Stated(NamedTuple):
@@ -171,8 +170,7 @@ def one_line(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_MOST_WORDS]
 
 
-_SAMPLED_IMAGES = 10
-"""First images, whose usual size is that of all; and images spread over all, whose brightest value is."""
+_SAMPLED_IMAGES = 10  # first images, whose usual size is that of all; images spread over all, whose brightest value is
 
 
 @dataclass(frozen=True)
