@@ -7,6 +7,7 @@ import pytest
 
 from remembered import remembered
 from spirillum.live.tracker import LiveTracker
+from spirillum.measurement.trials import trial_of
 from spirillum.vision.camera.optics import Optics
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.assembly import follow
@@ -86,6 +87,22 @@ def test_the_speed_over_a_grid_is_the_robots(film, tmp_path, clear):
     assert abs(turned) < 0.1  # of two; a pixel across the seal is 0.06
     assert track.cues["seal"].share == 1.0
     assert track.cues["tail"].share > 0.9
+
+
+@pytest.mark.parametrize("hand", [True, False])
+def test_a_robot_that_a_hand_hides_or_takes_away_keeps_its_speed(film, tmp_path, hand):
+    """Behind a hand nothing looks like a seal; on bare paper the outline may stick to lines."""
+    setup = written(film, tmp_path, clear=0.0)
+    _, paper, *_ = layers(flat=film)
+    covered = np.full(paper.shape, (120, 140, 190)) if hand else paper[:, :, ::-1]
+    for index in range(8, 14) if hand else range(14, len(film.times)):
+        cv2.imwrite(str(tmp_path / "film" / f"{index:02d}.png"), covered.astype(np.uint8))
+    trial = trial_of(follow(tmp_path / "film", *load_setup(setup)), load_setup(setup)[1])
+    speed = trial.quantities["forward_velocity"]
+    assert speed.low < film.velocity < speed.high
+    assert speed.high - speed.low < 0.2 * film.velocity
+    lost = {"robot-lost"} if hand else {"robot-left-the-view", "something-else-followed"}
+    assert lost & {flag.name for flag in trial.flags}
 
 
 def test_a_swing_across_the_lines_is_the_robots(film, tmp_path):

@@ -220,7 +220,7 @@ def _found_by_seal(body: BodyFinder, frames: Sequence[Frame], colours: int) -> _
         return None
     search = SealSearch(body.robot, body.optics, body.bounds)
     found = [search.places(frame.image) for frame in frames]
-    scores = np.array([[one.score for one in some] + [0.0] * (2 - len(some)) for some in found])[:, :2]
+    scores = np.array([[one.score for one in some[:2]] + [0.0] * (2 - len(some)) for some in found])
     best, clear = np.median(scores, axis=0)[0], float(np.median(scores[:, 0] / np.maximum(scores[:, 1], 1.0)))
     if best < SEAL.least_score or np.mean(scores[:, 0] > DETECTION.faint * best) < SEAL.clear_share:
         return None
