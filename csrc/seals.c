@@ -64,19 +64,6 @@ static bool surroundings(const Profiles *p, const int64_t *side, int64_t fewest,
     return true;
 }
 
-/* Inverse of a symmetric matrix by its cofactors. */
-static void invert(const double a[COLOURS][COLOURS], double inverse[COLOURS][COLOURS]) {
-    double determinant = 0.0;
-    for (int i = 0; i < COLOURS; i++)
-        for (int j = 0; j < COLOURS; j++) {
-            const int p = (i + 1) % 3, q = (i + 2) % 3, r = (j + 1) % 3, s = (j + 2) % 3;
-            inverse[i][j] = a[p][r] * a[q][s] - a[p][s] * a[q][r];
-        }
-    for (int j = 0; j < COLOURS; j++) determinant += a[0][j] * inverse[0][j];
-    for (int i = 0; i < COLOURS; i++)
-        for (int j = 0; j < COLOURS; j++) inverse[i][j] /= determinant;
-}
-
 /* Inverse covariance of what lies beside the edges of a side, with noise and what the ground has farther out. */
 static void whitening(const Profiles *p, const int64_t *side, const double *middle,
                       const double ground[COLOURS][COLOURS], double inverse[COLOURS][COLOURS]) {
@@ -94,7 +81,7 @@ static void whitening(const Profiles *p, const int64_t *side, const double *midd
     }
     for (int a = 0; a < COLOURS; a++)
         for (int b = 0; b < COLOURS; b++) spread[a][b] = spread[a][b] / count + ground[a][b];
-    invert(spread, inverse);
+    invert((const double *)spread, (double *)inverse);
 }
 
 /* Direction that separates a step of colour best from the surroundings (Fisher's); returns their squared distance. */

@@ -59,18 +59,6 @@ void fill_flows(int64_t p, const double z[LANES], double wall, double (*r)[LANES
     }
 }
 
-/* Inverse of a 3x3 matrix by cofactors. */
-static void invert(const double a[9], double inverse[9]) {
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            const int b = 3 * ((j + 1) % 3), c = 3 * ((j + 2) % 3), d = (i + 1) % 3, e = (i + 2) % 3;
-            inverse[3 * i + j] = a[b + d] * a[c + e] - a[b + e] * a[c + d];
-        }
-    }
-    const double determinant = a[0] * inverse[0] + a[1] * inverse[3] + a[2] * inverse[6];
-    for (int e = 0; e < 9; e++) inverse[e] /= determinant;
-}
-
 void fill_wall_flows(double wall, int64_t orders, WallFlows *flows) {
     double z[LANES], scaled[LANES], r[orders + 2][LANES], v[9][LANES], matrix[9];
     EACH_LANE z[l] = wall;

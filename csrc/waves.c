@@ -211,20 +211,6 @@ static Normal normal_of(const Row *rows, int64_t count, bool of_mirrored) {
     return normal;
 }
 
-/* Inverse of a symmetric matrix by cofactors. */
-static void invert(double m[3][3], double inverse[3][3]) {
-    for (int a = 0; a < 3; a++) {
-        const int b = (a + 1) % 3, c = (a + 2) % 3;
-        for (int d = 0; d < 3; d++) {
-            const int e = (d + 1) % 3, f = (d + 2) % 3;
-            inverse[d][a] = m[b][e] * m[c][f] - m[b][f] * m[c][e];
-        }
-    }
-    const double determinant = m[0][0] * inverse[0][0] + m[0][1] * inverse[1][0] + m[0][2] * inverse[2][0];
-    for (int a = 0; a < 3; a++)
-        for (int d = 0; d < 3; d++) inverse[a][d] /= determinant;
-}
-
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* Standard error, inlier share, handedness and amplitude error of a converged fit. */
@@ -248,7 +234,7 @@ static void assess(const Strip *strip, Row *rows, const View *view, const Normal
     /* The effect of opposite handedness, orthogonal to those of phase, offset and tilt. */
     Normal gram = normal_of(rows, strip->rows, true);
     for (int a = 0; a < 3; a++) gram.matrix[a][a] += 1e-12 * normal->matrix[a][a];
-    invert(gram.matrix, other);
+    invert((const double *)gram.matrix, (double *)other);
     for (int k = 5; k < 9; k++) answer[k] = 0.0;
     for (int64_t i = 0; i < strip->rows; i++) {
         const Row *row = rows + i;
@@ -292,7 +278,7 @@ EXPORT void wave_fit(const double *ridge, const double *xi, const Tilt *tilt, co
         normal.matrix[2][2] += prior_lean;
         normal.right[1] -= prior_offset * offset;
         normal.right[2] -= prior_lean * lean;
-        invert(normal.matrix, inverse);
+        invert((const double *)normal.matrix, (double *)inverse);
         const double change = dot(inverse[0], normal.right);
         phase += 1.2 * clamped(change, -0.5, 0.5);
         offset += dot(inverse[1], normal.right);
